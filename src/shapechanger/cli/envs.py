@@ -1,0 +1,169 @@
+"""`shapechanger envs`: what there is, what its numbers mean, what a shift changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.cli.pictures import write_picture
+from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.layout import Layout
+from shapechanger.transfer.env_ref import layouts_of
+
+__all__ = ["Envs"]
+
+_EnvId = Annotated[str, tyro.conf.Positional]
+
+
+@dataclass(frozen=True)
+class ListEnvs:
+    """List all envs."""
+
+    def run(self) -> None:
+        """Print a table of the catalogue."""
+        table = Table("id", "body", box=None, pad_edge=False)
+        for entry in CATALOGUE.values():
+            table.add_row(entry.id, entry.summary)
+        Console().print(table)
+
+
+@dataclass(frozen=True)
+class Show:
+    """Show what each number of an env's observation and action means."""
+
+    env: _EnvId
+    """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
+    body: str = ""
+    """Another body of the family: its name, or edits as JSON."""
+
+    def run(self) -> None:
+        """Print both layouts and what follows from the body."""
+        with opened(env_ref(self.env, self.body)) as env:
+            observation, action = layouts_of(env)
+            console = Console()
+            console.print(_layout_table("action", action))
+            console.print(_layout_table("observation", observation))
+            for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
+                value = getattr(env.unwrapped, name, None)
+                if value is not None and value != ():
+                    console.print(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Say what changes from one env to another, in words and numbers."""
+
+    source: _EnvId
+    """Id of the env to come from."""
+    target: _EnvId
+    """Id of the env to go to."""
+    source_body: str = ""
+    """Another body of the source's family: its name, or edits as JSON."""
+    target_body: str = ""
+    """Another body of the target's family: its name, or edits as JSON."""
+
+    def run(self) -> None:
+        """Print the certificate of the shift."""
+        with (
+            opened(env_ref(self.source, self.source_body)) as source,
+            opened(env_ref(self.target, self.target_body)) as target,
+        ):
+            certificate = source.unwrapped.certify_shift(source, target)  # type: ignore[attr-defined]
+            Console(soft_wrap=True, highlight=False).print(str(certificate), markup=False)
+
+
+@dataclass(frozen=True)
+class Check:
+    """Check that an env keeps the promises that learners rely on."""
+
+    env: _EnvId
+    """Id of the env."""
+    body: str = ""
+    """Another body of the family: its name, or edits as JSON."""
+
+    def run(self) -> None:
+        """Put the env through its exam."""
+        from shapechanger.testing import examine
+
+        ref = env_ref(self.env, self.body)
+        for question in examine(ref.make):
+            Console().print(f"[green]kept[/green]  {question}")
+
+
+@dataclass(frozen=True)
+class Render:
+    """Draw an env's body as it stands."""
+
+    env: _EnvId
+    """Id of the env."""
+    out: Path
+    """The picture to write, a PNG file."""
+    body: str = ""
+    """Another body of the family: its name, or edits as JSON."""
+    width: int = 640
+    """Width of the picture in pixels."""
+    height: int = 480
+    """Height of the picture in pixels."""
+
+    def run(self) -> None:
+        """Write the picture."""
+        with opened(env_ref(self.env, self.body)) as env:
+            write_picture(env.unwrapped.picture(self.width, self.height), self.out)  # type: ignore[attr-defined]
+        Console().print(f"wrote {self.out}", highlight=False)
+
+
+@dataclass(frozen=True)
+class Envs:
+    """Look at the envs: list, show, compare, check, render."""
+
+    command: (
+        Annotated[ListEnvs, tyro.conf.subcommand("list")]
+        | Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[Compare, tyro.conf.subcommand("compare")]
+        | Annotated[Check, tyro.conf.subcommand("check")]
+        | Annotated[Render, tyro.conf.subcommand("render")]
+    )
+
+    def run(self) -> None:
+        """Do what was asked."""
+        self.command.run()
+
+
+def _layout_table(side: str, layout: Layout) -> Table:
+    """A layout as a table, one line for each feature."""
+    title = f"{side}: {layout.size} numbers"
+    table = Table(
+        "#", "name", "unit", "low", "high", "belongs to", title=title, title_justify="left"
+    )
+    if side == "action":
+        table.add_column("1 gives")
+    for feature, places in zip(layout, layout.slices.values(), strict=True):
+        number = str(places.start) if feature.size == 1 else f"{places.start}..{places.stop - 1}"
+        element = feature.element
+        row = [
+            number,
+            feature.name,
+            feature.unit,
+            f"{feature.low:.4g}",
+            f"{feature.high:.4g}",
+            f"{element.kind} {element.name}" if element else "",
+        ]
+        if side == "action":
+            row.append(f"{feature.gain:.4g} {feature.gain_unit}".strip())
+        table.add_row(*row)
+    return table
+
+
+def _in_words(value: Any) -> str:
+    """Numbers rounded for reading, edits as they are written."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, tuple):
+        return ", ".join(_in_words(item) for item in value)
+    return str(value)

@@ -1,0 +1,82 @@
+"""`shapechanger play`: watch a policy, in a window or as a film."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+
+from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.cli.pictures import write_film
+from shapechanger.envs.headless import has_screen
+from shapechanger.errors import StudyError
+
+__all__ = ["Play"]
+
+
+@dataclass(frozen=True)
+class Play:
+    """Watch a policy in an env: in a window, or as a film where there is no screen."""
+
+    env: Annotated[str, tyro.conf.Positional]
+    """Id of the env, such as BigAnt."""
+    policy: Path | None = None
+    """A policy that `train` or a study has written; random actions if not given. One of another
+    body acts through the body map of same names."""
+    body: str = ""
+    """Another body of the family: its name, or edits as JSON."""
+    out: Path | None = None
+    """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
+    episodes: int = 1
+    """How many episodes."""
+    seed: int = 0
+    """Seed of the starts, and of random actions."""
+    max_steps: int = 1000
+    """Longest episode to show."""
+
+    def run(self) -> None:
+        """Play, and say what it was worth."""
+        if self.episodes < 1 or self.max_steps < 1:
+            raise StudyError("Playing takes at least one episode of one step.")
+        out = self.out or (None if has_screen() else Path("play.mp4"))
+        console = Console(highlight=False)
+        frames: list[NDArray[Any]] = []
+        mode = "human" if out is None else "rgb_array"
+        with opened(env_ref(self.env, self.body), render_mode=mode) as env:
+            acting, act = self._policy(env)
+            for episode in range(self.episodes):
+                observation, _ = acting.reset(seed=self.seed + episode)
+                worth, steps, over = 0.0, 0, False
+                while not over and steps < self.max_steps:
+                    action = act(np.asarray(observation)[None])[0]
+                    observation, reward, terminated, truncated, _ = acting.step(action)
+                    worth, steps = worth + float(reward), steps + 1
+                    over = terminated or truncated
+                    if out is not None:
+                        frames.append(cast("NDArray[Any]", env.render()))
+                console.print(f"episode {episode}: return {worth:.1f} in {steps} steps")
+            if out is not None:
+                write_film(frames, out, float(env.metadata["render_fps"]))
+                console.print(f"wrote {out}")
+
+    def _policy(self, env: Any) -> tuple[Any, Any]:
+        """The env to act in, and what acts."""
+        from shapechanger.transfer.evaluation import random_actions
+
+        if self.policy is None:
+            return env, random_actions(env.action_space, self.seed)
+        from shapechanger.transfer.body_map import BodyMap, MappedEnv
+        from shapechanger.transfer.env_ref import layouts_of
+        from shapechanger.transfer.policy_file import load_policy
+
+        policy = load_policy(self.policy)
+        observation, action = layouts_of(env)
+        if (observation, action) == (policy.card.observation, policy.card.action):
+            return env, policy.act
+        body_map = BodyMap.between(policy.card.observation, observation, policy.card.action, action)
+        return MappedEnv(env, body_map), policy.act

@@ -1,0 +1,79 @@
+"""`shapechanger train`: a policy for one env."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from shapechanger.cli.env_arguments import default_learner, env_ref
+from shapechanger.cli.progress import StudyProgress
+from shapechanger.cli.stopping import Interrupted
+
+__all__ = ["Train"]
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train a policy in one env, and write it to a file that `play` and `transfer` take."""
+
+    env: Annotated[str, tyro.conf.Positional]
+    """Id of the env, such as BigAnt."""
+    body: str = ""
+    """Another body of the family: its name, or edits as JSON."""
+    out: Path | None = None
+    """The file to write; results/policies/ENV.zip if not given."""
+    steps: int | None = None
+    """Env steps; the learner's own number if not given."""
+    learner: str | None = None
+    """Name of the learner's settings; those tuned for the env if not given."""
+    seed: int = 0
+    """Seed of everything random."""
+    tensorboard: Path | None = None
+    """Folder for TensorBoard's logs; none are written if not given."""
+
+    def run(self) -> None:
+        """Train, showing the evaluations as they come."""
+        import torch
+
+        from shapechanger.transfer.evaluation import Evaluation
+        from shapechanger.transfer.files import make_folder
+        from shapechanger.transfer.policy_file import save_policy
+        from shapechanger.transfer.settings import learner_settings
+        from shapechanger.transfer.training import train
+
+        env = env_ref(self.env, self.body)
+        learner = self.learner or default_learner(env)
+        settings = learner_settings(learner)
+        steps = settings.whole_updates(self.steps or settings.steps)
+        out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
+        make_folder(out.parent)
+        torch.set_num_threads(1)  # These networks are small; more threads wait for one another.
+        console = Console(highlight=False)
+
+        def show(result: Evaluation) -> None:
+            terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())
+            console.print(
+                f"{result.steps:>9} steps: return {result.mean_return:.1f} "
+                f"over {result.mean_length:.0f} steps an episode ({terms})"
+            )
+
+        try:
+            with StudyProgress({env.id: steps}) as progress:
+                policy = train(
+                    env,
+                    learner,
+                    settings,
+                    self.steps or settings.steps,
+                    self.seed,
+                    on_evaluation=show,
+                    on_steps=lambda done: progress(env.id, done, False),
+                    tensorboard=self.tensorboard,
+                )
+        except KeyboardInterrupt:
+            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+        save_policy(policy, out)
+        console.print(f"wrote {out}")

@@ -1,0 +1,220 @@
+"""`shapechanger transfer`: a whole transfer study in one command."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+import msgspec
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from shapechanger.cli.env_arguments import default_learner, env_ref, opened
+from shapechanger.cli.progress import StudyProgress
+from shapechanger.cli.stopping import Interrupted
+from shapechanger.errors import MapError, OutputError, RenderError
+from shapechanger.transfer.env_ref import EnvRef
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.plan import Plan
+    from shapechanger.transfer.study import Study
+
+__all__ = ["Transfer"]
+
+# What --quick divides the budget by, and the seeds it does with: enough to see that all works.
+_QUICK_DIVISOR: Final = 8
+_QUICK_SEEDS: Final = 2
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Learn in SOURCE, move to TARGET, and measure what the move was worth.
+
+    Stopped half-way, the same command goes on where it was.
+    """
+
+    source: Annotated[str, tyro.conf.Positional]
+    """Id of the env that the policy is learned in, such as Ant."""
+    target: Annotated[str, tyro.conf.Positional]
+    """Id of the env that it is moved to, such as ExtendedAnt."""
+    seeds: int | None = None
+    """Runs of each arm; 5 if not given."""
+    steps: int | None = None
+    """Target steps of a run; the learner's own number if not given."""
+    source_steps: int | None = None
+    """Source steps of a source policy; as many as target steps if not given."""
+    quick: bool = False
+    """Two seeds and an eighth of the steps: to see that it works, not to believe the numbers."""
+    out: Path | None = None
+    """The study's folder; results/SOURCE-to-TARGET if not given."""
+    source_policy: Path | None = None
+    """A policy to bring along in place of training one for each seed."""
+    source_body: str = ""
+    """Another body of the source's family: its name, or edits as JSON."""
+    target_body: str = ""
+    """Another body of the target's family: its name, or edits as JSON."""
+    learner: str | None = None
+    """Name of the learner's settings; those tuned for the target if not given."""
+    arms: tuple[Literal["scratch", "zero-shot", "fine-tune"], ...] = (
+        "scratch",
+        "zero-shot",
+        "fine-tune",
+    )
+    """What to compare; scratch is always needed."""
+    rule: tuple[str, ...] = ()
+    """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
+    "foot_*/motor=copy ankle_*/motor", "*/contact/*=zero", "ankle_4/angle=hold"."""
+    map: Path | None = None
+    """The body map as a TOML file, in place of --rule and --units."""
+    units: Literal["same", "torque"] = "same"
+    """Whether actions map as they are, or by the torque that they give."""
+    seed: int = 0
+    """Number that the seeds of all runs are drawn from."""
+    workers: int | None = None
+    """Runs at a time; one for each core if not given."""
+
+    def run(self) -> None:
+        """Do the study, print its table, and write its report."""
+        from shapechanger.transfer.executor import Processes
+        from shapechanger.transfer.study import run_study
+
+        console = Console(highlight=False)
+        executor = Processes(self.workers)
+        plan = self._plan()
+        out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
+        steps = {run.name: _steps(plan, run.kind) for run in plan.runs()}
+        try:
+            with StudyProgress(steps) as progress:
+                study = run_study(
+                    plan,
+                    out,
+                    source_policy=self.source_policy,
+                    executor=executor,
+                    on_progress=progress,
+                    command=_command(),
+                )
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"Stopped. Runs that had ended are kept in {out}; go on with: {_command()}"
+            ) from None
+        except OutputError as error:
+            raise OutputError(
+                f"{error} Runs that had ended are kept in {out}; go on with: {_command()}"
+            ) from error
+        _print(console, study)
+        report = self._report(study, out)
+        console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
+
+    def _plan(self) -> Plan:
+        """What to do."""
+        from shapechanger.transfer.plan import TransferTask
+        from shapechanger.transfer.settings import learner_settings
+        from shapechanger.transfer.study import make_plan
+
+        task = TransferTask(
+            env_ref(self.source, self.source_body), env_ref(self.target, self.target_body)
+        )
+        learner = self.learner or default_learner(task.target)
+        settings = learner_settings(learner)
+        steps, seeds = self.steps, self.seeds
+        if self.quick:
+            shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
+            settings = msgspec.structs.replace(
+                settings, eval_every=min(settings.eval_every, settings.whole_updates(shortest // 4))
+            )
+            steps = steps or shortest
+            seeds = seeds or _QUICK_SEEDS
+        return make_plan(
+            task,
+            learner,
+            settings,
+            seeds=5 if seeds is None else seeds,
+            steps=steps,
+            source_steps=self.source_steps,
+            source_policy=self.source_policy,
+            arms=self.arms,
+            seed=self.seed,
+            rules=dict(_split_rule(rule) for rule in self.rule),
+            map_text=_read(self.map) if self.map else "",
+            units=self.units,
+        )
+
+    def _report(self, study: Study, out: Path) -> Path:
+        """Write the report; a machine that cannot draw bodies gets one without their pictures."""
+        from shapechanger.transfer.report import write_report
+
+        path = out / "report.html"
+        pictures, note = None, ""
+        try:
+            pictures = _pictures(study.plan.task.source, study.plan.task.target)
+        except RenderError as error:
+            note = str(error)
+        write_report(study, path, pictures=pictures, picture_note=note)
+        return path
+
+
+def _split_rule(text: str) -> tuple[str, str]:
+    """The name and the rule of `NAME=RULE`.
+
+    Raises:
+        MapError: If it is not of that form.
+    """
+    name, equals, rule = text.partition("=")
+    if not (name and equals and rule):
+        raise MapError(f"A rule is written NAME=RULE, as in 'foot_*/motor=learn', not {text!r}.")
+    return name, rule
+
+
+def _read(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        MapError: If it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MapError(f"The body map {path} cannot be read: {error}.") from error
+
+
+def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
+    """Both bodies as they start, to one scale; None if the envs draw none."""
+    with opened(source) as one, opened(target) as other:
+        both: list[Any] = [one.unwrapped, other.unwrapped]
+        if not all(hasattr(env, "picture") for env in both):
+            return None
+        reach = max(env.reach for env in both)
+        return both[0].picture(reach=reach), both[1].picture(reach=reach)
+
+
+def _name(env: EnvRef) -> str:
+    """A short name for a folder."""
+    return env.id.split("/")[-1].removesuffix("-v1")
+
+
+def _steps(plan: Plan, kind: str) -> int:
+    """The steps of a run, for the progress; an evaluation counts as one."""
+    return {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}.get(
+        kind, 1
+    )
+
+
+def _command() -> str:
+    """The command as it was typed."""
+    return shlex.join(["shapechanger", *sys.argv[1:]])
+
+
+def _print(console: Console, study: Study) -> None:
+    """The table of measures, and what they come to."""
+    from shapechanger.transfer.report.table import measure_rows, verdict
+
+    rows = measure_rows(study)
+    table = Table("arm", "measure", "in target steps", "in total steps", box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(row.arm, row.measure, row.in_target_steps, row.in_total_steps)
+    console.print(table)
+    console.print(f"\n{verdict(study)}", soft_wrap=True)

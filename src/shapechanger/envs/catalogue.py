@@ -1,0 +1,130 @@
+"""The ids of all envs, registered without loading a simulator."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import gymnasium as gym
+import msgspec
+
+from shapechanger.errors import UnknownName
+
+__all__ = ["CATALOGUE", "NAMESPACE", "Entry", "find", "register_all"]
+
+NAMESPACE: Final = "shapechanger"
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """One env of the catalogue.
+
+    Attributes:
+        name: Its name; the id is `shapechanger/NAME-v1`.
+        family: Name of the family that its body belongs to.
+        summary: What it is, in a line.
+        entry_point: Where its class is.
+        learner: Name of the learner whose settings were tuned on the family.
+        body: Name of its body, handed to the class; empty where the class knows it.
+        reward_threshold: Return that counts as solved.
+    """
+
+    name: str
+    family: str
+    summary: str
+    entry_point: str
+    learner: str
+    body: str = ""
+    reward_threshold: float | None = None
+
+    @property
+    def id(self) -> str:
+        """The id to make it with."""
+        return f"{NAMESPACE}/{self.name}-v1"
+
+
+_PENDULUM: Final = "shapechanger.envs.pendulum:InvertedPendulumEnv"
+_ANT: Final = "shapechanger.envs.ant:AntEnv"
+_EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
+# Gymnasium's own thresholds for InvertedPendulum-v5 and Ant-v5.
+_UP: Final = 950.0
+_RUNS: Final = 6000.0
+
+CATALOGUE: Final[dict[str, Entry]] = {
+    entry.id: entry
+    for entry in (
+        Entry(
+            "InvertedPendulum",
+            "InvertedPendulum",
+            "a pole of 0.6 m on a cart",
+            _PENDULUM,
+            "ppo-balance",
+            "InvertedPendulum",
+            _UP,
+        ),
+        Entry(
+            "SmallInvertedPendulum",
+            "InvertedPendulum",
+            "a pole half as long",
+            _PENDULUM,
+            "ppo-balance",
+            "SmallInvertedPendulum",
+            _UP,
+        ),
+        Entry(
+            "BigInvertedPendulum",
+            "InvertedPendulum",
+            "a pole twice as long",
+            _PENDULUM,
+            "ppo-balance",
+            "BigInvertedPendulum",
+            _UP,
+        ),
+        Entry("Ant", "Ant", "four legs of two joints", _ANT, "ppo-run", "Ant", _RUNS),
+        Entry(
+            "AmputatedAnt",
+            "Ant",
+            "one back shank cut to a quarter",
+            _ANT,
+            "ppo-run",
+            "AmputatedAnt",
+            _RUNS,
+        ),
+        Entry("BigAnt", "Ant", "all shanks twice as long", _ANT, "ppo-run", "BigAnt", _RUNS),
+        Entry(
+            "ExtendedAnt",
+            "Ant",
+            "a third segment with a motor on each leg",
+            _EXTENDED_ANT,
+            "ppo-run",
+            "",
+            _RUNS,
+        ),
+    )
+}
+
+_EPISODE_STEPS: Final = 1000
+
+
+def register_all() -> None:
+    """Register every env of the catalogue with Gymnasium, once."""
+    for entry in CATALOGUE.values():
+        if entry.id not in gym.registry:
+            gym.register(
+                entry.id,
+                entry.entry_point,
+                reward_threshold=entry.reward_threshold,
+                max_episode_steps=_EPISODE_STEPS,
+                kwargs={"body": entry.body} if entry.body else {},
+            )
+
+
+def find(env_id: str) -> Entry:
+    """The entry of an id; its name alone, such as `BigAnt`, will do.
+
+    Raises:
+        UnknownName: If there is none.
+    """
+    name = env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+    entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
+    if entry is None:
+        raise UnknownName("environment", name, [entry.name for entry in CATALOGUE.values()])
+    return entry

@@ -1,0 +1,111 @@
+"""Names, units and ranges for the blocks that MuJoCo observations and actions are made of."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+
+from shapechanger.layout import Element, Feature, Layout
+
+__all__ = ["action_layout", "contact_features", "position_features", "velocity_features"]
+
+_J = mujoco.mjtJoint
+_POSITION_UNIT: Final = {_J.mjJNT_SLIDE: "m", _J.mjJNT_HINGE: "rad"}
+_FORCE_UNIT: Final = {_J.mjJNT_SLIDE: "N", _J.mjJNT_HINGE: "N·m"}
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+
+
+def position_features(model: mujoco.MjModel) -> list[Feature]:
+    """A feature for each number of qpos.
+
+    `joint/angle` or `joint/position` for a hinge or slide; `body/x` ... `body/qz` for a free joint:
+    place in the world, m, and orientation as a unit quaternion. Limits of joints are soft: contact
+    and motors can press a joint a little beyond them.
+    """
+    features: list[Feature] = []
+    for j in range(model.njnt):
+        name, kind = model.joint(j).name, _J(model.jnt_type[j])
+        low, high = model.jnt_range[j] if model.jnt_limited[j] else (-math.inf, math.inf)
+        if kind in _POSITION_UNIT:
+            quantity = "angle" if kind == _J.mjJNT_HINGE else "position"
+            element = Element("joint", name)
+            unit = _POSITION_UNIT[kind]
+            features.append(Feature(f"{name}/{quantity}", unit, float(low), float(high), element))
+            continue
+        body, element = _body_of(model, j)
+        if kind == _J.mjJNT_FREE:
+            features += [Feature(f"{body}/{axis}", "m", element=element) for axis in "xyz"]
+        features += [Feature(f"{body}/{q}", "1", -1.0, 1.0, element) for q in _QUATERNION]
+    return features
+
+
+def velocity_features(model: mujoco.MjModel) -> list[Feature]:
+    """A feature for each number of qvel.
+
+    `joint/velocity` for a hinge or slide; `body/vx` ... `body/wz` for a free joint: velocity in the
+    world's frame, m/s, and angular velocity in the body's, rad/s.
+    """
+    features: list[Feature] = []
+    for j in range(model.njnt):
+        name, kind = model.joint(j).name, _J(model.jnt_type[j])
+        if kind in _POSITION_UNIT:
+            unit = f"{_POSITION_UNIT[kind]}/s"
+            features.append(Feature(f"{name}/velocity", unit, element=Element("joint", name)))
+            continue
+        body, element = _body_of(model, j)
+        if kind == _J.mjJNT_FREE:
+            features += [Feature(f"{body}/v{axis}", "m/s", element=element) for axis in "xyz"]
+        features += [Feature(f"{body}/w{axis}", "rad/s", element=element) for axis in "xyz"]
+    return features
+
+
+def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Feature]:
+    """Six features for each body but the world: the clipped `cfrc_ext`, torque before force.
+
+    Args:
+        model: The model.
+        low: Where the numbers are clipped below, N and N·m.
+        high: Where they are clipped above.
+    """
+    features: list[Feature] = []
+    for b in range(1, model.nbody):
+        name = model.body(b).name
+        element = Element("body", name)
+        for prefix, unit in (("t", "N·m"), ("f", "N")):
+            features += [
+                Feature(f"{name}/contact/{prefix}{axis}", unit, low, high, element)
+                for axis in "xyz"
+            ]
+    return features
+
+
+def action_layout(model: mujoco.MjModel) -> Layout:
+    """A feature `actuator/motor` for each control, with its gear as gain."""
+    features: list[Feature] = []
+    for a in range(model.nu):
+        name = model.actuator(a).name
+        limited = bool(model.actuator_ctrllimited[a])
+        low, high = model.actuator_ctrlrange[a] if limited else (-math.inf, math.inf)
+        gear = float(model.actuator_gear[a, 0] * model.actuator_gainprm[a, 0])
+        drives_joint = model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT
+        kind = _J(model.jnt_type[model.actuator_trnid[a, 0]]) if drives_joint else None
+        known = kind in _FORCE_UNIT and gear > 0.0
+        features.append(
+            Feature(
+                f"{name}/motor",
+                "1",
+                float(low),
+                float(high),
+                Element("actuator", name),
+                gain=gear if known else 1.0,
+                gain_unit=_FORCE_UNIT[kind] if known and kind is not None else "",
+            )
+        )
+    return Layout(tuple(features))
+
+
+def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:
+    name = model.body(model.jnt_bodyid[joint]).name
+    return name, Element("body", name)

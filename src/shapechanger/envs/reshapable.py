@@ -1,0 +1,245 @@
+"""What turns one of Gymnasium's MuJoCo envs into one whose body can be any of its family."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.envs.headless import choose_gl
+from shapechanger.errors import MissingExtra, SpaceMismatch
+
+try:
+    import mujoco
+    from gymnasium.envs.mujoco import MujocoEnv
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
+except (ImportError, gym.error.DependencyNotInstalled) as error:
+    raise MissingExtra("mujoco", "sim") from error
+
+from shapechanger.embodiments.family import BodyLike, Family
+from shapechanger.envs.layouts import action_layout, position_features, velocity_features
+from shapechanger.envs.picture import body_reach, draw
+from shapechanger.layout import Feature, Layout
+from shapechanger.morphology import Body, compile_body, interpolate, to_json
+from shapechanger.morphology.certifiable import Wrapped
+from shapechanger.morphology.certificate import Certificate, certify
+from shapechanger.morphology.pose import (
+    floor_gap,
+    keep_within_limits,
+    standing_height,
+    start_pose,
+    trunk_joint,
+)
+
+if TYPE_CHECKING:
+    from gymnasium.envs.registration import EnvSpec
+
+__all__ = ["Reshapable"]
+
+
+class Reshapable(MujocoEnv):
+    """Mixed in before one of Gymnasium's MuJoCo envs: any body of a family, named spaces.
+
+    The env keeps its rewards, terminations, infos and arguments. What follows from the body is
+    derived from it: model, spaces, layouts, start pose.
+
+    Attributes:
+        family: The bodies that the env can have.
+        body: The edits that make the present body from the family's model.
+        observation_layout: What each number of the observation means.
+        action_layout: What each number of the action means.
+        standing_height: Height of the trunk above the floor when it stands with each joint in the
+            middle of its range, m; None for a body that does not stand.
+    """
+
+    family: ClassVar[Family]
+
+    body: Body
+    observation_layout: Layout
+    action_layout: Layout
+    standing_height: float | None
+    _spec: EnvSpec | None = None
+
+    def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
+        """What must be there before Gymnasium's constructor compiles the model."""
+        self.body = self.family.body(body)
+        if arguments.get("render_mode") is not None:
+            choose_gl()
+        self._renderer_arguments = {
+            "max_geom": arguments.get("max_geom", 1000),
+            "camera_id": arguments.get("camera_id"),
+            "camera_name": arguments.get("camera_name"),
+            "visual_options": arguments.get("visual_options"),
+        }
+
+    def _finish(self, arguments: dict[str, Any]) -> None:
+        """What follows from the compiled model, and what a pickle needs to build it again."""
+        self._follow_body()
+        # Gymnasium's constructor has recorded its own arguments; these are ours.
+        EzPickle.__init__(self, body=to_json(self.body), **arguments)
+
+    # The spec is what `gym.make`, Minari and a vector env build the env from again.
+
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The registered spec, with the present body as JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copy.deepcopy(spec)
+        self._record_body()
+
+    def _record_body(self) -> None:
+        """Write the present body where pickling and the spec look for it."""
+        if self._spec is not None:
+            self._spec.kwargs["body"] = to_json(self.body)
+        cast("dict[str, Any]", self._ezpickle_kwargs)["body"] = to_json(self.body)
+
+    def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """Compile the present body in place of the file as it is."""
+        model = compile_body(self.family.load(self.fullpath), self.body)
+        # As in Gymnasium's own method: the frame buffer must be as large as the picture.
+        model.vis.global_.offwidth = max(model.vis.global_.offwidth, self.width)
+        model.vis.global_.offheight = max(model.vis.global_.offheight, self.height)
+        return model, mujoco.MjData(model)
+
+    def _follow_body(self) -> None:
+        """Derive from the model what the env needs to know of it."""
+        self.init_qpos = start_pose(self.model)
+        self.init_qvel = np.zeros(self.model.nv)
+        self.standing_height = standing_height(self.model)
+        self.observation_layout = Layout(tuple(self._observation_features(self.model)))
+        self.action_layout = action_layout(self.model)
+
+    def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
+        """The features of this task's observation, in order."""
+        return position_features(model) + velocity_features(model)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of all randomness from here on; None goes on with the present state.
+            options: `{"body": ...}` changes the body: the name of one, edits, or their JSON.
+
+        Raises:
+            SpaceMismatch: If the new body would change a space.
+            UnknownName: If the body names what is not there.
+            MorphologyError: If the body cannot be built.
+        """
+        if options is not None and "body" in options:
+            self._change_body(self.family.body(options["body"]))
+        return super().reset(seed=seed, options=options)
+
+    def reset_model(self) -> NDArray[np.float64]:
+        """Draw a start state as Gymnasium does, and make it possible.
+
+        Joints that the noise moved beyond their limits are moved back, orientations become unit
+        quaternions again, and a trunk whose feet the noise pushed into the floor is lifted.
+        """
+        observation = super().reset_model()
+        pose = keep_within_limits(self.model, self.data.qpos)
+        mujoco.mj_normalizeQuat(self.model, pose)
+        moved = not np.array_equal(pose, self.data.qpos)
+        if moved:
+            self.set_state(pose, self.data.qvel.copy())
+        trunk = trunk_joint(self.model)
+        if trunk is not None and (gap := floor_gap(self.model, self.data)) < 0.0:
+            pose[self.model.jnt_qposadr[trunk] + 2] -= gap
+            self.set_state(pose, self.data.qvel.copy())
+            moved = True
+        return self._get_obs() if moved else observation
+
+    def _change_body(self, body: Body) -> None:
+        """Build another body of the same spaces; on any error the present one stays."""
+        if body == self.body:
+            return
+        present = self.body
+        self.body = body
+        try:
+            model, data = self._initialize_simulation()
+            observation = Layout(tuple(self._observation_features(model)))
+            self._require_same_spaces(observation, action_layout(model))
+        except Exception:
+            self.body = present
+            raise
+        self.model, self.data = model, data
+        self._follow_body()
+        self._record_body()
+        renderer = self.mujoco_renderer
+        renderer.close()
+        self.mujoco_renderer = MujocoRenderer(
+            model,
+            data,
+            renderer.default_cam_config,
+            self.width,
+            self.height,
+            **self._renderer_arguments,
+        )
+
+    def _require_same_spaces(self, observation: Layout, action: Layout) -> None:
+        """Refuse layouts that would change a space that learners already hold."""
+        for space, old, new in (
+            ("observation", self.observation_layout, observation),
+            ("action", self.action_layout, action),
+        ):
+            lost = [name for name in old.names if name not in new]
+            gained = [name for name in new.names if name not in old]
+            bounds_move = space == "action" and not (
+                np.array_equal(old.low, new.low) and np.array_equal(old.high, new.high)
+            )
+            if lost or gained or bounds_move:
+                change = "; ".join(
+                    f"{word} {', '.join(names[:3])}{' and more' * (len(names) > 3)}"
+                    for word, names in (("it loses", lost), ("it gains", gained))
+                    if names
+                )
+                raise SpaceMismatch(
+                    f"This body would change the {space} space from {old.size} to {new.size} "
+                    f"numbers ({change or 'its bounds move'}): a reset cannot change a space, so "
+                    "make another env with this body and cross over with a body map."
+                )
+
+    # What a transfer study asks of an env, whichever kind it is.
+
+    @staticmethod
+    def certify_shift(
+        source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
+    ) -> Certificate:
+        """What changes from one env to the other, wrappers included; both are reset.
+
+        Raises:
+            EmptyShift: If nothing does, and `allow_empty` is false.
+        """
+        return certify(cast("Wrapped", source), cast("Wrapped", target), allow_empty=allow_empty)
+
+    def body_towards(self, target: Reshapable, alpha: float) -> Body:
+        """The body at the part `alpha` in [0, 1] of the way to the body of `target`."""
+        return interpolate(self.body, target.body, alpha)
+
+    @property
+    def reach(self) -> float:
+        """How far from the middle of the body its farthest point is when it starts, m."""
+        return body_reach(self.model, self.init_qpos)
+
+    def picture(
+        self, width: int = 480, height: int = 360, reach: float | None = None
+    ) -> NDArray[np.uint8]:
+        """The body as it starts, shape (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Metres in view around the middle of the body; None for its own reach.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        return draw(self.model, self.init_qpos, width, height, reach or self.reach)

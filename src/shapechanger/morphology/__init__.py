@@ -1,0 +1,51 @@
+"""Bodies that change shape: a MuJoCo model in, edits as values, another model out.
+
+>>> import mujoco
+>>> from shapechanger.morphology import Cut, Stretch, compile_body, to_json
+>>> body = (Stretch("*shank*", 1.5), Cut("shank_4", 0.25))
+>>> to_json(body)
+'[{"edit":"stretch","body":"*shank*","factor":1.5},{"edit":"cut","body":"shank_4","keep":0.25}]'
+"""
+
+from __future__ import annotations
+
+from shapechanger.morphology.codec import EDITS, Body, as_body, from_json, to_json
+from shapechanger.morphology.edit import Edit
+from shapechanger.morphology.elements import name_elements
+from shapechanger.morphology.joint_edits import JointRange, Lock
+from shapechanger.morphology.limb_edits import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.path import interpolate
+from shapechanger.morphology.reshape import compile_body, reshape
+from shapechanger.morphology.shape_edits import Radius, Stretch
+from shapechanger.morphology.value_edits import Damping, Density, Friction, Gear, Mass, Stiffness
+from shapechanger.morphology.world_edits import Gravity, StartHeight
+
+__all__ = [
+    "EDITS",
+    "AddLimb",
+    "AddSegment",
+    "Body",
+    "Cut",
+    "Damping",
+    "Density",
+    "Edit",
+    "Friction",
+    "Gear",
+    "Gravity",
+    "JointRange",
+    "Lock",
+    "Mass",
+    "Radius",
+    "Remove",
+    "Split",
+    "StartHeight",
+    "Stiffness",
+    "Stretch",
+    "as_body",
+    "compile_body",
+    "from_json",
+    "interpolate",
+    "name_elements",
+    "reshape",
+    "to_json",
+]

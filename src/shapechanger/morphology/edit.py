@@ -1,0 +1,103 @@
+"""A change of body is a value: frozen, printable, comparable, and the same as JSON.
+
+Every edit carries an `amount`, the part of the change that is made. It is 1 except between two
+bodies, where it makes the path continuous (see `shapechanger.morphology.path`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+
+from shapechanger.errors import MorphologyError
+
+if TYPE_CHECKING:
+    import mujoco
+
+__all__ = ["Edit", "Vector", "part_of_the_way", "require_factor", "require_vector"]
+
+Vector = tuple[float, float, float]
+
+# A limb a hundred times longer or shorter is a typing mistake, and MuJoCo's contacts, whose
+# softness is fixed in absolute numbers, stop meaning anything there.
+_SMALLEST_FACTOR: Final = 0.01
+_LARGEST_FACTOR: Final = 100.0
+
+
+def _tag(class_name: str) -> str:
+    """`AddSegment` becomes `add_segment`."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", class_name).lower()
+
+
+class Edit(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    repr_omit_defaults=True,
+    forbid_unknown_fields=True,
+    tag_field="edit",
+    tag=_tag,
+):
+    """One change to a model.
+
+    Attributes:
+        amount: The part of the change that is made, from 0 (none) to 1 (all).
+
+    Raises:
+        MorphologyError: If the amount, or a number of the edit, is out of its range.
+    """
+
+    amount: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.amount <= 1.0:  # Also refuses NaN.
+            raise MorphologyError(f"amount must be between 0 and 1, got {self.amount}.")
+        self.check()
+
+    def check(self) -> None:
+        """Refuse numbers that no model could take; overridden where there are any."""
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change `spec` in place.
+
+        Raises:
+            UnknownName: If the edit names an element that the model lacks.
+            MorphologyError: If the element cannot be changed this way.
+        """
+        raise NotImplementedError
+
+    def partly(self, alpha: float) -> Edit:
+        """The same change, made to the part `alpha` in [0, 1] of what it was."""
+        return msgspec.structs.replace(self, amount=self.amount * alpha)
+
+
+def part_of_the_way(old: float, new: float, amount: float) -> float:
+    """`old` moved towards `new`; exactly `new` when all of the way."""
+    return new if amount == 1.0 else old + amount * (new - old)
+
+
+def require_factor(name: str, value: float) -> None:
+    """Refuse a ratio that is zero, negative, NaN or absurd.
+
+    Raises:
+        MorphologyError: Unless `value` lies between 0.01 and 100.
+    """
+    if not _SMALLEST_FACTOR <= value <= _LARGEST_FACTOR:  # Also refuses NaN.
+        raise MorphologyError(
+            f"{name} must be a ratio between {_SMALLEST_FACTOR:g} and {_LARGEST_FACTOR:g}, "
+            f"got {value}."
+        )
+
+
+def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
+    """Refuse a vector that is not finite or, if `nonzero`, has no direction.
+
+    Raises:
+        MorphologyError: If so.
+    """
+    if not all(math.isfinite(x) for x in value) or (nonzero and not any(value)):
+        raise MorphologyError(f"{name} must be finite{' and not zero' * nonzero}, got {value}.")

@@ -1,0 +1,128 @@
+"""Finding elements of a model by name or glob, and giving names to those that have none."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import mujoco
+
+from shapechanger.errors import MorphologyError, UnknownName
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["name_elements", "require_free_name", "require_limb", "select", "subtree"]
+
+
+class _Named(Protocol):
+    name: str
+
+
+_N = TypeVar("_N", bound=_Named)
+
+
+def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
+    """The elements whose name is `pattern` or fits it as a glob, in the model's order.
+
+    Args:
+        kind: What they are, for the message: "body", "joint".
+        pattern: A name, or a glob such as `*shank*`.
+        elements: Where to look.
+
+    Raises:
+        UnknownName: If nothing fits.
+    """
+    candidates = list(elements)
+    exact = [element for element in candidates if element.name == pattern]
+    found = exact or [e for e in candidates if fnmatch.fnmatchcase(e.name, pattern)]
+    if not found:
+        raise UnknownName(kind, pattern, [element.name for element in candidates])
+    return found
+
+
+def limbs_and_trunks(spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
+    """All bodies but the world."""
+    return [body for body in spec.bodies if body.parent is not None]
+
+
+def require_limb(body: mujoco.MjsBody, what: str) -> None:
+    """Refuse to cut a trunk: a body that hangs on the world, with the whole robot on it.
+
+    Raises:
+        MorphologyError: If `body` is a trunk.
+    """
+    if body.parent.parent is None:
+        raise MorphologyError(
+            f"{body.name!r} is the trunk that the rest hangs on, so it cannot be {what}; "
+            f"its limbs can: {', '.join(child.name for child in body.bodies) or 'it has none'}."
+        )
+
+
+def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
+    """Refuse a name that another element of the kind already bears.
+
+    Raises:
+        MorphologyError: If `name` is empty or taken.
+    """
+    taken = {
+        "body": lambda: spec.bodies,
+        "joint": lambda: spec.joints,
+        "geom": lambda: spec.geoms,
+        "actuator": lambda: spec.actuators,
+    }[kind]()
+    if not name or any(element.name == name for element in taken):
+        raise MorphologyError(f"A new {kind} needs a name that is free; {name!r} is not.")
+
+
+def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
+    """The body and all that hangs on it, parents first."""
+    yield body
+    for child in body.bodies:
+        yield from subtree(child)
+
+
+def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None = None) -> None:
+    """Name every body, joint, geom, site, camera and actuator that has no name, in place.
+
+    A body is called after `bodies_by_joint`, or after its joint, or after its parent; an actuator
+    after what it drives; anything else after its body. Names change no physics.
+
+    Args:
+        spec: The model.
+        bodies_by_joint: For a joint's name the name of the unnamed body that it moves.
+    """
+    chosen = bodies_by_joint or {}
+    body_name = _namer(spec.bodies)
+    for body in limbs_and_trunks(spec):
+        if not body.name:
+            joint = next((j.name for j in body.joints if j.name), "")
+            body.name = body_name(chosen.get(joint, joint or f"{body.parent.name}_part"))
+    for kind, elements in (
+        ("joint", spec.joints),
+        ("geom", spec.geoms),
+        ("site", spec.sites),
+        ("camera", spec.cameras),
+    ):
+        free = _namer(elements)
+        for element in elements:
+            element.name = element.name or free(f"{element.parent.name}_{kind}")
+    free = _namer(spec.actuators)
+    for actuator in spec.actuators:
+        actuator.name = actuator.name or free(actuator.target)
+
+
+def _namer(elements: Iterable[_Named]) -> Callable[[str], str]:
+    """A function that gives the name asked for, or the next free one after it."""
+    taken = {element.name for element in elements}
+
+    def free(name: str) -> str:
+        candidate, count = name, 1
+        while candidate in taken:
+            count += 1
+            candidate = f"{name}_{count}"
+        taken.add(candidate)
+        return candidate
+
+    return free

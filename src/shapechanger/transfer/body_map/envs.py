@@ -1,0 +1,181 @@
+"""Body maps between Gymnasium envs, and the target env as a source policy sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, SupportsFloat, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from shapechanger.errors import MapError, SpaceMismatch
+from shapechanger.layout import Layout
+from shapechanger.transfer.body_map.map import BodyMap
+from shapechanger.transfer.body_map.matching import Units
+from shapechanger.transfer.body_map.rules import RuleLike, Zero
+
+__all__ = ["MappedEnv", "body_map", "check_size", "wrap"]
+
+Array = NDArray[Any]
+
+
+def body_map(
+    source_env: gym.Env[Any, Any],
+    target_env: gym.Env[Any, Any],
+    *,
+    rules: Mapping[str, RuleLike] | None = None,
+    observation_rules: Mapping[str, RuleLike] | None = None,
+    action_rules: Mapping[str, RuleLike] | None = None,
+    otherwise: RuleLike = Zero(),  # noqa: B008 - frozen, so sharing it is safe.
+    units: Units = "same",
+) -> BodyMap:
+    """Match the features of two envs by name, see `BodyMap.between`.
+
+    Args:
+        source_env: The env that a policy was learned on.
+        target_env: The env that it is to act in.
+        rules: For a name or a glob its rule.
+        observation_rules: The same for source observation features only.
+        action_rules: The same for target action features only.
+        otherwise: What to do with a feature that nothing matches.
+        units: What the action numbers keep: their value, or the torque they give.
+
+    Raises:
+        MapError: If an env publishes no layouts, or the two cannot be mapped.
+        UnknownName: If a rule fits no feature, or takes one that is not there.
+    """
+    return BodyMap.between(
+        _published(source_env, "observation_layout"),
+        _published(target_env, "observation_layout"),
+        _published(source_env, "action_layout"),
+        _published(target_env, "action_layout"),
+        rules=rules,
+        observation_rules=observation_rules,
+        action_rules=action_rules,
+        otherwise=otherwise,
+        units=units,
+    )
+
+
+def wrap(
+    target_env: gym.Env[Any, Any],
+    body_map: BodyMap,
+    *,
+    observation_space: Box | None = None,
+    action_space: Box | None = None,
+) -> MappedEnv:
+    """The target env with the source's spaces, see `MappedEnv`."""
+    return MappedEnv(
+        target_env, body_map, observation_space=observation_space, action_space=action_space
+    )
+
+
+class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
+    """A target env in which a policy of the source acts unchanged.
+
+    Its observations are what the source body would sense, in float64; its actions are the
+    source's. Rewards, ends and infos are those of the target.
+
+    Attributes:
+        body_map: How the two bodies correspond.
+
+    Args:
+        env: The target env.
+        body_map: How the bodies correspond; as JSON too, so that a spec can be written down.
+        observation_space: The source's, shape (source_observation.size,); by default a float64
+            box with the ranges of its layout.
+        action_space: The source's, shape (source_action.size,); by default a float32 box.
+
+    Raises:
+        SpaceMismatch: If a space has not the size of its layout.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Any, Any],
+        body_map: BodyMap | str,
+        *,
+        observation_space: Box | None = None,
+        action_space: Box | None = None,
+    ) -> None:
+        built = BodyMap.from_json(body_map) if isinstance(body_map, str) else body_map
+        gym.utils.RecordConstructorArgs.__init__(
+            self,
+            body_map=built.to_json(),
+            observation_space=observation_space,
+            action_space=action_space,
+        )
+        super().__init__(env)
+        self.body_map = built
+        check_size("target observation", env.observation_space, built.target_observation)
+        self._target_dtype = check_size(
+            "target action", env.action_space, built.target_action
+        ).dtype
+        source = built.source_observation
+        self.observation_space = observation_space or Box(source.low, source.high, dtype=np.float64)
+        source = built.source_action
+        self.action_space = action_space or Box(
+            source.low.astype(np.float32), source.high.astype(np.float32), dtype=np.float32
+        )
+        check_size("source observation", self.observation_space, built.source_observation)
+        check_size("source action", self.action_space, built.source_action)
+
+    @property
+    def observation_layout(self) -> Layout:
+        """What the numbers of an observation mean: the source's layout."""
+        return self.body_map.source_observation
+
+    @property
+    def action_layout(self) -> Layout:
+        """What the numbers of an action mean: the source's layout."""
+        return self.body_map.source_action
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start an episode of the target env."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._sensed(observation), info
+
+    def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Act on the target as the source's action says.
+
+        Args:
+            action: An action of the source, shape (source_action.size,).
+        """
+        moved = self.body_map.adapt_action(action).astype(self._target_dtype)
+        observation, reward, terminated, truncated, info = self.env.step(moved)
+        return self._sensed(observation), reward, terminated, truncated, info
+
+    def _sensed(self, observation: Array) -> Array:
+        return self.body_map.adapt_observation(np.asarray(observation, dtype=np.float64))
+
+
+def _published(env: gym.Env[Any, Any], name: str) -> Layout:
+    """The layout that an env, or the outermost wrapper that has one, publishes."""
+    try:
+        layout = env.get_wrapper_attr(name)
+    except AttributeError:
+        layout = None
+    if not isinstance(layout, Layout):
+        raise MapError(
+            f"{env} publishes no {name}: give {type(env.unwrapped).__name__} a property of that "
+            "name, which is a shapechanger.layout.Layout."
+        )
+    return layout
+
+
+def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
+    """The space, if it is flat and of the size of its layout.
+
+    Raises:
+        SpaceMismatch: If it is not.
+    """
+    if not isinstance(space, Box) or space.shape != (layout.size,):
+        raise SpaceMismatch(
+            f"The {which} layout holds {layout.size} numbers: "
+            f"the space must be a Box of the shape ({layout.size},), and is {space}."
+        )
+    return cast("Box[Any]", space)

@@ -1,0 +1,411 @@
+"""How the observations and actions of two bodies correspond."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shapechanger.errors import MapError
+from shapechanger.layout import Layout
+from shapechanger.transfer.body_map import toml
+from shapechanger.transfer.body_map.composition import chained, inverted
+from shapechanger.transfer.body_map.entries import (
+    SAME_NAME,
+    Entry,
+    Side,
+    SideName,
+    check_entries,
+    same_meaning,
+)
+from shapechanger.transfer.body_map.gather import Gather
+from shapechanger.transfer.body_map.matching import Units, check_patterns, resolve
+from shapechanger.transfer.body_map.mirror import mirror
+from shapechanger.transfer.body_map.rules import RuleLike, Take, Zero, in_words
+from shapechanger.transfer.body_map.symmetry import Symmetry
+
+__all__ = ["BodyMap", "Row"]
+
+
+class Row(NamedTuple):
+    """One line of `BodyMap.table`.
+
+    Attributes:
+        side: "observation" or "action".
+        entry: The feature that is filled.
+        rule: What fills it, in words.
+        why: Where the rule came from.
+    """
+
+    side: SideName
+    entry: str
+    rule: str
+    why: str
+
+
+class BodyMap(msgspec.Struct, frozen=True, dict=True):
+    """What lets a policy learned in a source body act in a target body.
+
+    The policy senses what it knows: each source observation feature is filled from target
+    observation features. What it does reaches the target: each target action feature is filled
+    from source action features. So both halves are affine:
+
+        o_source = M o_target + c        a_target = clip(N a_source + d)
+
+    Attributes:
+        source_observation: What the source body senses.
+        target_observation: What the target body senses.
+        source_action: What the source body moves.
+        target_action: What the target body moves.
+        observation: One rule for each feature of `source_observation`, in order.
+        action: One rule for each feature of `target_action`, in order.
+
+    Raises:
+        MapError: If a feature has no rule, or takes a block of another shape.
+        UnknownName: If a rule takes a feature that is not there.
+    """
+
+    source_observation: Layout
+    target_observation: Layout
+    source_action: Layout
+    target_action: Layout
+    observation: tuple[Entry, ...]
+    action: tuple[Entry, ...]
+
+    def __post_init__(self) -> None:
+        check_entries(self._observation_side, self.observation)
+        check_entries(self._action_side, self.action)
+
+    @classmethod
+    def between(
+        cls,
+        source_observation: Layout,
+        target_observation: Layout,
+        source_action: Layout,
+        target_action: Layout,
+        *,
+        rules: Mapping[str, RuleLike] | None = None,
+        observation_rules: Mapping[str, RuleLike] | None = None,
+        action_rules: Mapping[str, RuleLike] | None = None,
+        otherwise: RuleLike = Zero(),  # noqa: B008 - frozen, so sharing it is safe.
+        units: Units = "same",
+    ) -> BodyMap:
+        """Match the features of two bodies by name.
+
+        A rule under the exact name of a feature comes first, then the partner of the same name,
+        then the first glob that fits, then `otherwise`.
+
+        Args:
+            source_observation: What the source body senses.
+            target_observation: What the target body senses.
+            source_action: What the source body moves.
+            target_action: What the target body moves.
+            rules: For a name or a glob its rule, where names are those of source observation and
+                of target action features. A rule is a `Take`, `Zero`, `Hold` or `Learn`, or one of
+                "zero", "hold" (the middle of the range), "learn" and "copy NAME"; the stars of
+                NAME are what the wildcards of the glob stood for, as in
+                `{"foot_*/motor": "copy ankle_*/motor"}`.
+            observation_rules: The same for source observation features only; they come first.
+            action_rules: The same for target action features only; they come first.
+            otherwise: What to do with a feature that nothing matches.
+            units: "same" hands on action numbers as they are. "torque" scales them by source gain
+                over target gain, so that they push as hard as they did in the source.
+
+        Raises:
+            MapError: If a partner has another unit or shape, if a rule changes nothing, or if no
+                name occurs in both bodies.
+            UnknownName: If a rule fits no feature, or takes one that is not there.
+        """
+        shared = dict(rules or {})
+        on_observation, on_action = dict(observation_rules or {}), dict(action_rules or {})
+        sides = (
+            Side("observation", source_observation, target_observation),
+            Side("action", target_action, source_action),
+        )
+        resolutions = (
+            resolve(sides[0], on_observation | _missing(shared, on_observation), otherwise, units),
+            resolve(sides[1], on_action | _missing(shared, on_action), otherwise, units),
+        )
+        check_patterns(shared, sides, resolutions)
+        check_patterns(on_observation, sides[:1], resolutions[:1])
+        check_patterns(on_action, sides[1:], resolutions[1:])
+        return cls(
+            source_observation=source_observation,
+            target_observation=target_observation,
+            source_action=source_action,
+            target_action=target_action,
+            observation=resolutions[0].entries,
+            action=resolutions[1].entries,
+        )
+
+    @classmethod
+    def identity(cls, observation: Layout, action: Layout) -> BodyMap:
+        """The map of a body onto itself that changes nothing."""
+        return cls(
+            source_observation=observation,
+            target_observation=observation,
+            source_action=action,
+            target_action=action,
+            observation=tuple(Entry(name, Take(name), SAME_NAME) for name in observation.names),
+            action=tuple(Entry(name, Take(name), SAME_NAME) for name in action.names),
+        )
+
+    def adapt_observation(self, target_observation: ArrayLike) -> NDArray[Any]:
+        """What the source body would sense.
+
+        Args:
+            target_observation: What the target body senses, shape (..., target_observation.size).
+
+        Returns:
+            Shape (..., source_observation.size): float32 for float32, float64 for float64.
+
+        Raises:
+            SpaceMismatch: If the last axis has another length.
+        """
+        return self._observation_gather(target_observation)
+
+    def adapt_action(self, source_action: ArrayLike) -> NDArray[Any]:
+        """What the target body is to do, within its bounds.
+
+        Args:
+            source_action: What the policy does, shape (..., source_action.size).
+
+        Returns:
+            Shape (..., target_action.size): float32 for float32, float64 for float64.
+
+        Raises:
+            SpaceMismatch: If the last axis has another length.
+        """
+        action = self._action_gather(source_action)
+        low, high = self._action_bounds
+        return np.clip(action, low.astype(action.dtype), high.astype(action.dtype))
+
+    @cached_property
+    def observation_matrix(self) -> NDArray[np.float64]:
+        """M, shape (source_observation.size, target_observation.size); read-only."""
+        return _read_only(self._observation_gather.matrix())
+
+    @cached_property
+    def observation_offset(self) -> NDArray[np.float64]:
+        """c, shape (source_observation.size,); read-only."""
+        return _read_only(self._observation_gather.offset)
+
+    @cached_property
+    def action_matrix(self) -> NDArray[np.float64]:
+        """N, shape (target_action.size, source_action.size); read-only."""
+        return _read_only(self._action_gather.matrix())
+
+    @cached_property
+    def action_offset(self) -> NDArray[np.float64]:
+        """d, shape (target_action.size,); read-only."""
+        return _read_only(self._action_gather.offset)
+
+    def then(self, following: BodyMap) -> BodyMap:
+        """The map from this source to the target of `following`.
+
+        The body in the middle drops out, and with it the bounds of its actions.
+
+        Raises:
+            MapError: If the target of this map and the source of `following` mean different things.
+        """
+        self._check_meeting("observation", self.target_observation, following.source_observation)
+        self._check_meeting("action", self.target_action, following.source_action)
+        return BodyMap(
+            source_observation=self.source_observation,
+            target_observation=following.target_observation,
+            source_action=self.source_action,
+            target_action=following.target_action,
+            observation=chained(self.observation, following.observation),
+            action=chained(following.action, self.action),
+        )
+
+    def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
+        """The map from this target back to this source.
+
+        A feature that was taken once goes back; of one that was taken several times the feature of
+        the same name gives it back.
+
+        Args:
+            otherwise: What to do with a feature that was not taken: zero, hold or learn.
+
+        Raises:
+            MapError: If a feature was taken several times, and by none of its name.
+        """
+        return BodyMap(
+            source_observation=self.target_observation,
+            target_observation=self.source_observation,
+            source_action=self.target_action,
+            target_action=self.source_action,
+            observation=inverted(self._observation_side, self.observation, otherwise),
+            action=inverted(self._action_side, self.action, otherwise),
+        )
+
+    def with_symmetry(self, symmetry: Symmetry) -> BodyMap:
+        """The map through a symmetry of the source or the target, such as its mirror image.
+
+        A policy of the source then acts as its mirror image would. For a symmetry that suits both
+        bodies the one of the source is meant.
+
+        Raises:
+            MapError: If the symmetry belongs to neither body.
+        """
+        if symmetry.suits(self.source_observation, self.source_action):
+            return _turned(symmetry, self.source_observation, self.source_action).then(self)
+        if symmetry.suits(self.target_observation, self.target_action):
+            return self.then(_turned(symmetry, self.target_observation, self.target_action))
+        where = same_meaning(symmetry.observation_layout, self.source_observation) or same_meaning(
+            symmetry.action_layout, self.source_action
+        )
+        raise MapError(
+            "The symmetry belongs neither to the source nor to the target: "
+            f"between it and the source {where}."
+        )
+
+    def table(self) -> tuple[Row, ...]:
+        """Each feature that is filled, its rule in words, and where that came from."""
+        sides: tuple[tuple[SideName, tuple[Entry, ...]], ...] = (
+            ("observation", self.observation),
+            ("action", self.action),
+        )
+        return tuple(
+            Row(name, entry.feature, in_words(entry.rule), entry.why)
+            for name, entries in sides
+            for entry in entries
+        )
+
+    def __str__(self) -> str:
+        """The table, one line for each feature."""
+        rows = [Row._fields, *self.table()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        return "\n".join(
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+            for row in rows
+        )
+
+    def __repr__(self) -> str:
+        """How many features are filled by which rule."""
+        return (
+            f"BodyMap(observation: {_counted(self.observation)}; action: {_counted(self.action)})"
+        )
+
+    def to_json(self) -> str:
+        """The map with its four layouts as JSON."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> BodyMap:
+        """Read what `to_json` wrote.
+
+        Raises:
+            MapError: If the text is no map.
+        """
+        try:
+            return msgspec.json.decode(text, type=cls)
+        except msgspec.MsgspecError as error:
+            raise MapError(f"This is not a body map: {error}.") from error
+
+    def to_toml(self) -> str:
+        """The rules as TOML, for a person to read and change; the layouts are not in it."""
+        return toml.write(self.observation, self.action)
+
+    @classmethod
+    def from_toml(
+        cls,
+        text: str,
+        source_observation: Layout,
+        target_observation: Layout,
+        source_action: Layout,
+        target_action: Layout,
+    ) -> BodyMap:
+        """Build a map by the rules of a TOML text, see `shapechanger.transfer.body_map.toml`.
+
+        Raises:
+            MapError: If the text is no TOML, or asks for what does not exist.
+            UnknownName: If a rule fits no feature, or takes one that is not there.
+        """
+        wanted = toml.read(text)
+        built = cls.between(
+            source_observation,
+            target_observation,
+            source_action,
+            target_action,
+            observation_rules=wanted.observation,
+            action_rules=wanted.action,
+            otherwise=wanted.otherwise,
+            units=wanted.units,
+        )
+        if wanted.symmetry is None:
+            return built
+        of_source = wanted.symmetry.of == "source"
+        observation = source_observation if of_source else target_observation
+        action = source_action if of_source else target_action
+        symmetry = mirror(observation, action, swap=wanted.symmetry.swap, flip=wanted.symmetry.flip)
+        turned = _turned(symmetry, observation, action)
+        return turned.then(built) if of_source else built.then(turned)
+
+    @property
+    def _observation_side(self) -> Side:
+        return Side("observation", self.source_observation, self.target_observation)
+
+    @property
+    def _action_side(self) -> Side:
+        return Side("action", self.target_action, self.source_action)
+
+    @cached_property
+    def _observation_gather(self) -> Gather:
+        return Gather.of(self._observation_side, self.observation)
+
+    @cached_property
+    def _action_gather(self) -> Gather:
+        return Gather.of(self._action_side, self.action)
+
+    @cached_property
+    def _action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return self.target_action.low, self.target_action.high
+
+    @staticmethod
+    def _check_meeting(name: SideName, first: Layout, second: Layout) -> None:
+        where = same_meaning(first, second)
+        if where:
+            raise MapError(
+                f"These maps do not meet: between the target {name} of the first and the source "
+                f"{name} of the second {where}."
+            )
+
+
+def _turned(symmetry: Symmetry, observation: Layout, action: Layout) -> BodyMap:
+    """A symmetry as a map from a body to itself.
+
+    The policy p acts as g⁻¹ p(g o), where g is the symmetry: if p walks, that does too.
+    """
+    return BodyMap(
+        source_observation=observation,
+        target_observation=observation,
+        source_action=action,
+        target_action=action,
+        observation=symmetry.observation_entries,
+        action=symmetry.inverse().action_entries,
+    )
+
+
+def _missing(
+    shared: Mapping[str, RuleLike], special: Mapping[str, RuleLike]
+) -> dict[str, RuleLike]:
+    """The shared rules that no special rule stands in for."""
+    return {pattern: rule for pattern, rule in shared.items() if pattern not in special}
+
+
+def _counted(entries: tuple[Entry, ...]) -> str:
+    counts = Counter(type(entry.rule).__name__ for entry in entries)
+    return ", ".join(f"{number} {kind}" for kind, number in counts.items()) or "none"
+
+
+def _read_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    copy = values.copy()
+    copy.setflags(write=False)
+    return copy

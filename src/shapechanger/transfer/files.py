@@ -1,0 +1,103 @@
+"""Writing so that a file is whole or not there, and reading with an error that names the file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from shapechanger.errors import CorruptStudy, OutputError
+
+__all__ = ["append_line", "make_folder", "read_json", "read_lines", "write_json", "write_whole"]
+
+_T = TypeVar("_T")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents.
+
+    Raises:
+        OutputError: If that cannot be done, or nothing can be written there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(f"Cannot write to {folder}: {error.strerror or error}.") from error
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that appears whole, or leaves what was there.
+
+    Raises:
+        OutputError: If it cannot be written, for instance because the disk is full.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise _cannot_write(path, error) from error
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as indented JSON, whole or not at all.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    write_whole(path, msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n")
+
+
+def append_line(path: Path, value: Any) -> None:
+    """Add one line of JSON to a file.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    try:
+        with path.open("ab") as file:
+            file.write(msgspec.json.encode(value) + b"\n")
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+
+
+def read_json(path: Path, kind: type[_T]) -> _T:
+    """Read what `write_json` wrote.
+
+    Raises:
+        CorruptStudy: If the file cannot be read, or is not what it should be.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except (OSError, msgspec.MsgspecError, ValueError) as error:
+        raise CorruptStudy(
+            f"{path} cannot be read ({error}): move it away, or give another --out; "
+            "nothing was changed."
+        ) from error
+
+
+def read_lines(path: Path, kind: type[_T]) -> list[_T]:
+    """Read what `append_line` wrote.
+
+    Raises:
+        CorruptStudy: If the file cannot be read, or is not what it should be.
+    """
+    try:
+        return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()]
+    except (OSError, msgspec.MsgspecError, ValueError) as error:
+        raise CorruptStudy(
+            f"{path} cannot be read ({error}): delete it to run it again."
+        ) from error
+
+
+def _cannot_write(path: Path, error: OSError) -> OutputError:
+    return OutputError(f"Cannot write {path}: {error.strerror or error}.")

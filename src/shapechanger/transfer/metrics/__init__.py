@@ -1,0 +1,61 @@
+"""What a transfer study measures: pure functions on learning curves.
+
+Read in this order: `LearningCurves` is what a study hands over, `Reference` turns returns into
+scores, the functions named after Taylor & Stone's measures and `forward_transfer` compare an arm
+with scratch, and `summarise` does all of it, counted in target steps and in total steps.
+
+The unit of everything statistical here is the seed, that is one training run. Episodes of one run
+share a policy, and counting them as independent would make every interval too narrow.
+"""
+
+from shapechanger.transfer.metrics.curves import LearningCurves, in_total_steps
+from shapechanger.transfer.metrics.forward_transfer import LEAST_HEADROOM, forward_transfer
+from shapechanger.transfer.metrics.intervals import (
+    Estimate,
+    estimate_difference,
+    estimate_ratio,
+    undefined,
+)
+from shapechanger.transfer.metrics.scores import Reference
+from shapechanger.transfer.metrics.summary import (
+    DEFAULT_THRESHOLDS,
+    Measures,
+    Summary,
+    summarise,
+)
+from shapechanger.transfer.metrics.taylor_stone import (
+    asymptotic_gain,
+    auc_ratio,
+    jumpstart,
+    total_reward_gain,
+)
+from shapechanger.transfer.metrics.thresholds import (
+    ReachTimes,
+    TimeToThreshold,
+    steps_to_reach,
+    time_to_threshold,
+)
+
+__all__ = [
+    "DEFAULT_THRESHOLDS",
+    "LEAST_HEADROOM",
+    "Estimate",
+    "LearningCurves",
+    "Measures",
+    "ReachTimes",
+    "Reference",
+    "Summary",
+    "TimeToThreshold",
+    "asymptotic_gain",
+    "auc_ratio",
+    "estimate_difference",
+    "estimate_ratio",
+    "forward_transfer",
+    "in_total_steps",
+    "jumpstart",
+    "steps_to_reach",
+    "summarise",
+    "time_to_threshold",
+    "total_reward_gain",
+    "undefined",
+]

@@ -1,0 +1,187 @@
+"""Learning curves: what several training runs of one arm were worth, and when.
+
+A curve is a straight line between two evaluations. Every measure reads it that way, so an area, a
+crossing and a value between two evaluations never contradict each other.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shapechanger.errors import StudyError
+
+__all__ = ["LearningCurves", "check_comparable", "in_total_steps"]
+
+# Beyond this a number is no return but an overflow, and the statistics would overflow with it.
+_LARGEST_RETURN: Final = 1e30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearningCurves:
+    """What the training runs of one arm were worth at each evaluation, one row for each seed.
+
+    The arrays are copied when the curves are built, and the copies are read-only.
+
+    Attributes:
+        steps: Environment steps of the target at each evaluation, shape (n_evals,), strictly
+            increasing from 0. The last one is the horizon H.
+        returns: Mean undiscounted return of each seed at each evaluation, shape (n_seeds, n_evals),
+            finite; in units of return, or of score after `Reference.scores`.
+        source_steps: Environment steps of the source that count before the first evaluation, so
+            that the curves at step T are worth what `returns` say at T - source_steps. 0 where only
+            target steps count. Set it with `in_total_steps`.
+        floor: What the curves are worth until `source_steps` have passed, in units of `returns`.
+
+    Raises:
+        StudyError: If the arrays do not have these shapes or these values.
+    """
+
+    steps: NDArray[np.float64]
+    returns: NDArray[np.float64]
+    source_steps: float = 0.0
+    floor: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and refuse what is not a learning curve."""
+        steps = _frozen_copy("steps", self.steps)
+        returns = _frozen_copy("returns", self.returns)
+        if steps.ndim != 1 or steps.size == 0:
+            raise StudyError(f"steps must have shape (n_evals,), n_evals >= 1, got {steps.shape}.")
+        if steps[0] != 0.0 or not np.all(np.diff(steps) > 0.0):
+            raise StudyError("steps must start at 0, before any training, and strictly increase.")
+        if returns.ndim != 2 or returns.shape[0] == 0 or returns.shape[1] != steps.size:
+            raise StudyError(
+                f"returns must have shape (n_seeds, {steps.size}), n_seeds >= 1, "
+                f"got {returns.shape}."
+            )
+        if not 0.0 <= self.source_steps < math.inf:  # Also refuses NaN.
+            raise StudyError(f"source_steps must be finite and >= 0, got {self.source_steps}.")
+        if not abs(self.floor) <= _LARGEST_RETURN:  # Also refuses NaN.
+            raise StudyError(f"floor must be finite, got {self.floor}.")
+        object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "returns", returns)
+
+    def __reduce__(self) -> tuple[type[LearningCurves], tuple[object, ...]]:
+        """Build copies and pickles anew, because a pickled array forgets that it is read-only."""
+        return type(self), (self.steps, self.returns, self.source_steps, self.floor)
+
+    @property
+    def n_seeds(self) -> int:
+        """How many training runs there are."""
+        return self.returns.shape[0]
+
+    @property
+    def n_evals(self) -> int:
+        """How often each run was evaluated; 1 for an arm that is not trained on the target."""
+        return self.steps.size
+
+    @property
+    def horizon(self) -> float:
+        """The last step that counts, H; source steps are paid out of it, not added to it."""
+        return float(self.steps[-1])
+
+    def at(self, steps: ArrayLike) -> NDArray[np.float64]:
+        """What each seed is worth at `steps`, shape (n_seeds, n_steps).
+
+        `floor` until `source_steps` have passed, a straight line between two evaluations, and the
+        last evaluation from there on.
+
+        Args:
+            steps: Steps of whatever these curves count, shape (n_steps,), >= 0.
+        """
+        learning = np.atleast_1d(np.asarray(steps, dtype=np.float64)) - self.source_steps
+        return np.where(learning < 0.0, self.floor, self._learnt(learning))
+
+    def last_steps(self, last_k: int) -> NDArray[np.float64]:
+        """The steps of the last `last_k` evaluations, shape (last_k,).
+
+        Raises:
+            StudyError: If there are not that many, or `last_k` is below one.
+        """
+        if not 1 <= last_k <= self.n_evals:
+            raise StudyError(f"last_k must be from 1 to {self.n_evals} evaluations, got {last_k}.")
+        return self.steps[-last_k:]
+
+    def auc(self) -> NDArray[np.float64]:
+        """Area under each curve from 0 to H, divided by H, shape (n_seeds,).
+
+        The division makes it the mean height of the curve, in units of `returns`. The area before
+        the jump at `source_steps` is a rectangle and the area after it a trapezoid rule on the
+        evaluations that still fit; the jump itself is never interpolated over.
+
+        Raises:
+            StudyError: If the arm was evaluated once only, which spans no area.
+        """
+        if self.n_evals == 1:
+            raise StudyError("One evaluation spans no area; a learning curve needs at least two.")
+        waiting = min(self.source_steps, self.horizon)
+        learning = self.horizon - waiting
+        knots = np.append(self.steps[self.steps < learning], learning)
+        area = np.asarray(np.trapezoid(self._learnt(knots), knots, axis=1))
+        return (self.floor * waiting + area) / self.horizon
+
+    def _learnt(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What each seed is worth after `steps` of learning on the target."""
+        rows: list[NDArray[np.float64]] = list(self.returns)
+        return np.stack([np.interp(steps, self.steps, row) for row in rows])
+
+
+def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) -> LearningCurves:
+    """The same runs with the steps they spent on the source counted too.
+
+    Taylor & Stone (JMLR 10, 2009, section 2) call this the total time scenario. The budget stays
+    H = `curves.horizon`: whoever first spends S steps on the source has H - S left for the target.
+    With p the arm's curve in target steps, the curve is `floor` for T < S and p(T - S) from there.
+
+    Args:
+        curves: The arm's curves in target steps.
+        source_steps: S, environment steps spent on the source, >= 0.
+        floor: What the arm is worth on the target while it still learns on the source: the return
+            of a random policy, or 0 if the curves are scores.
+
+    Returns:
+        Curves on the same grid of evaluations, which every measure here accepts.
+
+    Raises:
+        StudyError: If the source steps are counted already, or are not a count.
+    """
+    if curves.source_steps > 0.0:
+        raise StudyError(f"The curves already count {curves.source_steps:g} source steps.")
+    return dataclasses.replace(curves, source_steps=float(source_steps), floor=float(floor))
+
+
+def check_comparable(arm: LearningCurves, scratch: LearningCurves) -> None:
+    """Refuse two sets of curves that cannot be compared point by point.
+
+    Args:
+        arm: Curves of the arm, in target steps or in total steps. One evaluation at step 0 will do.
+        scratch: Curves of the baseline, which has no source.
+
+    Raises:
+        StudyError: If the evaluations differ, or scratch counts source steps.
+    """
+    if scratch.source_steps > 0.0:
+        raise StudyError("Scratch learns on the target only, so it cannot count source steps.")
+    if arm.n_evals > 1 and not np.array_equal(arm.steps, scratch.steps):
+        raise StudyError(
+            f"The arm was evaluated {arm.n_evals} times up to step {arm.horizon:g} and scratch "
+            f"{scratch.n_evals} times up to step {scratch.horizon:g}; the steps must be the same."
+        )
+
+
+def _frozen_copy(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
+    """A read-only float copy of `numbers`, all of them finite."""
+    try:
+        copy = np.array(numbers, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise StudyError(f"{name} must be an array of numbers: {error}.") from error
+    if not np.all(np.abs(copy) <= _LARGEST_RETURN):  # Also refuses NaN.
+        raise StudyError(f"{name} must be finite numbers, at most {_LARGEST_RETURN:g}.")
+    copy.setflags(write=False)
+    return copy

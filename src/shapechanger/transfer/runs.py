@@ -1,0 +1,147 @@
+"""What happens in the process of one run; everything random in it comes from the run's own seed."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from shapechanger.errors import MissingExtra
+from shapechanger.transfer.body_map import MappedEnv
+from shapechanger.transfer.evaluation import Evaluation, evaluate, random_actions
+from shapechanger.transfer.executor import Report
+from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
+from shapechanger.transfer.plan import Plan, Run
+from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.training import EVALUATION_SEED, train
+
+try:
+    import torch
+except ImportError as error:
+    raise MissingExtra("torch", "learn") from error
+
+__all__ = ["RunResult", "finished", "perform"]
+
+_RESULT: Final = "run.json"
+_CURVE: Final = "curve.jsonl"
+_POLICY: Final = "policy.zip"
+
+
+class RunResult(msgspec.Struct, frozen=True):
+    """What a run has come to.
+
+    Attributes:
+        run: Which run.
+        seed: Its seed.
+        curve: Its evaluations, by steps.
+        wall_s: How long it took, s; the only number here that another machine would not repeat.
+    """
+
+    run: Run
+    seed: int
+    curve: tuple[Evaluation, ...]
+    wall_s: float
+
+
+def finished(study: Path, run: Run) -> RunResult | None:
+    """The result of a run; None if it has not ended.
+
+    Raises:
+        CorruptStudy: If its file cannot be read.
+    """
+    path = run.folder(study) / _RESULT
+    return read_json(path, RunResult) if path.exists() else None
+
+
+def policy_path(study: Path, run: Run) -> Path:
+    """Where a run keeps its policy."""
+    return run.folder(study) / _POLICY
+
+
+def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report) -> None:
+    """Do one run from its beginning, whatever an earlier try has left.
+
+    Args:
+        plan: The plan of the study.
+        run: Which run.
+        study: The study's folder.
+        source_policy: File of the policy that was brought along; empty if there is none.
+        report: Called with the steps done.
+
+    Raises:
+        OutputError: If its files cannot be written.
+    """
+    # One thread a run: several runs share the machine, and sums in another order are other sums.
+    torch.set_num_threads(1)
+    folder = run.folder(Path(study))
+    shutil.rmtree(folder, ignore_errors=True)
+    make_folder(folder)
+    began = time.monotonic()
+    curve: list[Evaluation] = []
+
+    def on_evaluation(evaluation: Evaluation) -> None:
+        curve.append(evaluation)
+        append_line(folder / _CURVE, evaluation)
+
+    source_path = Path(source_policy or policy_path(Path(study), Run("source", run.index)))
+    if run.kind in ("source", "scratch", "fine-tune"):
+        start = load_policy(source_path) if run.kind == "fine-tune" else None
+        policy = _train(plan, run, start, on_evaluation, report)
+        save_policy(policy, folder / _POLICY)
+    elif run.kind == "random":
+        on_evaluation(_evaluate_random(plan, run))
+    else:
+        on_evaluation(_evaluate_unchanged(plan, load_policy(source_path)))
+    result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
+    write_json(folder / _RESULT, result)
+
+
+def _train(
+    plan: Plan,
+    run: Run,
+    source: TrainedPolicy | None,
+    on_evaluation: Callable[[Evaluation], None],
+    report: Report,
+) -> TrainedPolicy:
+    """Learn in the source, or in the target: from nothing, or from a source policy."""
+    of_source = run.kind == "source"
+    return train(
+        plan.task.source if of_source else plan.task.target,
+        plan.learner,
+        plan.settings,
+        plan.source_steps if of_source else plan.steps,
+        plan.seed_of(run),
+        on_evaluation=on_evaluation,
+        on_steps=report,
+        source=source,
+        body_map=plan.body_map if source is not None else None,
+    )
+
+
+def _evaluate_random(plan: Plan, run: Run) -> Evaluation:
+    """What actions drawn at random are worth in the target."""
+    envs = [plan.task.target.make() for _ in range(plan.settings.eval_episodes)]
+    try:
+        # Each run draws its own actions, from starts of its own.
+        seed = plan.seed_of(run)
+        return evaluate(random_actions(envs[0].action_space, seed), envs, seed)
+    finally:
+        for env in envs:
+            env.close()
+
+
+def _evaluate_unchanged(plan: Plan, source: TrainedPolicy) -> Evaluation:
+    """What a source policy is worth in the target, made to look like the source by the map."""
+    envs = [
+        MappedEnv(plan.task.target.make(), plan.body_map)
+        for _ in range(plan.settings.eval_episodes)
+    ]
+    try:
+        return evaluate(source.act, envs, EVALUATION_SEED)
+    finally:
+        for env in envs:
+            env.close()

@@ -1,0 +1,107 @@
+"""How a learner is set up; the sets that ship were tuned, and say on what."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import msgspec
+
+from shapechanger.errors import StudyError, UnknownName
+
+__all__ = ["LEARNERS", "LearnerSettings", "learner_settings"]
+
+
+class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Settings of Stable-Baselines3's PPO, under its names.
+
+    Attributes:
+        n_envs: Envs stepped together.
+        n_steps: Steps of each env between two updates.
+        batch_size: Steps in a minibatch.
+        n_epochs: Passes over the steps of an update.
+        learning_rate: Of Adam.
+        gamma: Discount.
+        gae_lambda: Of generalised advantage estimation.
+        clip_range: Of the policy ratio.
+        ent_coef: Weight of the entropy.
+        log_std_init: Logarithm of the first standard deviation of the actions.
+        net_arch: Widths of the hidden layers, of actor and critic each.
+        normalise: Whether observations and rewards are divided by running estimates of their
+            standard deviation (`VecNormalize`).
+        steps: Env steps of a training, where nobody asks for another number.
+        eval_every: Target steps between two evaluations, at least `n_envs * n_steps`.
+        eval_episodes: Episodes of an evaluation, with actions that are the policy's mean.
+    """
+
+    n_envs: int
+    n_steps: int
+    batch_size: int
+    n_epochs: int
+    learning_rate: float
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    ent_coef: float = 0.0
+    log_std_init: float = 0.0
+    net_arch: tuple[int, ...] = (64, 64)
+    normalise: bool = False
+    steps: int
+    eval_every: int
+    eval_episodes: int
+
+    def __post_init__(self) -> None:
+        if self.n_envs < 1 or self.n_steps < 1 or self.eval_episodes < 1:
+            raise StudyError("A learner needs at least one env, one step and one episode.")
+        if self.eval_every < self.update_steps:
+            raise StudyError(
+                f"An evaluation every {self.eval_every} steps is more often than an update, "
+                f"which takes {self.update_steps}."
+            )
+
+    @property
+    def update_steps(self) -> int:
+        """Env steps between two updates: the grain that every budget is rounded up to."""
+        return self.n_envs * self.n_steps
+
+    def whole_updates(self, steps: int) -> int:
+        """The least number of env steps that is `steps` or more and ends with an update."""
+        return -(-steps // self.update_steps) * self.update_steps
+
+
+# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 32,768 steps, and
+# `ppo-run` on the ant, which it takes to some 2 m/s within a million.
+LEARNERS: Final[dict[str, LearnerSettings]] = {
+    "ppo-balance": LearnerSettings(
+        n_envs=16,
+        n_steps=64,
+        batch_size=128,
+        n_epochs=10,
+        learning_rate=1e-3,
+        steps=32_768,
+        eval_every=2048,
+        eval_episodes=5,
+    ),
+    "ppo-run": LearnerSettings(
+        n_envs=64,
+        n_steps=128,
+        batch_size=2048,
+        n_epochs=5,
+        learning_rate=5e-4,
+        log_std_init=-1.0,
+        normalise=True,
+        steps=1_048_576,
+        eval_every=65_536,
+        eval_episodes=5,
+    ),
+}
+
+
+def learner_settings(name: str) -> LearnerSettings:
+    """The settings of this name.
+
+    Raises:
+        UnknownName: If there are none.
+    """
+    if name not in LEARNERS:
+        raise UnknownName("learner", name, LEARNERS)
+    return LEARNERS[name]

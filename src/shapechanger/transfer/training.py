@@ -1,0 +1,192 @@
+"""Training a policy with Stable-Baselines3, with evaluations along the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+import shapechanger
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.transfer.evaluation import Evaluation, evaluate
+from shapechanger.transfer.policy_file import Card, Normalisation, TrainedPolicy, actor
+from shapechanger.transfer.settings import LearnerSettings
+
+try:
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
+except ImportError as error:
+    raise MissingExtra("stable-baselines3", "learn") from error
+
+__all__ = ["EVALUATION_SEED", "OnEvaluation", "OnSteps", "Start", "make_training_envs", "train"]
+
+# Evaluations start from seeds far from those of training, the same ones for every run and arm.
+EVALUATION_SEED = 10_000_000
+
+OnEvaluation = Callable[[Evaluation], None]
+OnSteps = Callable[[int], None]
+# A model that is ready to learn, and its envs: what training starts from in place of a fresh one.
+Start = Callable[[VecEnv], PPO]
+
+
+def make_training_envs(
+    env: EnvRef, settings: LearnerSettings, normalisation: Normalisation | None = None
+) -> VecEnv:
+    """The envs that a learner steps together.
+
+    Args:
+        env: The env.
+        settings: How many, and whether normalised.
+        normalisation: Statistics to go on from, if normalised.
+    """
+    envs: VecEnv = VecMonitor(DummyVecEnv([env.make for _ in range(settings.n_envs)]))
+    if settings.normalise:
+        normalised = VecNormalize(envs, gamma=settings.gamma)
+        if normalisation is not None:
+            normalised.obs_rms = normalisation.observation
+            normalised.ret_rms = normalisation.reward
+        envs = normalised
+    return envs
+
+
+def fresh_model(
+    envs: VecEnv, settings: LearnerSettings, seed: int, tensorboard: Path | None = None
+) -> PPO:
+    """An untrained model."""
+    return PPO(
+        "MlpPolicy",
+        envs,
+        n_steps=settings.n_steps,
+        batch_size=settings.batch_size,
+        n_epochs=settings.n_epochs,
+        learning_rate=settings.learning_rate,
+        gamma=settings.gamma,
+        gae_lambda=settings.gae_lambda,
+        clip_range=settings.clip_range,
+        ent_coef=settings.ent_coef,
+        policy_kwargs={
+            "net_arch": list(settings.net_arch),
+            "log_std_init": settings.log_std_init,
+        },
+        seed=seed,
+        device="cpu",
+        tensorboard_log=str(tensorboard) if tensorboard else None,
+    )
+
+
+def train(
+    env: EnvRef,
+    learner: str,
+    settings: LearnerSettings,
+    steps: int,
+    seed: int,
+    *,
+    on_evaluation: OnEvaluation,
+    on_steps: OnSteps = lambda steps: None,
+    normalisation: Normalisation | None = None,
+    start: Start | None = None,
+    tensorboard: Path | None = None,
+) -> TrainedPolicy:
+    """Train a policy, evaluating it before the first step, along the way, and at the end.
+
+    Args:
+        env: The env to train in.
+        learner: Name of the learner, for the card.
+        settings: Its settings.
+        steps: Env steps, rounded up to whole updates.
+        seed: Seed of everything random in it.
+        on_evaluation: Called with each evaluation as soon as it is there.
+        on_steps: Called with the number of steps taken, after each step of all envs.
+        normalisation: Statistics to go on from.
+        start: What to begin with in place of an untrained model.
+        tensorboard: Folder for TensorBoard's logs.
+
+    Raises:
+        StudyError: If `steps` is smaller than one evaluation.
+    """
+    require_budget(steps, settings)
+    envs = make_training_envs(env, settings, normalisation)
+    evaluation_envs = [env.make() for _ in range(settings.eval_episodes)]
+    try:
+        model = fresh_model(envs, settings, seed, tensorboard) if start is None else start(envs)
+        model.set_random_seed(seed)
+        watcher = _Evaluations(settings, evaluation_envs, on_evaluation, on_steps)
+        model.learn(settings.whole_updates(steps), callback=watcher)
+        watcher.evaluate_now()
+        observation, action = layouts_of(evaluation_envs[0])
+        card = Card(
+            env,
+            observation,
+            action,
+            learner,
+            settings,
+            model.num_timesteps,
+            seed,
+            shapechanger.__version__,
+        )
+        return TrainedPolicy(model, _statistics(envs), card)
+    finally:
+        envs.close()
+        for evaluation_env in evaluation_envs:
+            evaluation_env.close()
+
+
+def require_budget(steps: int, settings: LearnerSettings) -> None:
+    """Refuse a budget that ends before the first evaluation.
+
+    Raises:
+        StudyError: If it does.
+    """
+    if steps < settings.eval_every:
+        raise StudyError(
+            f"A budget of {steps} steps is smaller than one evaluation, which comes every "
+            f"{settings.eval_every} steps: give at least that."
+        )
+
+
+def _statistics(envs: VecEnv) -> Normalisation | None:
+    if not isinstance(envs, VecNormalize):
+        return None
+    return Normalisation(envs.obs_rms, envs.ret_rms)  # pyright: ignore[reportArgumentType]
+
+
+class _Evaluations(BaseCallback):
+    """Evaluates between updates, when the policy is the one that the steps so far have made."""
+
+    def __init__(
+        self,
+        settings: LearnerSettings,
+        envs: list[gym.Env[Any, Any]],
+        on_evaluation: OnEvaluation,
+        on_steps: OnSteps,
+    ) -> None:
+        super().__init__()
+        self._every = settings.eval_every
+        self._envs = envs
+        self._on_evaluation = on_evaluation
+        self._on_steps = on_steps
+        self._next = 0
+
+    def _on_step(self) -> bool:
+        self._on_steps(self.num_timesteps)
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps >= self._next:
+            self.evaluate_now()
+            self._next += self._every
+
+    def evaluate_now(self) -> None:
+        """Evaluate the policy as it is."""
+        assert isinstance(self.model, PPO)
+        act = actor(self.model, _statistics(self.training_env))
+        result = evaluate(act, self._envs, EVALUATION_SEED, self.model.num_timesteps)
+        self.logger.record("eval/mean_return", result.mean_return)
+        self.logger.record("eval/mean_length", result.mean_length)
+        for name, value in result.terms.items():
+            self.logger.record(f"eval/{name}", value)
+        self._on_evaluation(result)

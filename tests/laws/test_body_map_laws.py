@@ -1,0 +1,314 @@
+"""What holds for every body map."""
+
+from __future__ import annotations
+
+import contextlib
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from shapechanger.errors import MapError
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import (
+    BodyMap,
+    Entry,
+    Hold,
+    Learn,
+    Rule,
+    Symmetry,
+    Take,
+    Zero,
+    mirror,
+)
+
+# The same examples every time, so that a failure can be looked at twice.
+law = settings(derandomize=True, deadline=None, max_examples=60)
+
+NAMES = ("hip/angle", "ankle/angle", "foot/angle", "Größe", 'odd "name"', "x[0]", "eye")
+# Powers of two: their products and quotients are exact, so that maps can be compared for equality.
+SCALES = st.sampled_from([1.0, -1.0, 2.0, -0.5, 0.25, 8.0])
+
+
+def feature(name: str) -> Feature:
+    """The feature of this name, the same in every body; the eye is a block."""
+    return Feature(name, "1", shape=(2, 2) if name == "eye" else (), gain_unit="N·m")
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> Layout:
+    """Some of the features in some order."""
+    names = draw(st.lists(st.sampled_from(NAMES), unique=True, min_size=1))
+    return Layout(tuple(feature(name) for name in names))
+
+
+def rules(
+    over: Layout, shape: tuple[int, ...], scales: st.SearchStrategy[float]
+) -> st.SearchStrategy[Rule]:
+    """Any rule for a feature of this shape."""
+    constant = st.one_of(
+        st.just(Zero()), st.just(Learn()), st.builds(Hold, st.sampled_from([-1.0, 0.1, 2.0]))
+    )
+    fitting = [taken.name for taken in over if taken.shape == shape]
+    if not fitting:
+        return constant
+    # Twice, so that most rules take something.
+    take = st.builds(Take, st.sampled_from(fitting), scales)
+    return st.one_of(take, take, constant)
+
+
+@st.composite
+def maps(
+    draw: st.DrawFn,
+    source: tuple[Layout, Layout] | None = None,
+    scales: st.SearchStrategy[float] = SCALES,
+) -> BodyMap:
+    """Any map, from a body given or from any body."""
+    source_observation, source_action = source or (draw(layouts()), draw(layouts()))
+    target_observation, target_action = draw(layouts()), draw(layouts())
+
+    def entries(into: Layout, over: Layout) -> tuple[Entry, ...]:
+        return tuple(Entry(f.name, draw(rules(over, f.shape, scales))) for f in into)
+
+    return BodyMap(
+        source_observation,
+        target_observation,
+        source_action,
+        target_action,
+        entries(source_observation, target_observation),
+        entries(target_action, source_action),
+    )
+
+
+@st.composite
+def chains(draw: st.DrawFn, length: int) -> list[BodyMap]:
+    """Maps that meet."""
+    links = [draw(maps())]
+    while len(links) < length:
+        last = links[-1]
+        links.append(draw(maps((last.target_observation, last.target_action))))
+    return links
+
+
+@st.composite
+def one_to_one(draw: st.DrawFn) -> BodyMap:
+    """A map in which nothing is taken twice."""
+    built = draw(maps())
+
+    def thinned(entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+        seen: set[str] = set()
+        kept: list[Entry] = []
+        for entry in entries:
+            again = isinstance(entry.rule, Take) and entry.rule.feature in seen
+            if isinstance(entry.rule, Take):
+                seen.add(entry.rule.feature)
+            kept.append(Entry(entry.feature, Zero()) if again else entry)
+        return tuple(kept)
+
+    return BodyMap(
+        built.source_observation,
+        built.target_observation,
+        built.source_action,
+        built.target_action,
+        thinned(built.observation),
+        thinned(built.action),
+    )
+
+
+@st.composite
+def symmetries(draw: st.DrawFn) -> Symmetry:
+    """Any signed permutation of features that are alike."""
+
+    def turned(layout: Layout) -> tuple[Take, ...]:
+        names = [f.name for f in layout if not f.shape]
+        order = dict(zip(names, draw(st.permutations(names)), strict=True))
+        return tuple(
+            Take(order.get(f.name, f.name), draw(st.sampled_from([1.0, -1.0]))) for f in layout
+        )
+
+    observation, action = draw(layouts()), draw(layouts())
+    return Symmetry(observation, action, turned(observation), turned(action))
+
+
+def layouts_of(built: BodyMap) -> tuple[Layout, Layout, Layout, Layout]:
+    """The four layouts, as `between` and `from_toml` want them."""
+    return (
+        built.source_observation,
+        built.target_observation,
+        built.source_action,
+        built.target_action,
+    )
+
+
+@law
+@given(links=chains(3))
+def test_composition_is_associative(links: list[BodyMap]) -> None:
+    """Three maps in a row are one map, however they are joined."""
+    a, b, c = links
+    left, right = a.then(b).then(c), a.then(b.then(c))
+    assert left == right
+    assert left.table() == right.table()
+
+
+@law
+@given(built=maps())
+def test_the_identity_is_neutral(built: BodyMap) -> None:
+    """To stay in a body before or after changing it changes nothing."""
+    before = BodyMap.identity(built.source_observation, built.source_action)
+    after = BodyMap.identity(built.target_observation, built.target_action)
+    assert before.then(built) == built == built.then(after)
+    assert before.then(built).table() == built.table() == built.then(after).table()
+
+
+@law
+@given(links=chains(2), seed=st.integers(0, 2**32 - 1))
+def test_a_composed_map_adapts_as_its_links_do(links: list[BodyMap], seed: int) -> None:
+    """The matrices of a chain are the products of the matrices of its links."""
+    a, b = links
+    both = a.then(b)
+    rng = np.random.default_rng(seed)
+    sensed = rng.normal(size=(3, both.target_observation.size))
+    moved = rng.normal(size=(3, both.source_action.size))
+    np.testing.assert_allclose(
+        both.adapt_observation(sensed), a.adapt_observation(b.adapt_observation(sensed))
+    )
+    np.testing.assert_allclose(both.adapt_action(moved), b.adapt_action(a.adapt_action(moved)))
+    np.testing.assert_allclose(both.observation_matrix, a.observation_matrix @ b.observation_matrix)
+    np.testing.assert_allclose(both.action_matrix, b.action_matrix @ a.action_matrix)
+
+
+@law
+@given(built=one_to_one())
+def test_there_and_back_is_the_identity_where_it_matched(built: BodyMap) -> None:
+    """What was taken comes back; what was not stays as its rule says."""
+    there_and_back = built.then(built.inverse("learn"))
+    for before, after in zip(built.observation, there_and_back.observation, strict=True):
+        expected = Take(before.feature) if isinstance(before.rule, Take) else before.rule
+        assert after.rule == expected
+    back_and_there = built.inverse("learn").then(built)
+    for before, after in zip(built.action, back_and_there.action, strict=True):
+        expected = Take(before.feature) if isinstance(before.rule, Take) else before.rule
+        assert after.rule == expected
+
+
+@law
+@given(built=one_to_one())
+def test_the_inverse_of_the_inverse_takes_the_same(built: BodyMap) -> None:
+    """Inverting twice leaves every taken entry as it was."""
+    again = built.inverse().inverse()
+    for before, after in zip(
+        (*built.observation, *built.action), (*again.observation, *again.action), strict=True
+    ):
+        if isinstance(before.rule, Take):
+            assert after.rule == before.rule
+
+
+@law
+@given(built=maps())
+def test_an_inverse_takes_each_feature_at_most_once(built: BodyMap) -> None:
+    """Where a feature went to several places, one of them gives it back or nobody does."""
+    back = None
+    with contextlib.suppress(MapError):
+        back = built.inverse()
+    if back is None:
+        with pytest.raises(MapError, match="is taken by"):
+            built.inverse()
+        return
+    taken = [e.rule.feature for e in back.action if isinstance(e.rule, Take)]
+    assert len(taken) == len(set(taken))
+
+
+@law
+@given(built=maps(scales=st.floats(1e-3, 1e3)))
+def test_json_round_trip(built: BodyMap) -> None:
+    """A map that is written down is the same map, remarks included."""
+    again = BodyMap.from_json(built.to_json())
+    assert again == built
+    assert again.table() == built.table()
+
+
+@law
+@given(built=maps(scales=st.floats(1e-3, 1e3)))
+def test_toml_round_trip(built: BodyMap) -> None:
+    """The text of a map gives the map again, to the last bit."""
+    text = built.to_toml()
+    assert BodyMap.from_toml(text, *layouts_of(built)) == built
+    assert BodyMap.from_toml(text, *layouts_of(built)).to_toml() == text
+
+
+@law
+@given(symmetry=symmetries())
+def test_a_symmetry_and_its_inverse_are_the_identity(symmetry: Symmetry) -> None:
+    """Turned and turned back, nothing has moved."""
+    still = BodyMap.identity(symmetry.observation_layout, symmetry.action_layout)
+    once = still.with_symmetry(symmetry)
+    assert once.with_symmetry(symmetry.inverse()) == still
+    assert symmetry.inverse().inverse() == symmetry
+    np.testing.assert_allclose(abs(np.linalg.det(once.observation_matrix)), 1.0)
+
+
+@law
+@given(
+    legs=st.integers(1, 4),
+    flip=st.booleans(),
+    order=st.randoms(use_true_random=False),
+)
+def test_a_mirror_undoes_itself(legs: int, flip: bool, order: object) -> None:
+    """Left and right exchanged twice is the body as it was, whatever the order of its features."""
+    names = [f"torso/{q}" for q in ("y", "qw", "qx", "qy", "qz", "vx", "vy", "wx", "wy", "wz")]
+    names += [
+        f"{joint}_{side}{leg}/{quantity}"
+        for joint in ("hip", "ankle")
+        for side in "lr"
+        for leg in range(legs)
+        for quantity in ("angle", "velocity", "contact/fy", "contact/tx")
+    ]
+    order.shuffle(names)  # type: ignore[attr-defined]
+    observation = Layout(tuple(Feature(name, "1") for name in names))
+    action = Layout(tuple(Feature(f"hip_{side}0/motor", "1", -1.0, 1.0) for side in "lr"))
+    symmetry = mirror(observation, action, swap={"*_l*": "*_r*"}, flip=["hip_*"] if flip else [])
+    assert symmetry.inverse() == symmetry
+    once = BodyMap.identity(observation, action).with_symmetry(symmetry)
+    assert once.then(once) == BodyMap.identity(observation, action)
+    assert once != BodyMap.identity(observation, action)
+
+
+@law
+@given(
+    gains=st.lists(st.tuples(st.floats(1e-2, 1e4), st.floats(1e-2, 1e4)), min_size=1, max_size=5),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_units_of_torque_keep_the_torque(gains: list[tuple[float, float]], seed: int) -> None:
+    """Gain times action is the same in both bodies, to rounding."""
+
+    def motors(which: int) -> Layout:
+        return Layout(
+            tuple(
+                Feature(f"{i}/motor", "1", gain=pair[which], gain_unit="N·m")
+                for i, pair in enumerate(gains)
+            )
+        )
+
+    sensed = Layout((Feature("z", "m"),))
+    built = BodyMap.between(sensed, sensed, motors(0), motors(1), units="torque")
+    action = np.random.default_rng(seed).normal(size=len(gains))
+    source_gain, target_gain = np.array(gains).T
+    np.testing.assert_allclose(
+        target_gain * built.adapt_action(action), source_gain * action, rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@law
+@given(layout=layouts(), more=layouts(), seed=st.integers(0, 2**32 - 1))
+def test_matched_entries_are_bit_exact(
+    dtype: type, layout: Layout, more: Layout, seed: int
+) -> None:
+    """A number that has a namesake is copied and never computed."""
+    target = Layout((*more.features, *(f for f in layout if f.name not in more)))
+    built = BodyMap.between(layout, target, layout, target)
+    values = np.random.default_rng(seed).normal(size=target.size).astype(dtype)
+    adapted = built.adapt_observation(values)
+    for name, place in layout.slices.items():
+        assert adapted[place].tobytes() == values[target.slices[name]].tobytes()

@@ -1,0 +1,269 @@
+"""Laws of the measures, for curves of any height, size and source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from shapechanger.transfer.metrics import (
+    Estimate,
+    LearningCurves,
+    Measures,
+    Reference,
+    Summary,
+    asymptotic_gain,
+    auc_ratio,
+    forward_transfer,
+    in_total_steps,
+    jumpstart,
+    steps_to_reach,
+    summarise,
+    time_to_threshold,
+    total_reward_gain,
+)
+
+Pair = tuple[LearningCurves, LearningCurves]
+Difference = Callable[[LearningCurves, LearningCurves], Estimate]
+
+DIFFERENCES: dict[str, Difference] = {
+    "jumpstart": jumpstart,
+    "asymptotic gain": lambda arm, scratch: asymptotic_gain(arm, scratch, last_k=1),
+    "total reward gain": total_reward_gain,
+    "steps saved": lambda arm, scratch: time_to_threshold(arm, scratch, 0.5).steps_saved,
+}
+differences = pytest.mark.parametrize("difference", DIFFERENCES.values(), ids=DIFFERENCES.keys())
+
+# Returns down to rounding noise and up to a few thousand, as simulated robots have them.
+heights = st.floats(-5.0, 5.0) | st.floats(-1e4, 1e4)
+source_steps = st.just(0) | st.integers(0, 2000)
+
+
+@st.composite
+def pairs(draw: st.DrawFn, low: float | None = None, high: float | None = None) -> Pair:
+    """An arm and scratch on one grid of evaluations, with any number of seeds each."""
+    gaps = draw(st.lists(st.integers(1, 300), min_size=1, max_size=5))
+    steps = np.cumsum([0.0, *gaps])
+    heights_here = heights if low is None else st.floats(low, high)
+
+    def curves() -> LearningCurves:
+        row = st.lists(heights_here, min_size=steps.size, max_size=steps.size)
+        return LearningCurves(steps, np.array(draw(st.lists(row, min_size=1, max_size=4))))
+
+    return curves(), curves()
+
+
+def value(estimate: Estimate) -> float:
+    """The point of an estimate that must exist."""
+    assert estimate.value is not None
+    return estimate.value
+
+
+def points(summary: Summary) -> list[float | None]:
+    """Every point estimate of a summary, in one order."""
+
+    def of(measures: Measures) -> list[float | None]:
+        found = [
+            measures.jumpstart.value,
+            measures.asymptotic_gain.value,
+            measures.total_reward_gain.value,
+            measures.auc_ratio.value,
+            measures.forward_transfer.value,
+        ]
+        for times in measures.times_to_threshold:
+            found.append(times.steps_saved.value)
+            for reached in (times.arm, times.scratch):
+                if reached is not None:
+                    found += [reached.fraction, reached.restricted_mean, reached.restricted_median]
+        return found
+
+    return of(summary.in_target_steps) + of(summary.in_total_steps)
+
+
+def summary_of(
+    arm: LearningCurves, scratch: LearningCurves, reference: Reference, source: float
+) -> Summary:
+    """A summary with few resamples, always from the same seed."""
+    return summarise(
+        scratch,
+        arm,
+        reference,
+        source_steps=source,
+        rng=np.random.default_rng(0),
+        last_k=1,
+        n_resamples=50,
+    )
+
+
+def same(left: list[float | None], right: list[float | None], tolerance: float) -> None:
+    """Both lists hold the same numbers and the same gaps, up to rounding."""
+    assert [v is None for v in left] == [v is None for v in right]
+    np.testing.assert_allclose(
+        [v for v in left if v is not None],
+        [v for v in right if v is not None],
+        rtol=tolerance,
+        atol=tolerance,
+    )
+
+
+@differences
+@given(pair=pairs())
+def test_differences_change_sign_when_arms_change_places(
+    difference: Difference, pair: Pair
+) -> None:
+    """What one arm gains the other loses, intervals included."""
+    arm, scratch = pair
+    there, back = difference(arm, scratch), difference(scratch, arm)
+    assert value(there) == -value(back)
+    if there.low is None:
+        assert back.low is None
+    else:
+        np.testing.assert_allclose([there.low, there.high], [-back.high, -back.low], rtol=1e-9)
+
+
+@differences
+@given(pair=pairs())
+def test_no_arm_gains_on_itself(difference: Difference, pair: Pair) -> None:
+    """The identity: every gain of an arm over itself is zero."""
+    assert value(difference(pair[0], pair[0])) == 0.0
+
+
+@given(pair=pairs(0.0, 1.0))
+def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
+    """The identity: a ratio of 1 and a forward transfer of 0, where they are defined."""
+    arm, _ = pair
+    ratio = auc_ratio(arm, arm, rng=np.random.default_rng(0), n_resamples=50)
+    transfer = forward_transfer(arm, arm, rng=np.random.default_rng(0), n_resamples=50)
+    assert ratio.value in (None, 1.0)
+    assert transfer.value in (None, 0.0)
+
+
+@given(
+    pair=pairs(),
+    scale=st.floats(1e-2, 1e2),
+    offset=st.floats(-1e3, 1e3),
+    span=st.floats(1.0, 1e3),
+    clip=st.booleans(),
+)
+def test_scores_do_not_know_units_of_reward(
+    pair: Pair,
+    scale: float,
+    offset: float,
+    span: float,
+    clip: bool,
+) -> None:
+    """Affine invariance: a reward times a > 0 plus b is the same task, and the same score."""
+    curves, _ = pair
+    plain = Reference(0.0, span)
+    moved = Reference(offset, scale * span + offset)
+    rewarded = LearningCurves(curves.steps, scale * curves.returns + offset)
+    np.testing.assert_allclose(
+        moved.scores(rewarded, clip=clip).returns,
+        plain.scores(curves, clip=clip).returns,
+        rtol=1e-6,
+        atol=1e-6,
+    )
+
+
+@differences
+@given(pair=pairs(), bonus=st.floats(0.0, 100.0), source=source_steps)
+def test_a_better_arm_never_gains_less(
+    difference: Difference, pair: Pair, bonus: float, source: int
+) -> None:
+    """Monotonicity: a bonus at every evaluation lowers no gain, in either way of counting."""
+    arm, scratch = pair
+    better = LearningCurves(arm.steps, arm.returns + bonus)
+    before = value(difference(in_total_steps(arm, source, 0.0), scratch))
+    after = value(difference(in_total_steps(better, source, 0.0), scratch))
+    assert after >= before - 1e-9 * max(1.0, abs(before))
+
+
+@given(pair=pairs(0.01, 0.9), bonus=st.floats(0.0, 0.1), source=source_steps)
+def test_a_better_arm_never_has_a_lower_ratio(pair: Pair, bonus: float, source: int) -> None:
+    """Monotonicity of the two ratios, on scores between 0 and 1."""
+    arm, scratch = pair
+    better = LearningCurves(arm.steps, arm.returns + bonus)
+    for measure in (auc_ratio, forward_transfer):
+        before, after = (
+            value(
+                measure(
+                    in_total_steps(curves, source, 0.0),
+                    scratch,
+                    rng=np.random.default_rng(0),
+                    n_resamples=50,
+                )
+            )
+            for curves in (arm, better)
+        )
+        assert after >= before - 1e-9 * max(1.0, abs(before))
+
+
+@given(pair=pairs(), source=source_steps, data=st.data())
+def test_seeds_have_no_order(pair: Pair, source: int, data: st.DataObject) -> None:
+    """Permutation: which run is called seed 0 changes no point estimate."""
+    arm, scratch = pair
+    rows = data.draw(st.permutations(range(arm.n_seeds)))
+    shuffled = LearningCurves(arm.steps, arm.returns[np.array(rows)])
+    reference = Reference(0.0, 1.0)
+    same(
+        points(summary_of(shuffled, scratch, reference, source)),
+        points(summary_of(arm, scratch, reference, source)),
+        tolerance=1e-9,
+    )
+
+
+@given(pair=pairs(), threshold=heights, source=source_steps)
+def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, source: int) -> None:
+    """Restricted means and medians lie in [0, H], and censored seeds are exactly the rest."""
+    arm, scratch = pair
+    counted = in_total_steps(arm, source, -1e4)
+    times = time_to_threshold(counted, scratch, threshold)
+    for reached in (times.arm, times.scratch):
+        assert reached is not None
+        assert 0.0 <= reached.restricted_mean <= arm.horizon
+        assert 0.0 <= reached.fraction <= 1.0
+        assert (reached.restricted_median is None) == (reached.fraction < 0.5)
+    steps: NDArray[np.float64] = steps_to_reach(counted, threshold)
+    assert np.all((steps <= arm.horizon) | np.isinf(steps))
+
+
+@given(pair=pairs())
+def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
+    """What is at 0.75 has been at 0.25 before."""
+    curves, _ = pair
+    assert np.all(steps_to_reach(curves, 0.25) <= steps_to_reach(curves, 0.75))
+
+
+@given(pair=pairs(), source=st.integers(0, 2000))
+def test_steps_on_the_source_never_pay_in_total_steps(pair: Pair, source: int) -> None:
+    """Each crossing comes later by the source steps, or not within the budget."""
+    curves, _ = pair
+    floor = float(curves.returns.min()) - 1.0
+    height = float(curves.returns.mean())
+    alone = steps_to_reach(curves, height)
+    counted = steps_to_reach(in_total_steps(curves, source, floor), height)
+    np.testing.assert_array_equal(
+        counted, np.where(alone + source <= curves.horizon, alone + source, np.inf)
+    )
+
+
+@given(pair=pairs())
+def test_no_source_no_difference(pair: Pair) -> None:
+    """With source_steps = 0 total steps are target steps, to the last digit and with intervals."""
+    summary = summary_of(*pair, Reference(0.0, 1.0), 0)
+    assert summary.in_total_steps == summary.in_target_steps
+
+
+@given(pair=pairs(), source=source_steps, floor=st.floats(-1e4, 1e4))
+def test_area_in_total_steps_is_floor_and_rest(pair: Pair, source: int, floor: float) -> None:
+    """The area is linear: a floor of f adds f times the share of the budget spent on the source."""
+    curves, _ = pair
+    share = min(source / curves.horizon, 1.0)
+    difference = (
+        in_total_steps(curves, source, floor).auc() - in_total_steps(curves, source, 0.0).auc()
+    )
+    np.testing.assert_allclose(difference, floor * share, rtol=1e-9, atol=1e-8)

@@ -1,0 +1,160 @@
+"""Maps in a row and backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.transfer.body_map.bodies import (
+    ant_action,
+    ant_observation,
+    motor,
+    pendulum_action,
+    pendulum_observation,
+)
+
+from shapechanger.errors import MapError
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero
+
+
+def grown(**options: object) -> BodyMap:
+    """The map from the ant to the ant with feet."""
+    return BodyMap.between(
+        ant_observation(),
+        ant_observation(feet=True),
+        ant_action(),
+        ant_action(feet=True),
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def copied() -> BodyMap:
+    """A map in which two target motors copy one source motor."""
+    return BodyMap.between(
+        Layout((Feature("z", "m"), Feature("height", "m"))),
+        Layout((Feature("z", "m"),)),
+        Layout((motor("ankle"),)),
+        Layout((motor("foot"), motor("ankle"), motor("toe"))),
+        rules={
+            "height": "copy z",
+            "foot/motor": "copy ankle/motor",
+            "toe/motor": Take("ankle/motor", -0.5),
+        },
+    )
+
+
+def test_there_and_back_is_nothing() -> None:
+    """An ant whose policy visits an ant with feet comes home unchanged."""
+    there = grown(rules={"foot_*": "learn"})
+    assert there.then(there.inverse()) == BodyMap.identity(ant_observation(), ant_action())
+
+
+def test_back_and_there_keeps_what_was_shared() -> None:
+    """What the ant lacks is lost on the way, and the rules say how."""
+    there = grown(rules={"foot_*": "learn"})
+    round_trip = there.inverse("hold").then(there)
+    observation = {entry.feature: entry for entry in round_trip.observation}
+    assert observation["hip_1/angle"].rule == Take("hip_1/angle")
+    assert isinstance(observation["foot_1/angle"].rule, Hold)
+    action = {entry.feature: entry for entry in round_trip.action}
+    assert (action["foot_1/motor"].rule, action["foot_1/motor"].why) == (Learn(), "rule 'foot_*'")
+
+
+def test_rules_multiply_and_reasons_add_up() -> None:
+    """The map of a chain says where each of its steps came from."""
+    motors = pendulum_action()
+    first = BodyMap.between(
+        pendulum_observation("pole"),
+        pendulum_observation(),
+        motors,
+        motors,
+        rules={"pole/*": "copy hinge/*"},
+    )
+    second = BodyMap.between(
+        pendulum_observation(),
+        pendulum_observation(),
+        motors,
+        motors,
+        rules={"hinge/angle": Take("hinge/angle", -2.0), "hinge/velocity": Hold(3.0)},
+    )
+    both = first.then(second)
+    assert [entry.rule for entry in both.observation] == [
+        Take("slider/position"),
+        Take("hinge/angle", -2.0),
+        Take("slider/velocity"),
+        Hold(3.0),
+    ]
+    assert both.observation[0].why == "same name"
+    assert both.observation[1].why == "rule 'pole/*', then rule 'hinge/angle'"
+
+
+def test_actions_run_through_both_maps() -> None:
+    """The chain does to an action what its links do, one after the other."""
+    first, second = grown(rules={"foot_*/motor": "copy ankle_*/motor"}), grown().inverse()
+    second = second.then(grown(rules={"foot_*/motor": "copy hip_*/motor"}))
+    action = np.random.default_rng(0).uniform(-1.0, 1.0, size=8)
+    np.testing.assert_array_equal(
+        first.then(second).adapt_action(action), second.adapt_action(first.adapt_action(action))
+    )
+
+
+@pytest.mark.parametrize(
+    ("middle", "message"),
+    [
+        (Layout((Feature("z", "mm"), Feature("y", "m"))), r"z \[m\] and z \[mm\], whose unit"),
+        (Layout((Feature("y", "m"), Feature("z", "m"))), "whose name is 'z' and 'y'"),
+        (Layout((Feature("z", "m"),)), "one has 2 features and the other 1"),
+    ],
+)
+def test_maps_that_do_not_meet_are_refused(middle: Layout, message: str) -> None:
+    """The message says where the bodies in the middle part."""
+    here = Layout((Feature("z", "m"), Feature("y", "m")))
+    first = BodyMap.identity(here, pendulum_action())
+    second = BodyMap.identity(middle, pendulum_action())
+    with pytest.raises(MapError, match=message) as caught:
+        first.then(second)
+    assert "target observation of the first" in str(caught.value)
+
+
+def test_motors_of_another_strength_do_not_meet() -> None:
+    """A scale made for one gain is wrong for another."""
+    first = BodyMap.identity(pendulum_observation(), pendulum_action(100.0))
+    second = BodyMap.identity(pendulum_observation(), pendulum_action(200.0))
+    with pytest.raises(MapError, match=r"action of the first .* gain is 100\.0 and 200\.0"):
+        first.then(second)
+
+
+def test_a_scale_is_undone() -> None:
+    """The way back divides."""
+    motors = pendulum_action(100.0), pendulum_action(400.0)
+    there = BodyMap.between(pendulum_observation(), pendulum_observation(), *motors, units="torque")
+    assert there.inverse().action[0].rule == Take("slide/motor", 4.0)
+
+
+def test_the_namesake_gives_a_copied_feature_back() -> None:
+    """Of several copies the one of the same name is the original."""
+    back = copied().inverse()
+    assert [entry.rule for entry in back.action] == [Take("ankle/motor")]
+    assert [entry.rule for entry in back.observation] == [Take("z")]
+
+
+def test_copies_without_a_namesake_have_no_way_back() -> None:
+    """Which of two motors was meant, nobody can know."""
+    there = BodyMap.between(
+        pendulum_observation(),
+        pendulum_observation(),
+        Layout((motor("ankle"),)),
+        Layout((motor("foot"), motor("toe"))),
+        rules={"*/motor": "copy ankle/motor"},
+    )
+    with pytest.raises(MapError, match="is taken by 'foot/motor' and 'toe/motor', and none"):
+        there.inverse()
+
+
+def test_what_was_not_taken_gets_the_rule_for_the_rest() -> None:
+    """The way back has gaps of its own."""
+    for otherwise, rule in (("learn", Learn()), ("zero", Zero())):
+        rules = {e.feature: e.rule for e in grown().inverse(otherwise).observation}
+        assert rules["foot_1/velocity"] == rule
+    with pytest.raises(MapError, match=r"'foot_1/angle' cannot hold 0\.1: it reaches from 0\.52"):
+        grown().inverse(Hold(0.1))

@@ -1,0 +1,134 @@
+"""Maps between envs, and the target env as a source policy sees it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from tests.transfer.body_map.bodies import ant_action, ant_observation
+
+from shapechanger.errors import MapError, SpaceMismatch
+from shapechanger.layout import Layout
+from shapechanger.transfer.body_map import BodyMap, MappedEnv, Take, body_map, wrap
+
+
+class Recorder(gym.Env[np.ndarray, np.ndarray]):
+    """An env of some layout that senses what it is told to and remembers what it was made to do."""
+
+    def __init__(self, *, feet: bool = False) -> None:
+        self.observation_layout = ant_observation(feet=feet)
+        self.action_layout = ant_action(feet=feet)
+        n = self.observation_layout.size
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (n,), np.float64)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (self.action_layout.size,), np.float32)
+        self.moved: list[np.ndarray] = []
+
+    def sensed(self) -> np.ndarray:
+        """A different number in each place and at each time."""
+        n = self.observation_layout.size
+        return np.linspace(-0.3, 0.3, n) + len(self.moved)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Forget everything."""
+        super().reset(seed=seed)
+        self.moved = []
+        return self.sensed(), {"options": options}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Remember the action."""
+        self.moved.append(action)
+        return self.sensed(), 2.5, True, False, {"moved": action}
+
+
+class Silent(Recorder):
+    """An env that publishes nothing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        del self.action_layout
+
+
+def test_envs_are_mapped_by_their_layouts() -> None:
+    """A map needs nothing but two envs."""
+    built = body_map(Recorder(), gym.wrappers.TimeLimit(Recorder(feet=True), 5), otherwise="learn")
+    assert built.source_action == ant_action()
+    assert built.target_action == ant_action(feet=True)
+
+
+def test_an_env_without_layouts_is_refused() -> None:
+    """The message says what to add."""
+    with pytest.raises(MapError, match="publishes no action_layout: give Silent a property"):
+        body_map(Recorder(), Silent())
+
+
+def test_a_source_policy_acts_in_the_target() -> None:
+    """It senses the source's numbers and moves the target's motors."""
+    source, target = Recorder(), Recorder(feet=True)
+    built = body_map(source, target, rules={"foot_*/motor": "copy ankle_*/motor"})
+    env = wrap(target, built)
+    observation, info = env.reset(seed=3, options={"a": 1})
+    assert info == {"options": {"a": 1}}
+    np.testing.assert_array_equal(observation, built.adapt_observation(target.sensed()))
+    assert observation.dtype == np.float64
+    action = np.linspace(-1.0, 1.0, 8).astype(np.float32)
+    observation, reward, terminated, truncated, _ = env.step(action)
+    assert (reward, terminated, truncated) == (2.5, True, False)
+    np.testing.assert_array_equal(observation, built.adapt_observation(target.sensed()))
+    np.testing.assert_array_equal(target.moved[0], built.adapt_action(action))
+    assert target.moved[0].dtype == np.float32
+
+
+def test_the_spaces_are_those_of_the_source() -> None:
+    """They follow from the layouts, or are the source's own."""
+    source, target = Recorder(), Recorder(feet=True)
+    built = body_map(source, target)
+    env = wrap(target, built)
+    assert isinstance(env.observation_space, gym.spaces.Box)
+    np.testing.assert_array_equal(env.observation_space.high, source.observation_layout.high)
+    assert env.action_space == source.action_space
+    env = wrap(
+        target,
+        built,
+        observation_space=source.observation_space,
+        action_space=source.action_space,
+    )
+    assert env.observation_space is source.observation_space
+    assert env.action_space is source.action_space
+
+
+def test_a_mapped_env_publishes_the_source_layouts() -> None:
+    """So it can be mapped again: what it shows is what counts, and not what it wraps."""
+    source, target = Recorder(), Recorder(feet=True)
+    env = wrap(target, body_map(source, target))
+    assert (env.observation_layout, env.action_layout) == (ant_observation(), ant_action())
+    assert body_map(source, env) == BodyMap.identity(ant_observation(), ant_action())
+
+
+def test_a_space_of_the_wrong_size_is_refused() -> None:
+    """A map for other bodies is found when the env is built."""
+    built = body_map(Recorder(), Recorder(feet=True))
+    with pytest.raises(SpaceMismatch, match=r"target observation layout holds 59 numbers"):
+        wrap(Recorder(), built)
+    with pytest.raises(SpaceMismatch, match="source action layout holds 8"):
+        wrap(Recorder(feet=True), built, action_space=gym.spaces.Box(-1.0, 1.0, (7,)))
+
+
+def test_a_mapped_env_is_rebuilt_from_its_spec() -> None:
+    """The spec holds the map, also as JSON, so that a study can be repeated."""
+    gym.register("body_map_test/Recorder-v0", f"{__name__}:Recorder", kwargs={"feet": True})
+    try:
+        target = gym.make("body_map_test/Recorder-v0", disable_env_checker=True)
+        built = body_map(Recorder(), target, action_rules={"foot_1/motor": Take("hip_1/motor")})
+        spec = wrap(target, built).spec
+        assert spec is not None
+        again = gym.make(EnvSpec.from_json(spec.to_json()), disable_env_checker=True)
+    finally:
+        del gym.registry["body_map_test/Recorder-v0"]
+    assert isinstance(again, MappedEnv)
+    assert again.body_map == built
+    assert isinstance(again.observation_layout, Layout)

@@ -1,0 +1,201 @@
+"""What a body map computes, shows and refuses."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import msgspec
+import numpy as np
+import pytest
+from tests.transfer.body_map.bodies import (
+    ant_action,
+    ant_observation,
+    motor,
+    pendulum_action,
+    pendulum_observation,
+)
+
+from shapechanger.errors import MapError, SpaceMismatch, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Entry, Hold, Learn, Row, Take, Zero
+
+
+def small() -> BodyMap:
+    """A map with each kind of rule."""
+    return BodyMap.between(
+        Layout((Feature("z", "m"), Feature("lost", "m"), Feature("rest", "rad"))),
+        Layout((Feature("new", "m"), Feature("z", "m"))),
+        Layout((motor("hip"), motor("ankle"))),
+        Layout((motor("ankle"), motor("foot"), motor("toe"), motor("hip"))),
+        observation_rules={"rest": Hold(0.25)},
+        action_rules={
+            "foot/motor": Take("ankle/motor", -2.0),
+            "toe/motor": "learn",
+            "hip/motor": Take("hip/motor", 0.5),
+        },
+    )
+
+
+def test_numbers_arrive_where_their_names_are() -> None:
+    """Observations in the order of the source, actions in that of the target."""
+    np.testing.assert_array_equal(small().adapt_observation([7.0, 3.0]), [3.0, 0.0, 0.25])
+    np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
+
+
+def test_actions_end_at_the_bounds_of_the_target() -> None:
+    """A scaled action shall not ask for more than the motor has."""
+    np.testing.assert_array_equal(small().adapt_action([3.0, -0.7]), [-0.7, 1.0, 0.0, 1.0])
+
+
+def test_batches_of_any_shape_pass() -> None:
+    """Leading axes are left alone."""
+    values = np.random.default_rng(0).normal(size=(4, 5, 2))
+    adapted = small().adapt_observation(values)
+    assert adapted.shape == (4, 5, 3)
+    np.testing.assert_array_equal(adapted[2, 3], small().adapt_observation(values[2, 3]))
+    assert small().adapt_observation(np.zeros((0, 2))).shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("given", "result"),
+    [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
+)
+def test_the_number_type_is_kept(given: type, result: type) -> None:
+    """A policy in single precision gets single precision."""
+    assert small().adapt_observation(np.ones(2, given)).dtype == result
+    assert small().adapt_action(np.ones(2, given)).dtype == result
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_matched_numbers_are_copied_to_the_last_bit(dtype: type) -> None:
+    """A map of namesakes is a permutation and not arithmetic."""
+    built = BodyMap.between(
+        ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
+    )
+    values = np.random.default_rng(1).normal(size=built.target_observation.size).astype(dtype)
+    values[:4] = [-0.0, 5e-324, np.inf, np.nan]
+    adapted = built.adapt_observation(values)
+    for name, place in built.source_observation.slices.items():
+        original = values[built.target_observation.slices[name]]
+        assert adapted[place].tobytes() == original.tobytes()
+
+
+def test_a_gap_is_filled_even_from_nonsense() -> None:
+    """0 times NaN is NaN, so what is not taken must not be touched."""
+    np.testing.assert_array_equal(small().adapt_observation([np.nan, 3.0]), [3.0, 0.0, 0.25])
+
+
+def test_the_result_is_a_new_array() -> None:
+    """A learner may keep an observation."""
+    built = BodyMap.identity(pendulum_observation(), pendulum_action())
+    values = np.zeros(4)
+    assert not np.may_share_memory(values, built.adapt_observation(values))
+
+
+def test_blocks_move_as_a_whole() -> None:
+    """A picture keeps its order, wherever it lies in the vector."""
+    eye = Feature("eye", "1", 0.0, 1.0, shape=(2, 2))
+    ear = Feature("ear", "1", 0.0, 1.0, shape=(2,))
+    built = BodyMap.between(
+        Layout((Feature("z", "m"), eye, ear)),
+        Layout((eye, Feature("z", "m"))),
+        pendulum_action(),
+        pendulum_action(),
+        rules={"ear": "hold"},
+    )
+    adapted = built.adapt_observation([1.0, 2.0, 3.0, 4.0, 9.0])
+    np.testing.assert_array_equal(adapted, [9.0, 1.0, 2.0, 3.0, 4.0, 0.5, 0.5])
+
+
+def test_the_affine_form_is_the_map() -> None:
+    """Transplanting weights uses the matrices, so they must say what the map does."""
+    rng = np.random.default_rng(2)
+    built = small()
+    sensed, moved = rng.normal(size=2), rng.uniform(-0.3, 0.3, size=2)
+    np.testing.assert_allclose(
+        built.observation_matrix @ sensed + built.observation_offset,
+        built.adapt_observation(sensed),
+    )
+    np.testing.assert_allclose(
+        built.action_matrix @ moved + built.action_offset, built.adapt_action(moved)
+    )
+    assert built.observation_matrix is built.observation_matrix
+    with pytest.raises(ValueError, match="read-only"):
+        built.action_offset[0] = 1.0
+
+
+def test_a_vector_of_another_body_is_refused() -> None:
+    """The message counts the numbers."""
+    with pytest.raises(SpaceMismatch, match=r"holds 2 numbers, .*target observation.*\(3,\)"):
+        small().adapt_observation(np.zeros(3))
+    with pytest.raises(SpaceMismatch, match=r"source action feature.* shape given is \(\)"):
+        small().adapt_action(0.0)
+
+
+def test_the_table_states_each_rule() -> None:
+    """Every entry of the map says what it does and why."""
+    assert small().table() == (
+        Row("observation", "z", "z", "same name"),
+        Row("observation", "lost", "zero", "default"),
+        Row("observation", "rest", "hold 0.25", "rule 'rest'"),
+        Row("action", "ankle/motor", "ankle/motor", "same name"),
+        Row("action", "foot/motor", "ankle/motor times -2", "rule 'foot/motor'"),
+        Row("action", "toe/motor", "learn", "rule 'toe/motor'"),
+        Row("action", "hip/motor", "hip/motor times 0.5", "rule 'hip/motor'"),
+    )
+    lines = str(small()).splitlines()
+    assert lines[0].split() == ["side", "entry", "rule", "why"]
+    assert lines[2] == "observation  lost         zero                  default"
+    assert len(lines) == 8
+
+
+def test_the_short_form_counts_the_rules() -> None:
+    """A map of an ant has a hundred lines, which nobody wants in a traceback."""
+    assert repr(small()) == (
+        "BodyMap(observation: 1 Take, 1 Zero, 1 Hold; action: 3 Take, 1 Learn)"
+    )
+
+
+def test_each_feature_needs_its_rule_in_order() -> None:
+    """A map built by hand is checked as well."""
+    good = small()
+    with pytest.raises(MapError, match=r"in the order of the layout: z, lost, rest; .* lost, z"):
+        msgspec.structs.replace(
+            good, observation=(good.observation[1], good.observation[0], good.observation[2])
+        )
+    with pytest.raises(MapError, match="the rules given are for none"):
+        msgspec.structs.replace(good, action=())
+    with pytest.raises(UnknownName, match="No target observation feature matches 'y'"):
+        msgspec.structs.replace(good, observation=(Entry("z", Take("y")), *good.observation[1:]))
+
+
+def test_entries_are_equal_if_they_do_the_same() -> None:
+    """Where a rule came from is a remark."""
+    assert Entry("a", Zero(), "default") == Entry("a", Zero(), "rule 'a'")
+    assert hash(Entry("a", Zero(), "default")) == hash(Entry("a", Zero(), "rule 'a'"))
+    assert Entry("a", Zero()) != Entry("a", Learn())
+    assert not Entry("a", Zero(), "default") != Entry("a", Zero(), "rule 'a'")  # noqa: SIM202
+
+
+def test_a_map_crosses_to_another_process() -> None:
+    """Workers get maps by pickle; what was computed once is computed again there."""
+    built = small()
+    assert built.action_matrix.shape == (4, 2)
+    for twin in (pickle.loads(pickle.dumps(built)), copy.deepcopy(built)):
+        assert twin == built
+        np.testing.assert_array_equal(twin.action_matrix, built.action_matrix)
+
+
+def test_json_round_trip_keeps_the_layouts() -> None:
+    """A study writes its map down and reads it again."""
+    again = BodyMap.from_json(small().to_json())
+    assert again == small()
+    assert again.table() == small().table()
+
+
+@pytest.mark.parametrize("text", ["{", "{}", small().to_json().replace("0.25", "null")])
+def test_json_that_is_no_map_is_refused(text: str) -> None:
+    """The message comes from here and not from the parser."""
+    with pytest.raises(MapError, match="This is not a body map"):
+        BodyMap.from_json(text)

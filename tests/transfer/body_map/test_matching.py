@@ -1,0 +1,248 @@
+"""Which rule each feature gets, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+from tests.transfer.body_map.bodies import (
+    DEGREE,
+    ant_action,
+    ant_observation,
+    motor,
+    pendulum_action,
+    pendulum_observation,
+)
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, RuleLike, Take, Zero
+
+
+def grown(**options: object) -> BodyMap:
+    """The map from the ant to the ant with feet."""
+    return BodyMap.between(
+        ant_observation(),
+        ant_observation(feet=True),
+        ant_action(),
+        ant_action(feet=True),
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def shrunk(**options: object) -> BodyMap:
+    """The map from the ant with feet to the ant."""
+    return BodyMap.between(
+        ant_observation(feet=True),
+        ant_observation(),
+        ant_action(feet=True),
+        ant_action(),
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def rules_of(built: BodyMap) -> dict[str, object]:
+    """The rule of each filled feature."""
+    return {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
+
+
+def test_features_of_one_name_are_partners() -> None:
+    """An ant with feet has everything that an ant has."""
+    built = grown()
+    assert all(entry.rule == Take(entry.feature) for entry in built.observation)
+    assert {entry.why for entry in built.observation} == {"same name"}
+    assert built.action[0].rule == Take("hip_4/motor")
+    assert (built.action[-1].rule, built.action[-1].why) == (Zero(), "default")
+
+
+@pytest.mark.parametrize(
+    ("like", "rule"),
+    [
+        ("zero", Zero()),
+        ("learn", Learn()),
+        ("hold", Hold(0.0)),
+        (Hold(0.5), Hold(0.5)),
+        ("copy ankle_2/motor", Take("ankle_2/motor")),
+        (Take("ankle_2/motor", 0.5), Take("ankle_2/motor", 0.5)),
+    ],
+)
+def test_a_rule_can_be_said_in_words(like: RuleLike, rule: object) -> None:
+    """Words and values mean the same."""
+    built = grown(rules={"foot_2/motor": like})
+    assert rules_of(built)["foot_2/motor"] == rule
+    assert {e.feature: e.why for e in built.action}["foot_2/motor"] == "rule 'foot_2/motor'"
+
+
+def test_holding_keeps_to_the_middle_of_the_range() -> None:
+    """A joint that the target lacks rests half way between its stops."""
+    held = rules_of(shrunk(rules={"foot_*/angle": "hold"}))["foot_1/angle"]
+    assert isinstance(held, Hold)
+    assert held.value == pytest.approx(65 * DEGREE)
+
+
+def test_the_first_glob_that_fits_counts() -> None:
+    """Rules are read from the top."""
+    rules = rules_of(grown(rules={"foot_[12]/*": "learn", "foot_*": "hold"}))
+    assert [rules[f"foot_{leg}/motor"] for leg in (1, 2, 3)] == [Learn(), Learn(), Hold(0.0)]
+
+
+def test_an_exact_name_comes_before_a_glob() -> None:
+    """The exception need not be written above the rule."""
+    rules = rules_of(grown(rules={"foot_*": "learn", "foot_3/motor": "zero"}))
+    assert rules["foot_3/motor"] == Zero()
+
+
+def test_only_an_exact_name_overrules_a_namesake() -> None:
+    """A glob fills gaps; to cut a joint off it has to be named."""
+    rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
+    assert rules["hip_1/motor"] == Zero()
+    assert rules["hip_2/motor"] == Take("hip_2/motor")
+    assert rules["foot_2/motor"] == Learn()
+
+
+def test_stars_carry_over() -> None:
+    """Each foot copies the ankle of its own leg."""
+    rules = rules_of(grown(rules={"foot_*/motor": "copy ankle_*/motor"}))
+    assert rules["foot_3/motor"] == Take("ankle_3/motor")
+
+
+def test_rules_can_be_for_one_side_only() -> None:
+    """A sensor and a motor of one name may need different rules; the narrower one comes first."""
+    layout = Layout((Feature("a", "1"), Feature("b", "1")))
+    built = BodyMap.between(
+        layout,
+        Layout((Feature("a", "1"),)),
+        Layout((Feature("a", "1"),)),
+        layout,
+        rules={"b": "learn"},
+        observation_rules={"b": Hold(0.5)},
+    )
+    assert built.observation[1].rule == Hold(0.5)
+    assert built.action[1].rule == Learn()
+    with pytest.raises(UnknownName, match="No source observation feature matches 'c'"):
+        BodyMap.between(layout, layout, layout, layout, observation_rules={"c": "zero"})
+    with pytest.raises(UnknownName, match="No target action feature matches 'c'"):
+        BodyMap.between(layout, layout, layout, layout, action_rules={"c": "zero"})
+
+
+def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
+    """Silence about a feature is answered by `otherwise`."""
+    assert rules_of(grown(otherwise="learn"))["foot_2/motor"] == Learn()
+    assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
+    with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', and not 'copy hip_1/motor'"):
+        grown(otherwise="copy hip_1/motor")
+
+
+def test_what_a_feature_cannot_be_is_not_held() -> None:
+    """A motor that ends at 1 is not held at 3."""
+    with pytest.raises(MapError, match=r"'foot_4/motor' cannot hold 3: it reaches from -1 to 1"):
+        grown(rules={"foot_*": Hold(3.0)})
+    with pytest.raises(MapError, match="cannot hold 3"):
+        grown(otherwise=Hold(3.0))
+
+
+def test_a_pattern_that_fits_nothing_is_unknown() -> None:
+    """A slip in a name is found before anything is trained."""
+    with pytest.raises(UnknownName, match=r"matches 'fot_1/motor'\. Did you mean 'foot_1/motor'"):
+        grown(rules={"fot_1/motor": "learn"})
+
+
+def test_a_pattern_that_changes_nothing_is_refused() -> None:
+    """Who writes that the hips are to be learned shall not find them copied."""
+    with pytest.raises(MapError, match=r"The rule 'hip_\*' changes nothing"):
+        grown(rules={"hip_*": "learn"})
+
+
+def test_a_word_that_is_no_rule_is_refused() -> None:
+    """The message knows the nearest word."""
+    with pytest.raises(MapError, match=r"No rule matches 'lern'. Did you mean 'learn'"):
+        grown(rules={"foot_*": "lern"})
+
+
+def test_a_partner_that_is_not_there_is_unknown() -> None:
+    """The message knows the nearest name."""
+    with pytest.raises(UnknownName, match=r"No source action feature .* Did you mean 'ankle_1/mot"):
+        grown(rules={"foot_1/motor": "copy ankle_1/moter"})
+
+
+def test_units_are_not_mixed() -> None:
+    """0.1 rad is not 0.1 m, whatever the name; a scale says that somebody thought of it."""
+    sides = pendulum_observation(), pendulum_observation(unit="deg")
+    motors = pendulum_action(), pendulum_action()
+    with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot take .* hinge/angle \[deg\]"):
+        BodyMap.between(*sides, *motors)
+    built = BodyMap.between(
+        *sides,
+        *motors,
+        observation_rules={
+            "hinge/angle": Take("hinge/angle", DEGREE),
+            "hinge/velocity": Take("hinge/velocity", DEGREE),
+        },
+    )
+    sensed = built.adapt_observation([0.0, 180.0, 0.0, 90.0])
+    assert sensed[1] == pytest.approx(180 * DEGREE)
+
+
+def test_blocks_of_different_shapes_are_no_partners() -> None:
+    """A picture is not cut to size in passing."""
+    small = Layout((Feature("eye", "1", 0.0, 1.0, shape=(2, 3)),))
+    large = Layout((Feature("eye", "1", 0.0, 1.0, shape=(4, 3)),))
+    with pytest.raises(MapError, match=r"'eye' has the shape \(2, 3\) and cannot take"):
+        BodyMap.between(small, large, pendulum_action(), pendulum_action())
+
+
+def test_bodies_with_nothing_in_common_are_refused() -> None:
+    """The message says what each has and what to write."""
+    with pytest.raises(MapError, match="These observation spaces cannot be mapped") as caught:
+        BodyMap.between(pendulum_observation(), ant_observation(), pendulum_action(), ant_action())
+    message = str(caught.value)
+    assert "slider/position, hinge/angle" in message
+    assert "torso/z, torso/qw" in message
+    assert "and 43 more" in message
+    assert "rules={'slider/position': 'copy torso/z'}" in message
+
+
+def test_a_body_without_motors_is_refused_too() -> None:
+    """There is nothing to copy, so the example holds."""
+    with pytest.raises(MapError, match=r"source action features are none.*: 'hold'"):
+        BodyMap.between(
+            pendulum_observation(), pendulum_observation(), Layout(()), pendulum_action()
+        )
+
+
+def test_strangers_may_be_mapped_by_hand() -> None:
+    """A stated rule for each feature is a map, even if all of it is to be learned."""
+    built = BodyMap.between(
+        pendulum_observation(),
+        pendulum_observation(),
+        pendulum_action(),
+        ant_action(),
+        rules={"*/motor": "learn"},
+    )
+    assert {entry.rule for entry in built.action} == {Learn()}
+
+
+def test_equal_torque_is_a_scale() -> None:
+    """A motor twice as strong is driven half as hard."""
+    weak, strong = pendulum_action(100.0), pendulum_action(200.0)
+    sides = pendulum_observation(), pendulum_observation()
+    assert BodyMap.between(*sides, weak, strong).action[0].rule == Take("slide/motor")
+    built = BodyMap.between(*sides, weak, strong, units="torque")
+    assert built.action[0].rule == Take("slide/motor", 0.5)
+    built = BodyMap.between(
+        *sides, weak, strong, units="torque", rules={"slide/motor": Take("slide/motor", -1.0)}
+    )
+    assert built.action[0].rule == Take("slide/motor", -0.5)
+
+
+def test_a_force_is_no_torque() -> None:
+    """Only gains of one unit can be made equal."""
+    sides = pendulum_observation(), pendulum_observation()
+    with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
+        BodyMap.between(*sides, pendulum_action(), pendulum_action(unit="N·m"), units="torque")
+
+
+def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
+    """Where both are silent about what they do, the numbers are all there is."""
+    silent = Layout((motor("slide", 1.0, ""),))
+    sides = pendulum_observation(), pendulum_observation()
+    built = BodyMap.between(*sides, silent, silent, units="torque")
+    assert built.action[0].rule == Take("slide/motor")

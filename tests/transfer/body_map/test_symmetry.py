@@ -1,0 +1,193 @@
+"""Symmetries of a body, and the mirror in particular."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from tests.transfer.body_map.bodies import (
+    ANT_FLIP,
+    ANT_SWAP,
+    ant_action,
+    ant_observation,
+    pendulum_action,
+    pendulum_observation,
+)
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Symmetry, Take, mirror
+
+
+def ant_mirror() -> Symmetry:
+    """The ant's left and right exchanged."""
+    return mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
+
+
+def legs(*names: str, low: float = -1.0, high: float = 1.0) -> Layout:
+    """A layout of like features."""
+    return Layout(tuple(Feature(name, "1", low, high) for name in names))
+
+
+def test_the_mirror_of_an_ant() -> None:
+    """Worked out by hand: y turns, axial x and z turn, hips turn, ankles do not."""
+    taken = dict(zip(ant_observation().names, ant_mirror().observation, strict=True))
+    assert taken["torso/z"] == Take("torso/z")
+    assert [taken[f"torso/{q}"].scale for q in ("qw", "qx", "qy", "qz")] == [1, -1, 1, -1]
+    assert [taken[f"torso/{v}"].scale for v in ("vx", "vy", "vz")] == [1, -1, 1]
+    assert [taken[f"torso/{w}"].scale for w in ("wx", "wy", "wz")] == [-1, 1, -1]
+    assert taken["hip_1/angle"] == Take("hip_4/angle", -1.0)
+    assert taken["hip_2/velocity"] == Take("hip_3/velocity", -1.0)
+    assert taken["ankle_3/angle"] == Take("ankle_2/angle")
+    assert [taken[f"shank_1/contact/{c}"] for c in ("tx", "ty", "tz", "fx", "fy", "fz")] == [
+        Take("shank_4/contact/tx", -1.0),
+        Take("shank_4/contact/ty"),
+        Take("shank_4/contact/tz", -1.0),
+        Take("shank_4/contact/fx"),
+        Take("shank_4/contact/fy", -1.0),
+        Take("shank_4/contact/fz"),
+    ]
+    moved = dict(zip(ant_action().names, ant_mirror().action, strict=True))
+    assert moved["hip_3/motor"] == Take("hip_2/motor", -1.0)
+    assert moved["ankle_4/motor"] == Take("ankle_1/motor")
+
+
+def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
+    """R(mirrored q) = S R(q) S with S = diag(1, -1, 1), which is what mirroring a pose means."""
+    q = np.random.default_rng(0).normal(size=4)
+    q /= np.linalg.norm(q)
+    flip = np.diag([1.0, -1.0, 1.0])
+
+    def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+
+    built = BodyMap.identity(ant_observation(), ant_action()).with_symmetry(ant_mirror())
+    sensed = np.zeros(built.target_observation.size)
+    sensed[1:5] = q
+    mirrored = built.adapt_observation(sensed)[1:5]
+    np.testing.assert_allclose(rotation(*mirrored), flip @ rotation(*q) @ flip, atol=1e-12)
+
+
+def test_two_mirrors_are_none() -> None:
+    """Left becomes right becomes left."""
+    once = BodyMap.identity(ant_observation(), ant_action()).with_symmetry(ant_mirror())
+    assert once.then(once) == BodyMap.identity(ant_observation(), ant_action())
+    assert ant_mirror().inverse() == ant_mirror()
+
+
+def test_a_turned_policy_is_equivariant() -> None:
+    """With g the turn of a four-legged body, the map makes of p the policy g⁻¹ p(g o)."""
+    names = ("a", "b", "c", "d")
+    turn = {name: Take(names[(i + 1) % 4], -1.0 if i == 0 else 1.0) for i, name in enumerate(names)}
+    symmetry = Symmetry.of(legs(*names), legs(*names), observation=turn, action=turn)
+    built = BodyMap.identity(legs(*names), legs(*names)).with_symmetry(symmetry)
+    g = built.observation_matrix
+    np.testing.assert_allclose(built.action_matrix, np.linalg.inv(g))
+    assert not np.array_equal(g, g.T)
+    back = BodyMap.identity(legs(*names), legs(*names)).with_symmetry(symmetry.inverse())
+    assert built.then(back) == BodyMap.identity(legs(*names), legs(*names))
+
+
+def test_the_symmetry_of_either_body_will_do() -> None:
+    """Mirrored before or after the body changes, the map is the same."""
+    there = BodyMap.between(
+        ant_observation(),
+        ant_observation(feet=True),
+        ant_action(),
+        ant_action(feet=True),
+        rules={"foot_*/motor": "copy ankle_*/motor"},
+    )
+    of_target = mirror(
+        ant_observation(feet=True), ant_action(feet=True), swap=ANT_SWAP, flip=ANT_FLIP
+    )
+    assert there.with_symmetry(of_target) == there.with_symmetry(ant_mirror())
+    whys = {entry.why for entry in there.with_symmetry(of_target).observation}
+    assert whys == {"same name", "symmetry"}
+
+
+def test_the_symmetry_of_a_third_body_is_refused() -> None:
+    """The message says where it differs from the source."""
+    built = BodyMap.identity(pendulum_observation(), pendulum_action())
+    with pytest.raises(
+        MapError, match=r"belongs neither to the source nor to the target: .* torso/z"
+    ):
+        built.with_symmetry(ant_mirror())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"a": Take("b")}, "'a' and 'b' both take 'b'"),
+        ({"a": Take("b", 2.0), "b": Take("a", 0.5)}, "in a symmetry the scale is 1 or -1"),
+    ],
+)
+def test_what_is_no_signed_permutation_is_refused(
+    changes: Mapping[str, Take], message: str
+) -> None:
+    """A symmetry loses nothing and stretches nothing."""
+    with pytest.raises(MapError, match=message):
+        Symmetry.of(legs("a", "b"), legs("a"), observation=changes)
+
+
+def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
+    """A slip in a name is found, and so is a rule too few."""
+    with pytest.raises(UnknownName, match="No feature matches 'hip'"):
+        Symmetry.of(legs("hop"), legs("a"), observation={"hip": Take("hop")})
+    with pytest.raises(UnknownName, match="No action feature matches 'b'"):
+        Symmetry.of(legs("a"), legs("a"), action={"a": Take("b")})
+    with pytest.raises(MapError, match="needs 1 action rules, one a feature: 0 given"):
+        Symmetry(legs("a"), legs("a"), (Take("a"),), ())
+
+
+def test_only_like_features_change_places() -> None:
+    """An angle does not stand for a length, nor a strong motor for a weak one."""
+    mixed = Layout((Feature("a", "m"), Feature("b", "rad")))
+    swap = {"a": Take("b"), "b": Take("a")}
+    with pytest.raises(MapError, match="their unit is 'm' and 'rad'"):
+        Symmetry.of(mixed, legs("a"), observation=swap)
+
+
+def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
+    """A wrong sign shows where the stops of a joint are not symmetric."""
+    with pytest.raises(MapError, match=r"'ankle_1/angle' reaches from 0.52.* no such symmetry"):
+        mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=["hip_*", "ankle_*"])
+
+
+@pytest.mark.parametrize(
+    ("swap", "flip", "message"),
+    [
+        ({"hip_1": "hip_9"}, [], "No element matches 'hip_9'"),
+        ({"leg_*": "hip_*"}, [], r"No element matches 'leg_\*'"),
+        ({"hip_1": "hip_4"}, ["hop_*"], r"No element matches 'hop_\*'"),
+    ],
+)
+def test_an_element_that_is_not_there_is_unknown(
+    swap: dict[str, str], flip: list[str], message: str
+) -> None:
+    """A mirror is described by names, and a slip is found."""
+    with pytest.raises(UnknownName, match=message):
+        mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
+
+
+@pytest.mark.parametrize(
+    ("swap", "flip", "message"),
+    [
+        ({"hip_1": "hip_4", "hip_2": "hip_4"}, [], "'hip_4' is to mirror both 'hip_1' and 'hip_2'"),
+        (ANT_SWAP, ["hip_1"], "flip both of them or neither"),
+    ],
+)
+def test_a_mirror_that_is_none_is_refused(
+    swap: dict[str, str], flip: list[str], message: str
+) -> None:
+    """Each element has one partner, and what flips on one side flips on the other."""
+    with pytest.raises(MapError, match=message):
+        mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
+
+
+def test_a_picture_has_no_mirror_by_name() -> None:
+    """Turning a picture is more than a sign."""
+    seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
+    with pytest.raises(MapError, match="'eye' is a block of numbers"):
+        mirror(seeing, pendulum_action())

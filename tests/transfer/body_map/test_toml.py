@@ -1,0 +1,153 @@
+"""Body maps as text."""
+
+from __future__ import annotations
+
+import pytest
+from tests.transfer.body_map.bodies import (
+    ANT_FLIP,
+    ANT_SWAP,
+    ant_action,
+    ant_observation,
+    pendulum_action,
+    pendulum_observation,
+)
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero, mirror
+
+GROWN = ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
+SHRUNK = ant_observation(feet=True), ant_observation(), ant_action(feet=True), ant_action()
+
+EXAMPLE = """
+units = "same"
+otherwise = { hold = 0.1 }
+
+[observation]
+"torso/vx" = { take = "torso/vx", scale = 0.5 }
+
+[action]
+"foot_1/motor" = { take = "ankle_1/motor", scale = -0.5 }
+"foot_2/motor" = "learn"
+"foot_[3]/motor" = "copy ankle_*/motor"
+"""
+
+
+def test_a_person_can_write_a_map() -> None:
+    """The example of the documentation does what it says."""
+    built = BodyMap.from_toml(EXAMPLE, *GROWN)
+    rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
+    assert rules["torso/vx"] == Take("torso/vx", 0.5)
+    assert rules["foot_1/motor"] == Take("ankle_1/motor", -0.5)
+    assert rules["foot_2/motor"] == Learn()
+    assert rules["foot_3/motor"] == Take("ankle_3/motor")
+    assert rules["foot_4/motor"] == Hold(0.1)
+
+
+def test_an_empty_text_is_a_map_by_name() -> None:
+    """What is not said has a default."""
+    assert BodyMap.from_toml("", *GROWN) == BodyMap.between(*GROWN)
+
+
+def test_units_come_from_the_text() -> None:
+    """A stronger motor is driven less hard."""
+    sides = pendulum_observation(), pendulum_observation()
+    built = BodyMap.from_toml(
+        'units = "torque"', *sides, pendulum_action(100.0), pendulum_action(200.0)
+    )
+    assert built.action[0].rule == Take("slide/motor", 0.5)
+
+
+@pytest.mark.parametrize(
+    "built",
+    [
+        BodyMap.from_toml(EXAMPLE, *GROWN),
+        BodyMap.between(*GROWN),
+        BodyMap.between(*SHRUNK, otherwise="hold"),
+        BodyMap.between(*SHRUNK, otherwise="learn"),
+    ],
+)
+def test_what_is_written_is_read_again(built: BodyMap) -> None:
+    """The text holds the rules to the last bit."""
+    layouts = (
+        built.source_observation,
+        built.target_observation,
+        built.source_action,
+        built.target_action,
+    )
+    assert BodyMap.from_toml(built.to_toml(), *layouts) == built
+
+
+def test_the_text_is_short() -> None:
+    """A partner of the same name needs no line."""
+    text = BodyMap.between(*GROWN, rules={"foot_1/motor": "learn"}).to_toml()
+    assert text.splitlines() == [
+        'units = "same"',
+        'otherwise = "zero"',
+        "",
+        "[action]",
+        '"foot_4/motor" = "zero"',
+        '"foot_1/motor" = "learn"',
+        '"foot_2/motor" = "zero"',
+        '"foot_3/motor" = "zero"',
+    ]
+
+
+def test_odd_names_survive() -> None:
+    """Quotes, backslashes, umlauts and control characters are written as TOML wants them."""
+    names = ('a"b', "a\\b", "Größe µ", "tab\t", "del\x7f", "x[0]")
+    layout = Layout(tuple(Feature(name, "1") for name in (*names, "z")))
+    less = Layout((Feature("z", "1"),))
+    built = BodyMap.between(layout, less, less, less, rules={"*": Hold(0.3)})
+    assert BodyMap.from_toml(built.to_toml(), layout, less, less, less) == built
+
+
+@pytest.mark.parametrize(("of", "feet"), [("", (False, True)), ('of = "target"', (True, False))])
+def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -> None:
+    """The symmetry is that of the source, or of the target if the text says so."""
+    layouts = (
+        *(ant_observation(feet=f) for f in feet),
+        *(ant_action(feet=f) for f in feet),
+    )
+    text = f'[symmetry]\n{of}\nswap = {{ "*_1" = "*_4", "*_2" = "*_3" }}\nflip = ["hip_*"]\n'
+    symmetry = mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
+    built = BodyMap.from_toml(text, *layouts)
+    assert built == BodyMap.between(*layouts).with_symmetry(symmetry)
+    assert BodyMap.from_toml(built.to_toml(), *layouts) == built
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("units = ", "This is not TOML"),
+        ("unit = 'same'", "No key matches 'unit'. Did you mean 'units'?"),
+        ("units = 'torq'", "No word matches 'torq'. Did you mean 'torque'?"),
+        ("units = 3", "'units' is wrong: Expected `str`, got `int`"),
+        ("otherwise = 'copy hip_1/motor'", "'zero', 'hold' or 'learn', and not 'copy"),
+        ("otherwise = 'lern'", "otherwise: No word matches 'lern'. Did you mean 'learn'?"),
+        ("action = 3", "'action' is wrong"),
+        ("[action]\n'foot_1/motor' = 3", "'foot_1/motor' is wrong: Expected `object`"),
+        ("[action]\n'foot_1/motor' = { tak = 'x' }", "No key of 'foot_1/motor' matches 'tak'"),
+        ("[action]\n'foot_1/motor' = { scale = 2 }", "and not a table of scale"),
+        ("[action]\n'foot_1/motor' = {}", "and not a table of nothing"),
+        ("[action]\n'foot_1/motor' = { hold = true }", "Expected `float`, got `bool`"),
+        ("[action]\n'foot_1/motor' = { take = 'ankle_1/motor', scale = 0 }", "not zero"),
+        ("[symmetry]\nof = 'both'", "No word matches 'both'"),
+        ("[symmetry]\nflop = []", "No key of 'symmetry' matches 'flop'. Did you mean 'flip'?"),
+        ("[symmetry]\nswap = ['hip_1']", "'swap' is wrong"),
+    ],
+)
+def test_wrong_text_is_explained(text: str, message: str) -> None:
+    """One sentence with what exists and the nearest spelling."""
+    with pytest.raises(MapError) as caught:
+        BodyMap.from_toml(text, *GROWN)
+    assert message in str(caught.value)
+
+
+def test_a_name_that_is_not_there_is_unknown() -> None:
+    """Names in a text are checked as those in a program."""
+    with pytest.raises(UnknownName, match="Did you mean 'foot_1/motor'"):
+        BodyMap.from_toml('[action]\n"fot_1/motor" = "zero"', *GROWN)
+    with pytest.raises(UnknownName, match="No target action feature"):
+        BodyMap.from_toml('[action]\n"hip_1/angle" = "zero"', *GROWN)
+    assert BodyMap.between(*GROWN).action[-1].rule == Zero()

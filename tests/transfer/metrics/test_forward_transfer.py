@@ -1,0 +1,76 @@
+"""Forward transfer, against hand numbers and at its edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.metrics import (
+    LEAST_HEADROOM,
+    Estimate,
+    LearningCurves,
+    forward_transfer,
+    in_total_steps,
+)
+
+STEPS = np.array([0.0, 10.0, 20.0])
+
+
+def curves(*rows: tuple[float, float, float]) -> LearningCurves:
+    """Scores of a few seeds."""
+    return LearningCurves(STEPS, np.array(rows))
+
+
+def transfer(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
+    """`forward_transfer` with few resamples."""
+    return forward_transfer(arm, scratch, rng=np.random.default_rng(0), n_resamples=500)
+
+
+# Areas 0.4 and 0.6, 0.5 on the mean; and 0.1 and 0.3, 0.2 on the mean.
+ARM = curves((0.0, 0.4, 0.8), (0.2, 0.6, 1.0))
+SCRATCH = curves((0.0, 0.1, 0.2), (0.1, 0.3, 0.5))
+
+
+def test_forward_transfer() -> None:
+    """(0.5 - 0.2) / (1 - 0.2), and a BCa interval around it."""
+    estimate = transfer(ARM, SCRATCH)
+    assert estimate.value == pytest.approx(0.375)
+    assert estimate.method == "bca"
+
+
+def test_forward_transfer_in_total_steps() -> None:
+    """Half the budget on the source leaves areas of 0.1 and 0.2: (0.15 - 0.2) / (1 - 0.2)."""
+    assert transfer(in_total_steps(ARM, 10, 0.0), SCRATCH).value == pytest.approx(-0.0625)
+
+
+def test_perfect_from_the_start_is_1() -> None:
+    """An arm that can do everything at once wins all there is."""
+    assert transfer(curves((1.0, 1.0, 1.0)), SCRATCH).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("height", "is_defined"), [(1.0, False), (0.995, False), (0.98, True), (0.0, True)]
+)
+def test_headroom_is_needed(height: float, is_defined: bool) -> None:
+    """Where scratch leaves nothing to be won, a share of it is undefined and says so."""
+    estimate = transfer(ARM, curves((height, height, height)))
+    assert (estimate.value is not None) is is_defined
+    if not is_defined:
+        assert f"less than {LEAST_HEADROOM:g}" in estimate.note
+
+
+@pytest.mark.parametrize("outside", [-0.1, 1.1])
+def test_scores_must_be_clipped(outside: float) -> None:
+    """Raw returns, or scores above 1, would give a number without a meaning."""
+    wild = curves((0.0, 0.5, outside))
+    for arm, scratch in ((wild, SCRATCH), (ARM, wild), (in_total_steps(ARM, 5, outside), SCRATCH)):
+        with pytest.raises(StudyError, match="clip=True"):
+            transfer(arm, scratch)
+
+
+def test_zero_shot_has_no_forward_transfer() -> None:
+    """One evaluation spans no area."""
+    estimate = transfer(LearningCurves(np.array([0.0]), np.array([[0.5]])), SCRATCH)
+    assert estimate.value is None
+    assert "one evaluation only" in estimate.note

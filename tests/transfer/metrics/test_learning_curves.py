@@ -1,0 +1,194 @@
+"""Learning curves: what they refuse, what they promise, and areas against hand numbers."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import ShapechangerError, StudyError
+from shapechanger.transfer.metrics import LearningCurves, in_total_steps
+from shapechanger.transfer.metrics.curves import check_comparable
+
+# Two seeds, three evaluations: one rises from 0 to 1, one falls from 1 to 0.
+STEPS = np.array([0.0, 50.0, 100.0])
+RISING = LearningCurves(STEPS, np.array([[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]))
+
+
+@pytest.mark.parametrize(
+    ("steps", "returns", "message"),
+    [
+        ([], np.zeros((1, 0)), "n_evals"),
+        ([[0.0]], [[1.0]], "n_evals"),
+        ([1.0, 2.0], [[1.0, 2.0]], "start at 0"),
+        ([0.0, 2.0, 2.0], [[1.0, 2.0, 3.0]], "strictly increase"),
+        ([0.0, 1.0], [1.0, 2.0], r"\(n_seeds, 2\)"),
+        ([0.0, 1.0], np.zeros((0, 2)), r"\(n_seeds, 2\)"),
+        ([0.0, 1.0], [[1.0, 2.0, 3.0]], r"\(n_seeds, 2\)"),
+        ([0.0, 1.0], [[1.0, np.nan]], "returns must be finite"),
+        ([0.0, 1.0], [[1.0, np.inf]], "returns must be finite"),
+        ([0.0, 1.0], [[1.0, 1e300]], "returns must be finite"),
+        ([0.0, np.inf], [[1.0, 2.0]], "steps must be finite"),
+        ([0.0, 1.0], [["high", "low"]], "array of numbers"),
+        ([0.0, 1.0], [[1.0], [1.0, 2.0]], "array of numbers"),
+    ],
+)
+def test_bad_curves_are_refused(steps: object, returns: object, message: str) -> None:
+    """A curve that is none is refused where it is built, with its reason."""
+    with pytest.raises(StudyError, match=message):
+        LearningCurves(steps, returns)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("source_steps", [-1.0, np.nan, np.inf])
+def test_source_steps_must_be_a_count(source_steps: float) -> None:
+    """Less than no source, or an endless one, cannot be counted."""
+    with pytest.raises(StudyError, match="source_steps"):
+        in_total_steps(RISING, source_steps, 0.0)
+
+
+@pytest.mark.parametrize("floor", [np.nan, -np.inf])
+def test_floor_must_be_finite(floor: float) -> None:
+    """A floor of infinity would make every area infinite."""
+    with pytest.raises(StudyError, match="floor"):
+        in_total_steps(RISING, 10, floor)
+
+
+def test_refusals_are_ours_and_pythons() -> None:
+    """Code that knows only Python can catch a refusal too."""
+    with pytest.raises(ShapechangerError):
+        LearningCurves(np.array([1.0]), np.array([[1.0]]))
+    with pytest.raises(ValueError, match="start at 0"):
+        LearningCurves(np.array([1.0]), np.array([[1.0]]))
+
+
+def test_curves_are_copies() -> None:
+    """Whoever built the curves may go on using the arrays."""
+    steps, returns = np.array([0.0, 1.0]), np.array([[1.0, 2.0]])
+    curves = LearningCurves(steps, returns)
+    steps[1], returns[0, 0] = 9.0, 9.0
+    np.testing.assert_array_equal(curves.steps, [0.0, 1.0])
+    np.testing.assert_array_equal(curves.returns, [[1.0, 2.0]])
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [
+        RISING,
+        copy.deepcopy(RISING),
+        pickle.loads(pickle.dumps(RISING)),
+        in_total_steps(RISING, 1, 0.0),
+    ],
+    ids=["built", "copied", "pickled", "counted"],
+)
+def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
+    """Neither the fields nor the arrays change, not even after a trip between processes."""
+    with pytest.raises(ValueError, match="read-only"):
+        copied.returns[0, 0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        copied.steps[0] = 1.0
+    with pytest.raises(AttributeError):
+        copied.floor = 1.0  # type: ignore[misc]
+    np.testing.assert_array_equal(copied.returns, RISING.returns)
+
+
+def test_sizes_have_names() -> None:
+    """Seeds are rows and evaluations are columns."""
+    assert (RISING.n_seeds, RISING.n_evals, RISING.horizon) == (2, 3, 100.0)
+
+
+def test_last_steps() -> None:
+    """The end is a number of evaluations, not of steps."""
+    np.testing.assert_array_equal(RISING.last_steps(2), [50.0, 100.0])
+
+
+@pytest.mark.parametrize("last_k", [-1, 0, 4])
+def test_last_steps_must_exist(last_k: int) -> None:
+    """Asking for more evaluations than there are says how many there are."""
+    with pytest.raises(StudyError, match="from 1 to 3"):
+        RISING.last_steps(last_k)
+
+
+def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
+    """A value between two evaluations is on the line, one after the last is the last."""
+    np.testing.assert_allclose(RISING.at([25.0, 100.0, 400.0]), [[0.25, 1, 1], [0.75, 0, 0]])
+    np.testing.assert_allclose(RISING.at(25.0), [[0.25], [0.75]])
+
+
+def test_area_is_the_mean_height() -> None:
+    """Both a rise and a fall over the whole range have mean height one half."""
+    np.testing.assert_allclose(RISING.auc(), [0.5, 0.5])
+
+
+def test_area_weighs_uneven_evaluations() -> None:
+    """Trapezoids: (0 + 4)/2 · 10 + (4 + 2)/2 · 30 = 110, over 40."""
+    curves = LearningCurves(np.array([0.0, 10.0, 40.0]), np.array([[0.0, 4.0, 2.0]]))
+    np.testing.assert_allclose(curves.auc(), [2.75])
+
+
+def test_one_evaluation_spans_no_area() -> None:
+    """An arm that is not trained has no learning curve."""
+    with pytest.raises(StudyError, match="no area"):
+        LearningCurves(np.array([0.0]), np.array([[1.0]])).auc()
+
+
+def test_total_steps_jump_without_a_slope() -> None:
+    """The floor holds until the last source step and the first evaluation stands right after."""
+    total = in_total_steps(RISING, 30, floor=-2.0)
+    just_before = np.nextafter(30.0, 0.0)
+    np.testing.assert_allclose(
+        total.at([0.0, just_before, 30.0, 55.0, 100.0]),
+        [[-2.0, -2.0, 0.0, 0.25, 0.7], [-2.0, -2.0, 1.0, 0.75, 0.3]],
+    )
+
+
+@pytest.mark.parametrize(
+    ("source_steps", "rising", "falling"),
+    [
+        # Target steps only.
+        (0, 0.5, 0.5),
+        # Between evaluations: floor -1 · 30, then 70 steps of the curve.
+        (30, (-30 + 0.35 * 70) / 100, (-30 + 0.65 * 70) / 100),
+        # On an evaluation: floor -1 · 50, then the first half of the curve.
+        (50, (-50 + 0.25 * 50) / 100, (-50 + 0.75 * 50) / 100),
+        # A sliver of the target is left: it is worth its first evaluation, nearly.
+        (99, (-99 + 0.005) / 100, (-99 + 0.995) / 100),
+        # Nothing left, and less than nothing.
+        (100, -1.0, -1.0),
+        (1000, -1.0, -1.0),
+    ],
+)
+def test_area_in_total_steps_is_exact(source_steps: int, rising: float, falling: float) -> None:
+    """The jump is a rectangle next to a trapezoid, wherever it falls."""
+    total = in_total_steps(RISING, source_steps, floor=-1.0)
+    np.testing.assert_allclose(total.auc(), [rising, falling], rtol=1e-12)
+
+
+def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
+    """The formula equals a brute-force midpoint sum over the same curve."""
+    rng = np.random.default_rng(0)
+    steps = np.array([0.0, 7.0, 20.0, 64.0])
+    total = in_total_steps(LearningCurves(steps, rng.normal(size=(3, 4))), 13, floor=0.5)
+    midpoints = (np.arange(64_000) + 0.5) / 1000.0
+    np.testing.assert_allclose(total.auc(), total.at(midpoints).mean(axis=1), rtol=1e-6)
+
+
+def test_source_steps_count_once() -> None:
+    """Counting twice is a mistake, not a longer source."""
+    with pytest.raises(StudyError, match="already count 30"):
+        in_total_steps(in_total_steps(RISING, 30, 0.0), 30, 0.0)
+
+
+def test_comparison_needs_the_same_evaluations() -> None:
+    """Curves on other grids are refused, except an arm that was evaluated once."""
+    other = LearningCurves(np.array([0.0, 50.0, 99.0]), np.zeros((1, 3)))
+    with pytest.raises(StudyError, match="the steps must be the same"):
+        check_comparable(other, RISING)
+    check_comparable(LearningCurves(np.array([0.0]), np.zeros((1, 1))), RISING)
+
+
+def test_scratch_has_no_source() -> None:
+    """The arguments cannot be swapped without notice."""
+    with pytest.raises(StudyError, match="cannot count source steps"):
+        check_comparable(RISING, in_total_steps(RISING, 30, 0.0))

@@ -1,0 +1,161 @@
+"""The summary: both counts, both units, and the way to a file and back."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer import metrics
+from shapechanger.transfer.metrics import (
+    DEFAULT_THRESHOLDS,
+    Estimate,
+    LearningCurves,
+    Measures,
+    Reference,
+    Summary,
+    summarise,
+)
+
+STEPS = np.array([0.0, 10.0, 20.0])
+REFERENCE = Reference(random=-100.0, final=300.0)
+# In scores: 0, 0.5, 1 on the mean; and 0.5, 1, 1.5.
+SCRATCH = LearningCurves(STEPS, np.array([[-120.0, 90.0, 290.0], [-80.0, 110.0, 310.0]]))
+ARM = LearningCurves(STEPS, np.array([[90.0, 280.0, 510.0], [110.0, 320.0, 490.0]]))
+ZERO_SHOT = LearningCurves(np.array([0.0]), np.array([[90.0], [110.0]]))
+
+
+def summary(
+    arm: LearningCurves = ARM, reference: Reference = REFERENCE, source_steps: float = 10
+) -> Summary:
+    """A summary with few resamples."""
+    return summarise(
+        SCRATCH,
+        arm,
+        reference,
+        source_steps=source_steps,
+        rng=np.random.default_rng(0),
+        last_k=1,
+        n_resamples=500,
+    )
+
+
+def estimates(measures: Measures) -> dict[str, Estimate]:
+    """The five estimates that are not times."""
+    return {
+        "jumpstart": measures.jumpstart,
+        "asymptotic_gain": measures.asymptotic_gain,
+        "total_reward_gain": measures.total_reward_gain,
+        "auc_ratio": measures.auc_ratio,
+        "forward_transfer": measures.forward_transfer,
+    }
+
+
+def test_target_steps_by_hand() -> None:
+    """Gains of one half everywhere, and areas of 1 and 0.5."""
+    measured = summary().in_target_steps
+    values = {name: estimate.value for name, estimate in estimates(measured).items()}
+    assert values == pytest.approx(
+        {
+            "jumpstart": 0.5,
+            "asymptotic_gain": 0.5,
+            "total_reward_gain": 0.5,
+            "auc_ratio": 2.0,
+            # Clipped, the areas of the arm's seeds are 0.84375 and 0.88125, scratch's 0.48125 and
+            # 0.525.
+            "forward_transfer": (0.8625 - 0.503125) / (1.0 - 0.503125),
+        }
+    )
+
+
+def test_total_steps_by_hand() -> None:
+    """Ten of twenty steps go to the source: scratch is at 0.5 by then, and the arm ends at 1."""
+    measured = summary().in_total_steps
+    assert measured.jumpstart.value == pytest.approx(0.0)
+    assert measured.asymptotic_gain.value == pytest.approx(0.0)
+    assert measured.total_reward_gain.value == pytest.approx(0.375 - 0.5)
+    assert measured.auc_ratio.value == pytest.approx(0.75)
+
+
+def test_thresholds_are_reported_in_order() -> None:
+    """The declared grid comes back whole, in both counts."""
+    for measured in (summary().in_target_steps, summary().in_total_steps):
+        assert tuple(t.threshold for t in measured.times_to_threshold) == DEFAULT_THRESHOLDS
+        assert all(t.arm is not None for t in measured.times_to_threshold)
+
+
+def test_summary_says_what_it_rests_on() -> None:
+    """Budget, seeds, k and confidence stand next to the numbers."""
+    result = summary()
+    assert (result.unit, result.reference) == ("score", REFERENCE)
+    assert (result.horizon, result.source_steps) == (20.0, 10.0)
+    assert (result.n_seeds_arm, result.n_seeds_scratch) == (2, 2)
+    assert (result.last_k, result.confidence) == (1, 0.95)
+
+
+def test_without_source_steps_both_counts_agree() -> None:
+    """To the last digit, intervals included."""
+    result = summary(source_steps=0)
+    assert result.in_total_steps == result.in_target_steps
+
+
+def test_same_generator_same_summary() -> None:
+    """A report can be made again."""
+    assert summary() == summary()
+
+
+def test_scratch_that_did_not_learn_leaves_returns() -> None:
+    """Gains are then in units of return, and what needs scores is undefined with a reason."""
+    result = summary(reference=Reference(random=400.0, final=300.0))
+    assert result.unit == "return"
+    measured = result.in_target_steps
+    assert measured.jumpstart.value == pytest.approx(200.0)
+    assert measured.asymptotic_gain.value == pytest.approx(200.0)
+    assert measured.total_reward_gain.value == pytest.approx(200.0)
+    for missing in (
+        measured.auc_ratio,
+        measured.forward_transfer,
+        *(times.steps_saved for times in measured.times_to_threshold),
+    ):
+        assert missing.value is None
+        assert "no score" in missing.note
+    assert len(measured.times_to_threshold) == len(DEFAULT_THRESHOLDS)
+    # In total steps the floor is the random policy's return: (400 · 10 + 200 · 10) / 20 - 100.
+    assert result.in_total_steps.total_reward_gain.value == pytest.approx(200.0)
+
+
+def test_zero_shot_is_summarised_without_error() -> None:
+    """An arm that is evaluated once has a start and an end; the rest carries its reason."""
+    result = summary(ZERO_SHOT)
+    for measured in (result.in_target_steps, result.in_total_steps):
+        assert measured.asymptotic_gain.value == pytest.approx(-0.5)
+        for missing in (measured.total_reward_gain, measured.auc_ratio, measured.forward_transfer):
+            assert missing.value is None
+            assert "one evaluation only" in missing.note
+        assert all(times.arm is None for times in measured.times_to_threshold)
+    assert result.in_target_steps.jumpstart.value == pytest.approx(0.5)
+    assert result.in_total_steps.jumpstart.value == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    "result",
+    [summary(), summary(ZERO_SHOT), summary(reference=Reference(400.0, 300.0))],
+    ids=["arm", "zero-shot", "no scores"],
+)
+def test_summaries_survive_json(result: Summary) -> None:
+    """What is written is what is read, undefined measures included."""
+    assert msgspec.json.decode(msgspec.json.encode(result), type=Summary) == result
+
+
+def test_other_evaluations_are_refused() -> None:
+    """Before anything is measured."""
+    shorter = LearningCurves(STEPS[:2], ARM.returns[:, :2])
+    with pytest.raises(StudyError, match="must be the same"):
+        summary(shorter)
+
+
+def test_every_exported_name_exists_once_and_in_order() -> None:
+    """`__all__` promises what can be imported."""
+    assert len(set(metrics.__all__)) == len(metrics.__all__)
+    assert all(hasattr(metrics, name) for name in metrics.__all__)

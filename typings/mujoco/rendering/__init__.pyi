@@ -1,0 +1,2 @@
+"""Generated from mujoco 4.0.0 by scripts/generate_stubs.py; do not edit."""
+

@@ -1,0 +1,49 @@
+"""Generated from mujoco 4.0.0 by scripts/generate_stubs.py; do not edit."""
+
+import types
+import typing
+
+import numpy.typing
+
+from mujoco._enums import mjtFontScale
+from mujoco._structs import MjData, MjModel, MjvCamera, MjvOption, MjvScene
+
+class Renderer:
+    def __init__(
+        self,
+        model: MjModel,
+        height: int = 240,
+        width: int = 320,
+        max_geom: int = 10000,
+        font_scale: mjtFontScale = ...,
+    ) -> None: ...
+    @property
+    def model(self) -> MjModel: ...
+    @property
+    def scene(self) -> MjvScene: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    def enable_depth_rendering(self) -> None: ...
+    def disable_depth_rendering(self) -> None: ...
+    def enable_segmentation_rendering(self) -> None: ...
+    def disable_segmentation_rendering(self) -> None: ...
+    def render(
+        self, *, out: numpy.typing.NDArray[typing.Any] | None = None
+    ) -> numpy.typing.NDArray[typing.Any]: ...
+    def update_scene(
+        self,
+        data: MjData,
+        camera: int | str | MjvCamera = -1,
+        scene_option: MjvOption | None = None,
+    ) -> None: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> typing.Self: ...
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_value: BaseException | None,
+        traceback: types.TracebackType | None,
+    ) -> None: ...
+    def __del__(self) -> None: ...
