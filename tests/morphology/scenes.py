@@ -29,7 +29,7 @@ EVERYTHING = """
     <site name="anchor" pos="0 0 1"/>
     <camera name="eye" pos="0 -2 1"/>
     <body name="target" mocap="true" pos="1 1 1"/>
-    <body name="stand" pos="0 0 .2"><geom name="stand" size=".1"/></body>
+    <body name="stand" pos="0 0 .2"><geom name="stand" size=".1" conaffinity="0"/></body>
     <body name="trunk" pos="0 0 1" gravcomp=".1">
       <freejoint name="root"/>
       <geom name="trunk" type="box" size=".2 .1 .05" fluidshape="ellipsoid"/>
@@ -47,8 +47,8 @@ EVERYTHING = """
           <joint name="wrist" axis="1 0 0" range="-1 1" stiffness="1" springref=".2"
                  damping=".3" armature=".01" frictionloss=".05" ref=".1"
                  actuatorfrcrange="-5 5"/>
-          <geom name="hand" type="cylinder" size=".04 .02" priority="1"/>
-          <site name="palm" pos="0 .05 0"/>
+          <geom name="hand" type="cylinder" size=".04 .02" priority="1" contype="0"/>
+          <site name="palm" pos="0 .05 0" euler=".1 0 0"/>
         </body>
       </body>
       <body name="leg" pos="0 -.2 0">

@@ -11,9 +11,7 @@ from shapechanger.morphology.naming import names_of
 from tests.morphology.scenes import asset, asset_spec, everything
 
 
-@pytest.mark.parametrize(
-    "name", ["ant", "half_cheetah", "hopper", "humanoid", "inverted_pendulum", "walker2d_v5"]
-)
+@pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "walker2d_v5"])
 def test_a_model_named_by_rule_is_the_same_model(name: str) -> None:
     """The names given to unnamed elements are those that editing gives them."""
     spec = asset_spec(name)
@@ -34,8 +32,9 @@ def test_names_that_repeat_are_numbered() -> None:
     """No two elements of a kind bear the same name, whatever was given."""
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body name='a'>"
-        "<joint/><joint axis='1 0 0'/><geom size='1'/><geom size='2'/><geom name='a_geom_2' size='1'/>"
-        "<site/><body><geom size='1'/></body><body/></body></worldbody>"
+        "<joint/><joint axis='1 0 0'/><geom size='1'/><geom size='2'/>"
+        "<geom name='a_geom_2' size='1'/><site/>"
+        "<body><geom size='1'/></body><body/></body></worldbody>"
         "<equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
     )
     names = names_of(model)

@@ -3,7 +3,8 @@
 Source: MuJoCo 4.0.0, `mujoco/doc/computation/index.rst`, "Collision detection, selection". Two
 geoms can collide if
 
-- the contact type of one is among the contact affinities of the other;
+- the contact type of one is among the contact affinities of the other, for the geoms and, with the
+  bits of all their geoms taken together when the model was compiled, for their bodies;
 - their bodies are not welded together, and are not parent and child, unless the parent is the world
   or the model switches `filterparent` off; bodies welded together count as one;
 - no `<exclude>` names their bodies;
@@ -46,8 +47,18 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 
 
 def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
-    """Whether the type of one geom is among the affinities of the other."""
-    types, affinities = model.geom_contype[pairs], model.geom_conaffinity[pairs]
+    """Whether the type of one geom is among the affinities of the other.
+
+    Their bodies, which carry the bits of all their geoms as they were compiled, must agree: bits
+    that are set in a compiled model later have no effect.
+    """
+    bodies = model.geom_bodyid[pairs]
+    of_geoms = _meet(model.geom_contype[pairs], model.geom_conaffinity[pairs])
+    return of_geoms & _meet(model.body_contype[bodies], model.body_conaffinity[bodies])
+
+
+def _meet(types: NDArray[np.int32], affinities: NDArray[np.int32]) -> _Bools:
+    """Whether the type of one of two is among the affinities of the other, shape (n,)."""
     return ((types[:, 0] & affinities[:, 1]) | (types[:, 1] & affinities[:, 0])) != 0
 
 

@@ -1,8 +1,9 @@
 """Whether the numbers of a compiled model fit together.
 
 A compiled model can be written to. Mass without inertia, or either without `mujoco.mj_setConst`,
-leaves a robot that is neither the old one nor the new one: MuJoCo then softens contacts and limits
-by inverse weights that no longer hold.
+leaves a robot that is neither the old one nor the new one: MuJoCo softens contacts and limits by
+inverse weights that no longer hold, copies frames that no longer coincide, and ignores gravity
+compensation, adhesion or an actuator's damping where there was none when the model was compiled.
 """
 
 from __future__ import annotations
@@ -25,9 +26,36 @@ __all__ = ["inconsistencies", "lone_masses"]
 # compiled elsewhere and loaded from a file.
 _TOLERANCE: Final = 1e-6
 
-_OF_BODIES: Final = ("body_subtreemass", "body_invweight0")
-_OF_DOFS: Final = ("dof_M0", "dof_invweight0")
-_OF_TENDONS: Final = ("tendon_length0", "tendon_invweight0")
+# What `mj_setConst` computes, by the elements it belongs to, and what goes wrong if it is stale.
+_CONSTANTS: Final = {
+    "body": {
+        "body_subtreemass": "centres of mass are wrong",
+        "body_invweight0": "constraints have the wrong softness",
+        "body_sameframe": "body_ipos or body_iquat is ignored",
+        "body_margin": "contacts may be missed",
+    },
+    "dof": {
+        "dof_M0": "lengths and gains derived from it are wrong",
+        "dof_invweight0": "constraints have the wrong softness",
+    },
+    "geom": {
+        "geom_rbound": "contacts may be missed",
+        "geom_sameframe": "geom_pos or geom_quat is ignored",
+        "geom_fluid": "forces of the fluid are those of the old shape",
+    },
+    "site": {"site_sameframe": "site_pos or site_quat is ignored"},
+    "joint": {"jnt_actuatorid": "the actuator's damping or armature is ignored"},
+    "tendon": {
+        "tendon_length0": "lengths derived from it are wrong",
+        "tendon_invweight0": "constraints have the wrong softness",
+        "tendon_actuatorid": "the actuator's damping or armature is ignored",
+    },
+}
+_FLAGS: Final = {
+    "flg_gravcomp": "body_gravcomp is ignored",
+    "flg_surfacevel": "geom_surfacevel is ignored",
+    "flg_adhesion": "geom_adhesion and pair_adhesion are ignored",
+}
 
 
 def inconsistencies(model: mujoco.MjModel) -> tuple[str, ...]:
@@ -77,35 +105,45 @@ def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
 def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
     """Arrays that `mj_setConst` would change, each with the element where it changes most."""
     fresh = copy.deepcopy(model)
-    mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
-    dofs = named(names.joints, model.dof_jntid)
+    try:
+        mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
+    except mujoco.FatalError as error:
+        return [f"MuJoCo cannot derive its constants from the model: {error}."]
+    owners = {
+        "body": names.bodies,
+        "dof": named(names.joints, model.dof_jntid),
+        "geom": names.geoms,
+        "site": names.sites,
+        "joint": names.joints,
+        "tendon": names.tendons,
+    }
+    cure = "Call mujoco.mj_setConst after writing to a compiled model."
     found: list[str] = []
-    for owners, arrays in (
-        (names.bodies, _OF_BODIES),
-        (dofs, _OF_DOFS),
-        (names.tendons, _OF_TENDONS),
-    ):
-        for array in arrays:
+    for kind, constants in _CONSTANTS.items():
+        for array, consequence in constants.items():
             told = _largest_gap(getattr(model, array), getattr(fresh, array))
             if told is not None:
                 row, old, new = told
                 found.append(
-                    f"{owners[row]}: {array} is {old:.4g}, but the model makes it {new:.4g}: "
-                    "call mujoco.mj_setConst after writing to a compiled model."
+                    f"{owners[kind][row]}: {array} is {old:.4g}, but the model makes it {new:.4g}, "
+                    f"so {consequence}. {cure}"
                 )
+    for flag, consequence in _FLAGS.items():
+        if getattr(fresh, flag) and not getattr(model, flag):
+            found.append(f"{flag} is not set, so {consequence}. {cure}")
     return found
 
 
 def _largest_gap(
-    old: NDArray[np.float64], new: NDArray[np.float64]
+    old: NDArray[np.number], new: NDArray[np.number]
 ) -> tuple[int, float, float] | None:
     """Row and values of the largest relative gap; None if there is none."""
     if not old.size:
         return None
-    old, new = old.reshape(len(old), -1), new.reshape(len(new), -1)
-    scale = np.maximum(np.abs(old), np.abs(new))
-    gap = np.abs(old - new) / np.where(scale > 0.0, scale, 1.0)
+    one, two = (array.reshape(len(array), -1).astype(np.float64) for array in (old, new))
+    scale = np.maximum(np.abs(one), np.abs(two))
+    gap = np.abs(one - two) / np.where(scale > 0.0, scale, 1.0)
     row, column = np.unravel_index(int(np.argmax(gap)), gap.shape)
     if gap[row, column] <= _TOLERANCE:
         return None
-    return int(row), float(old[row, column]), float(new[row, column])
+    return int(row), float(one[row, column]), float(two[row, column])

@@ -209,7 +209,7 @@ def _joined(one: _Rows, two: _Rows) -> _Rows:
 
 
 def _overridden(model: mujoco.MjModel, rows: _Rows) -> _Rows:
-    """The contacts after the model's global override, and with friction at its floor or above."""
+    """The contacts after the model's switches, and with friction at its floor or above."""
     option, count = model.opt, len(rows.dim)
     if option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
         rows = replace(
@@ -220,4 +220,9 @@ def _overridden(model: mujoco.MjModel, rows: _Rows) -> _Rows:
             solimp=np.tile(option.o_solimp, (count, 1)),
             margin=np.full(count, option.o_margin),
         )
-    return replace(rows, friction=np.maximum(rows.friction, mujoco.mjMINMU))
+    return replace(
+        rows,
+        friction=np.maximum(rows.friction, mujoco.mjMINMU),
+        # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
+        adhesion=rows.adhesion * model.flg_adhesion,
+    )

@@ -60,15 +60,16 @@ def effective_model(model: mujoco.MjModel) -> EffectiveModel:
     names = names_of(model)
     contacts = effective_contacts(model, names)
     geoms, sites = _relevant_geoms(model), _relevant_sites(model)
-    needed = np.zeros(model.nbody, np.bool_)
-    needed[model.geom_bodyid[geoms]] = True
-    needed[model.site_bodyid[sites]] = True
-    needed[_bound_bodies(model)] = True
+    carrying = np.zeros(model.nbody, np.bool_)
+    carrying[model.geom_bodyid[geoms]] = True
+    carrying[model.site_bodyid[sites]] = True
+    carrying[_bound_bodies(model)] = True
+    kept = effective_body.bodies_that_matter(model, carrying)
     return EffectiveModel(
         (
             ("options", effective_world.options(model)),
             ("sizes", effective_world.sizes(model)),
-            ("bodies", effective_body.bodies(model, names, needed)),
+            ("bodies", effective_body.bodies(model, names, kept)),
             ("joints", effective_body.joints(model, names)),
             ("geoms", effective_body.geoms(model, names, geoms)),
             ("sites", effective_body.sites(model, names, sites)),
@@ -78,7 +79,7 @@ def effective_model(model: mujoco.MjModel) -> EffectiveModel:
             ("equalities", effective_drive.equalities(model, names)),
             ("flexes", effective_world.flexes(model, names)),
             ("plugins", effective_world.plugins(model)),
-            ("derived", effective_world.derived(model)),
+            ("derived", effective_world.derived(model, kept, geoms)),
         )
     )
 

@@ -15,13 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.contacts import safe_solref
+from shapechanger.morphology.effective_frames import (
+    canonical,
+    geom_frames,
+    inertial_frames,
+    site_frames,
+)
 from shapechanger.morphology.effective_rows import Rows, Section
 from shapechanger.morphology.reading import named, word
 
 if TYPE_CHECKING:
     from shapechanger.morphology.naming import Names
 
-__all__ = ["bodies", "digest", "geoms", "joints", "sites"]
+__all__ = ["bodies", "bodies_that_matter", "digest", "geoms", "joints", "sites"]
 
 _Bools = NDArray[np.bool_]
 
@@ -33,26 +39,22 @@ _DOF_COUNT: Final = {"free": 6, "ball": 3, "slide": 1, "hinge": 1}
 _SIZE_COUNT: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
-def bodies(model: mujoco.MjModel, names: Names, needed: _Bools) -> Section:
-    """Where each body sits on its parent and what it weighs.
-
-    Args:
-        model: The compiled model.
-        names: Names of its elements.
-        needed: Bodies that carry something that matters, shape (nbody,).
-    """
+def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
+    """Where each of the bodies that matter sits on its parent, and what it weighs."""
     rows = Rows(names.bodies)
     moving = model.body_treeid >= 0
     free = np.zeros(model.nbody, np.bool_)
     free[model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]] = True
     rows.words("parent", named(names.bodies, model.body_parentid))
     rows.numbers("position", model.body_pos, ~free)  # A free body starts from its joint's qpos0.
-    rows.numbers("orientation", _canonical(model.body_quat), ~free)
+    rows.numbers("orientation", canonical(model.body_quat), ~free)
     rows.numbers("mass", model.body_mass, moving)
     rows.numbers("inertia", model.body_inertia, moving)
-    rows.numbers("centre of mass", model.body_ipos, moving)
-    rows.numbers("inertia axes", _canonical(model.body_iquat), moving)
-    rows.numbers("gravity compensation", model.body_gravcomp, moving)
+    inertial = inertial_frames(model)
+    rows.numbers("centre of mass", inertial.position, moving)
+    rows.numbers("inertia axes", inertial.orientation, moving)
+    # Read only if the compiler, or mj_setConst, found a body that has some.
+    rows.numbers("gravity compensation", model.body_gravcomp * model.flg_gravcomp, moving)
     mocap = model.body_mocapid >= 0
     rows.numbers("mocap", mocap, mocap)
     asleep = np.zeros(model.nbody, np.bool_)
@@ -61,11 +63,22 @@ def bodies(model: mujoco.MjModel, names: Names, needed: _Bools) -> Section:
         policy = np.zeros(model.nbody)
         policy[model.tree_bodyadr] = model.tree_sleep_policy
         rows.numbers("sleep policy", policy, asleep)
-    keep = needed | mocap | (moving & (model.body_mass > 0.0)) | (model.body_jntnum > 0)
+    return rows.section(kept)
+
+
+def bodies_that_matter(model: mujoco.MjModel, carrying: _Bools) -> _Bools:
+    """Bodies that move by themselves, weigh something or carry something, shape (nbody,).
+
+    Args:
+        model: The compiled model.
+        carrying: Bodies that bear a geom, a site or a constraint that matters, shape (nbody,).
+    """
+    heavy = (model.body_treeid >= 0) & (model.body_mass > 0.0)
+    kept = carrying | heavy | (model.body_mocapid >= 0) | (model.body_jntnum > 0)
     for child in range(model.nbody - 1, 0, -1):  # A child's index is above its parent's.
-        keep[model.body_parentid[child]] |= keep[child]
-    keep[0] = False  # The world is the same in every model.
-    return rows.section(keep)
+        kept[model.body_parentid[child]] |= kept[child]
+    kept[0] = False  # The world is the same in every model.
+    return kept
 
 
 def joints(model: mujoco.MjModel, names: Names) -> Section:
@@ -88,7 +101,7 @@ def joints(model: mujoco.MjModel, names: Names) -> Section:
     springy = (model.jnt_stiffness != 0.0) | model.jnt_stiffnesspoly.any(axis=1)
     rows.numbers("stiffness", model.jnt_stiffness)
     rows.numbers("stiffness polynomial", model.jnt_stiffnesspoly, springy)
-    rows.numbers("spring yield", model.jnt_springyield, springy)
+    rows.numbers("spring yield", model.jnt_springyield, springy & (model.jnt_plasticadr >= 0))
     counts = [n * has for n, has in zip(coordinates, springy.tolist(), strict=True)]
     rows.parts("spring reference", model.qpos_spring, qpos, counts)
     rows.parts("damping", model.dof_damping, dof, dofs)
@@ -110,8 +123,9 @@ def geoms(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
     kinds = [word(mujoco.mjtGeom(kind)) for kind in model.geom_type.tolist()]
     rows.words("type", kinds)
     rows.words("body", named(names.bodies, model.geom_bodyid))
-    rows.numbers("position", model.geom_pos)
-    rows.numbers("orientation", _canonical(model.geom_quat))
+    frames = geom_frames(model)
+    rows.numbers("position", frames.position)
+    rows.numbers("orientation", frames.orientation)
     sizes = [
         tuple(size[: _SIZE_COUNT.get(kind, 0)])
         for kind, size in zip(kinds, model.geom_size.tolist(), strict=True)
@@ -126,7 +140,7 @@ def geoms(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
             )
         ],
     )
-    conveying = np.count_nonzero(model.geom_surfacevel, axis=1) > 0
+    conveying = (np.count_nonzero(model.geom_surfacevel, axis=1) > 0) & model.flg_surfacevel
     rows.numbers("surface velocity", model.geom_surfacevel, conveying)
     rows.numbers("fluid coefficients", model.geom_fluid, in_fluid(model))
     return rows.section(relevant)
@@ -136,8 +150,9 @@ def sites(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
     """The points to which tendons, actuators and constraints are fixed."""
     rows = Rows(names.sites)
     rows.words("body", named(names.bodies, model.site_bodyid))
-    rows.numbers("position", model.site_pos)
-    rows.numbers("orientation", _canonical(model.site_quat))
+    frames = site_frames(model)
+    rows.numbers("position", frames.position)
+    rows.numbers("orientation", frames.orientation)
     return rows.section(relevant)
 
 
@@ -174,10 +189,3 @@ def _shape(model: mujoco.MjModel, kind: str, data: int) -> str:
         model.mesh_vert[vertex : vertex + model.mesh_vertnum[data]],
         model.mesh_face[face : face + model.mesh_facenum[data]],
     )
-
-
-def _canonical(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of the two quaternions of each rotation the one whose first number is above 0; (n, 4)."""
-    leading = np.argmax(quaternions != 0.0, axis=1)[:, None]
-    sign = np.sign(np.take_along_axis(quaternions, leading, axis=1))
-    return np.where(sign < 0.0, -quaternions, quaternions)

@@ -68,12 +68,15 @@ def actuators(model: mujoco.MjModel, names: Names) -> Section:
     rows.numbers("early activation", model.actuator_actearly, stateful)
     muscle = is_any(model.actuator_gaintype, _GAIN.mjGAIN_MUSCLE)
     rows.words("length range", _per_output(model, model.actuator_lengthrange, muscle))
-    delayed = model.actuator_delay > 0.0
-    rows.numbers("delay", model.actuator_delay)
+    delayed = model.actuator_historyadr >= 0
+    rows.numbers("delay", model.actuator_delay, delayed)
     rows.numbers("delay buffer", model.actuator_history, delayed)
-    rows.numbers("damping", model.actuator_damping)
-    rows.numbers("damping polynomial", model.actuator_dampingpoly)
-    rows.numbers("armature", model.actuator_armature)
+    # What an actuator adds to its joint or tendon counts only where that knows of it.
+    users = np.concatenate([model.jnt_actuatorid, model.tendon_actuatorid])
+    added = np.isin(np.arange(model.nactuator), users)
+    rows.numbers("damping", model.actuator_damping, added)
+    rows.numbers("damping polynomial", model.actuator_dampingpoly, added)
+    rows.numbers("armature", model.actuator_armature, added)
     disabled = (model.opt.disableactuator >> model.actuator_group.clip(0, 30)) & 1 > 0
     rows.numbers("switched off", disabled, disabled)
     return rows.section(in_order=True)
@@ -91,7 +94,7 @@ def tendons(model: mujoco.MjModel, names: Names) -> Section:
     springy = (model.tendon_stiffness != 0.0) | model.tendon_stiffnesspoly.any(axis=1)
     rows.numbers("stiffness", model.tendon_stiffness)
     rows.numbers("stiffness polynomial", model.tendon_stiffnesspoly, springy)
-    rows.numbers("spring yield", model.tendon_springyield, springy)
+    rows.numbers("spring yield", model.tendon_springyield, springy & (model.tendon_plasticadr >= 0))
     rows.numbers("spring length", model.tendon_lengthspring, springy)
     rows.numbers("damping", model.tendon_damping)
     rows.numbers("damping polynomial", model.tendon_dampingpoly)
@@ -207,7 +210,10 @@ def _paths(model: mujoco.MjModel, names: Names) -> list[tuple[Value, ...]]:
     }
     stops: list[tuple[Value, ...]] = []
     for number, what, parameter in zip(
-        model.wrap_type.tolist(), model.wrap_objid.tolist(), model.wrap_prm.tolist(), strict=True
+        model.wrap_type.tolist(),
+        model.wrap_objid.tolist(),
+        (model.wrap_prm + 0.0).tolist(),
+        strict=True,
     ):
         kind = wrap(number)
         name = passed[kind][int(what)] if kind in passed else ""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.morphology.effective_body import digest
 from shapechanger.morphology.effective_rows import Rows, Section, Value
@@ -158,11 +159,19 @@ def plugins(model: mujoco.MjModel) -> Section:
     return (("all plugins", (("configuration", (used,)),)),)
 
 
-def derived(model: mujoco.MjModel) -> Section:
-    """What `mujoco.mj_setConst` computes from the rest and the solver then relies on."""
-    moving = model.body_treeid >= 0
+def derived(model: mujoco.MjModel, kept: NDArray[np.bool_], geoms: NDArray[np.bool_]) -> Section:
+    """What `mujoco.mj_setConst` computes from the rest and the solver then relies on.
+
+    Args:
+        model: The compiled model.
+        kept: Bodies that matter, shape (nbody,).
+        geoms: Geoms that matter, shape (ngeom,).
+    """
+    moving = kept & (model.body_treeid >= 0)
     arrays = {name: getattr(model, name)[moving] for name in _DERIVED_BODY}
     arrays |= {name: getattr(model, name) for name in _DERIVED}
+    arrays["body_margin"] = model.body_margin[kept]
+    arrays["geom_rbound"] = model.geom_rbound[geoms]
     arrays["meaninertia"] = np.asarray([model.stat.meaninertia])
     return tuple(
         (name, (("values", tuple((values + 0.0).ravel().tolist())),))

@@ -10,10 +10,12 @@ import gymnasium as gym
 
 import shapechanger
 from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.evaluation import Evaluation, evaluate
 from shapechanger.transfer.policy_file import Card, Normalisation, TrainedPolicy, actor
 from shapechanger.transfer.settings import LearnerSettings
+from shapechanger.transfer.transplant import transplant
 
 try:
     from stable_baselines3 import PPO
@@ -22,59 +24,73 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["EVALUATION_SEED", "OnEvaluation", "OnSteps", "Start", "make_training_envs", "train"]
+__all__ = ["EVALUATION_SEED", "OnEvaluation", "OnSteps", "require_budget", "train"]
 
 # Evaluations start from seeds far from those of training, the same ones for every run and arm.
 EVALUATION_SEED = 10_000_000
 
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
-# A model that is ready to learn, and its envs: what training starts from in place of a fresh one.
-Start = Callable[[VecEnv], PPO]
 
 
-def make_training_envs(
-    env: EnvRef, settings: LearnerSettings, normalisation: Normalisation | None = None
-) -> VecEnv:
-    """The envs that a learner steps together.
-
-    Args:
-        env: The env.
-        settings: How many, and whether normalised.
-        normalisation: Statistics to go on from, if normalised.
-    """
+def _make_training_envs(env: EnvRef, settings: LearnerSettings) -> VecEnv:
+    """The envs that a learner steps together, normalised if the settings say so."""
     envs: VecEnv = VecMonitor(DummyVecEnv([env.make for _ in range(settings.n_envs)]))
-    if settings.normalise:
-        normalised = VecNormalize(envs, gamma=settings.gamma)
-        if normalisation is not None:
-            normalised.obs_rms = normalisation.observation
-            normalised.ret_rms = normalisation.reward
-        envs = normalised
-    return envs
+    return VecNormalize(envs, gamma=settings.gamma) if settings.normalise else envs
 
 
-def fresh_model(
-    envs: VecEnv, settings: LearnerSettings, seed: int, tensorboard: Path | None = None
+def _arguments(settings: LearnerSettings, tensorboard: Path | None) -> dict[str, Any]:
+    """The settings as arguments of PPO that go with any shape of network."""
+    return {
+        "n_steps": settings.n_steps,
+        "batch_size": settings.batch_size,
+        "n_epochs": settings.n_epochs,
+        "learning_rate": settings.learning_rate,
+        "gamma": settings.gamma,
+        "gae_lambda": settings.gae_lambda,
+        "clip_range": settings.clip_range,
+        "ent_coef": settings.ent_coef,
+        "device": "cpu",
+        "tensorboard_log": str(tensorboard) if tensorboard else None,
+    }
+
+
+def _fresh_model(
+    envs: VecEnv, settings: LearnerSettings, seed: int, tensorboard: Path | None
 ) -> PPO:
     """An untrained model."""
     return PPO(
         "MlpPolicy",
         envs,
-        n_steps=settings.n_steps,
-        batch_size=settings.batch_size,
-        n_epochs=settings.n_epochs,
-        learning_rate=settings.learning_rate,
-        gamma=settings.gamma,
-        gae_lambda=settings.gae_lambda,
-        clip_range=settings.clip_range,
-        ent_coef=settings.ent_coef,
+        seed=seed,
         policy_kwargs={
             "net_arch": list(settings.net_arch),
             "log_std_init": settings.log_std_init,
         },
+        **_arguments(settings, tensorboard),
+    )
+
+
+def _moved_model(
+    envs: VecEnv,
+    settings: LearnerSettings,
+    seed: int,
+    tensorboard: Path | None,
+    source: TrainedPolicy,
+    body_map: BodyMap,
+) -> PPO:
+    """The source policy in the target's shapes, with its statistics, ready to go on learning."""
+    gathered = source.normalisation
+    if gathered is not None and isinstance(envs, VecNormalize):
+        # The critic speaks of rewards divided by these.
+        envs.ret_rms = gathered.reward.copy()
+    return transplant(
+        source.model,
+        body_map,
+        envs,
+        normalisation=None if gathered is None else gathered.observation,
         seed=seed,
-        device="cpu",
-        tensorboard_log=str(tensorboard) if tensorboard else None,
+        **_arguments(settings, tensorboard),
     )
 
 
@@ -87,8 +103,8 @@ def train(
     *,
     on_evaluation: OnEvaluation,
     on_steps: OnSteps = lambda steps: None,
-    normalisation: Normalisation | None = None,
-    start: Start | None = None,
+    source: TrainedPolicy | None = None,
+    body_map: BodyMap | None = None,
     tensorboard: Path | None = None,
 ) -> TrainedPolicy:
     """Train a policy, evaluating it before the first step, along the way, and at the end.
@@ -101,19 +117,21 @@ def train(
         seed: Seed of everything random in it.
         on_evaluation: Called with each evaluation as soon as it is there.
         on_steps: Called with the number of steps taken, after each step of all envs.
-        normalisation: Statistics to go on from.
-        start: What to begin with in place of an untrained model.
+        source: A policy of another body to begin with, in place of an untrained one.
+        body_map: How that body and this one correspond; needed with `source`.
         tensorboard: Folder for TensorBoard's logs.
 
     Raises:
         StudyError: If `steps` is smaller than one evaluation.
     """
     require_budget(steps, settings)
-    envs = make_training_envs(env, settings, normalisation)
+    envs = _make_training_envs(env, settings)
     evaluation_envs = [env.make() for _ in range(settings.eval_episodes)]
     try:
-        model = fresh_model(envs, settings, seed, tensorboard) if start is None else start(envs)
-        model.set_random_seed(seed)
+        if source is None or body_map is None:
+            model = _fresh_model(envs, settings, seed, tensorboard)
+        else:
+            model = _moved_model(envs, settings, seed, tensorboard, source, body_map)
         watcher = _Evaluations(settings, evaluation_envs, on_evaluation, on_steps)
         model.learn(settings.whole_updates(steps), callback=watcher)
         watcher.evaluate_now()

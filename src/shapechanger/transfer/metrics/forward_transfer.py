@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics.curves import LearningCurves, check_comparable
@@ -38,8 +37,8 @@ def forward_transfer(
         arm: Scores of the arm from `Reference.scores(..., clip=True)`.
         scratch: Scores of the baseline, clipped too and evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Of the BCa interval.
-        n_resamples: Resamples of the BCa interval.
+        confidence: Of the studentised bootstrap interval.
+        n_resamples: Resamples of the studentised bootstrap.
 
     Raises:
         StudyError: If the curves cannot be compared or leave [0, 1].
@@ -53,17 +52,26 @@ def forward_transfer(
             )
     if arm.n_evals == 1:
         return undefined(NO_CURVE)
-    baseline = scratch.auc()
-    if not 1.0 - baseline.mean() >= LEAST_HEADROOM:
-        return undefined(f"Undefined: scratch leaves less than {LEAST_HEADROOM:g} to be won.")
-    return estimate_ratio(
-        _share_won, arm.auc(), baseline, rng=rng, confidence=confidence, n_resamples=n_resamples
+    # Gain over headroom is one minus the ratio of what the two arms leave to be won.
+    left = estimate_ratio(
+        1.0 - arm.auc(),
+        1.0 - scratch.auc(),
+        least=LEAST_HEADROOM,
+        too_small=f"Undefined: scratch leaves less than {LEAST_HEADROOM:g} to be won.",
+        rng=rng,
+        confidence=confidence,
+        n_resamples=n_resamples,
+    )
+    return Estimate(
+        _rest(left.value),
+        _rest(left.high),
+        # No arm leaves less than nothing, though the interval does not know.
+        None if left.low is None else _rest(max(left.low, 0.0)),
+        left.method,
+        left.note,
     )
 
 
-def _share_won(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Gain over headroom, NaN where there is too little headroom."""
-    headroom = 1.0 - scratch
-    return np.divide(
-        arm - scratch, headroom, out=np.full_like(arm, np.nan), where=headroom >= LEAST_HEADROOM
-    )
+def _rest(share: float | None) -> float | None:
+    """One minus a share, or None."""
+    return None if share is None else 1.0 - share

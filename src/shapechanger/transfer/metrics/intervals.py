@@ -1,14 +1,13 @@
 """Estimates with intervals over seeds, and the honest absence of one.
 
 Each arm is one sample of independent seeds, of a size of its own; arms are not paired. Both
-functions take one number for each seed.
+functions take one number for each seed. How often such intervals hold the truth with few seeds, and
+what else was tried, is measured in docs/statistics.md.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable
 from typing import Final, Literal
 
 import msgspec
@@ -20,22 +19,16 @@ from shapechanger.errors import StudyError
 
 __all__ = ["Estimate", "Method", "estimate_difference", "estimate_ratio", "undefined"]
 
-Method = Literal["welch", "bca", "none"]
+Method = Literal["Welch's t", "studentised bootstrap", "none"]
 
 # Numbers that differ by less than this share of their size differ by rounding only.
 _ROUNDING: Final = 1e-12
-# The square of a smaller spread, and for BCa its cube, would come out as zero.
+# The square of a smaller spread, divided by another one, would come near to what floats can hold.
 _LEAST_SPREAD: Final = 1e-60
 
 _TOO_FEW: Final = "No interval: it takes at least two seeds in each arm."
 _NO_SPREAD: Final = "No interval: all seeds equal in each of the two arms, so nothing shows spread."
-_NO_BCA: Final = "No interval: BCa is undefined, or the measure is in some of the resamples."
-
-# Coverage measured in `tests/transfer/metrics/test_interval_coverage.py`.
-_FEW_SEEDS: Final = 20
-_NARROW: Final = (
-    "Too narrow for so few seeds: a 95 % BCa interval covers about 87 % at 5 seeds and 92 % at 10."
-)
+_NO_TAILS: Final = "No interval: too many resamples have no ratio, or no spread to judge it by."
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -45,7 +38,7 @@ class Estimate(msgspec.Struct, frozen=True):
         value: The number, or None where the measure is undefined; `note` says why.
         low: Lower end of the interval, or None where there is none; `note` says why.
         high: Upper end of the interval.
-        method: How the interval was made: Welch's t, BCa bootstrap, or none.
+        method: How the interval was made, in words.
         note: What a reader must know; empty if nothing.
     """
 
@@ -87,80 +80,107 @@ def estimate_difference(
     shares = squares / squares.sum()
     freedom = 1.0 / float((shares**2 / np.array([arm.size - 1, scratch.size - 1])).sum())
     half = float(stats.t.ppf(0.5 + confidence / 2.0, freedom)) * math.sqrt(float(squares.sum()))
-    return Estimate(value, value - half, value + half, "welch")
+    return Estimate(value, value - half, value + half, "Welch's t")
 
 
 def estimate_ratio(
-    ratio: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
     arm: NDArray[np.float64],
     scratch: NDArray[np.float64],
     *,
+    least: float,
+    too_small: str,
     rng: np.random.Generator,
     confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Estimate:
-    """A ratio of means with its BCa bootstrap interval.
+    """Ratio of means, arm over scratch, with its studentised bootstrap interval.
 
-    Seeds of the arm and of scratch are resampled apart. BCa is "bias-corrected and accelerated"
-    (Efron, JASA 82, 1987), as in `scipy.stats.bootstrap`. With few seeds it is too narrow, and the
-    estimate says so.
+    The seeds of each arm are resampled apart, with replacement. Each resample b gives
+    t_b = (ratio_b - ratio) / error_b, with the standard error of a ratio by the delta method, and
+    the interval is from ratio - t(high) · error to ratio - t(low) · error, with the quantiles of
+    all t_b in place of Student's (B. Efron and R. J. Tibshirani, "An Introduction to the
+    Bootstrap", 1993, section 12.5).
+
+    A resample may have no t_b: because it drew equal seeds only, so that its error is zero, or a
+    mean of scratch below `least`. Dropping it would make the interval narrower, and so would a
+    floor under the error that is chosen too high. It counts as infinitely far out instead, in both
+    tails. Once such resamples fill a tail there is no interval, and the note says so; of two seeds
+    in each arm a quarter of the resamples is like that.
 
     Args:
-        ratio: Takes the mean of the arm and the mean of scratch as arrays of one shape and gives
-            the measure in that shape; NaN where it is undefined.
         arm: One number for each seed, shape (n_arm,).
         scratch: The same, shape (n_scratch,).
+        least: Smallest mean of scratch that the ratio may be taken over, > 0.
+        too_small: Why the ratio is undefined below that; the note of the estimate.
         rng: Draws the resamples.
-        confidence: Between 0 and 1.
-        n_resamples: How many resamples to draw, >= 2; thousands for an interval that holds still.
+        confidence: Share of such intervals that contain the truth, between 0 and 1. How close to
+            the truth it is with few seeds is measured in docs/statistics.md.
+        n_resamples: How many resamples to draw: at least one for each tail, thousands for an
+            interval that holds still.
 
     Raises:
-        StudyError: If `confidence` is not between 0 and 1 or there are fewer than two resamples.
+        StudyError: If `confidence` is not between 0 and 1 or there are too few resamples for it.
     """
     _check_confidence(confidence)
-    if n_resamples < 2:
-        raise StudyError(f"A bootstrap needs at least two resamples, got {n_resamples}.")
-    value = float(ratio(np.asarray(arm.mean()), np.asarray(scratch.mean())))
+    # A little less, because 1 - 0.9 is not 0.1.
+    fewest = math.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))
+    if n_resamples < fewest:
+        raise StudyError(
+            f"A bootstrap interval of confidence {confidence:g} needs at least {fewest} resamples, "
+            f"got {n_resamples}."
+        )
+    if not scratch.mean() >= least:
+        return undefined(too_small)
     if no_interval := _why_no_interval(arm, scratch):
-        return Estimate(value, note=no_interval)
-
-    def statistic(
-        arms: NDArray[np.float64], scratches: NDArray[np.float64], axis: int
-    ) -> NDArray[np.float64]:
-        return ratio(np.asarray(arms.mean(axis=axis)), np.asarray(scratches.mean(axis=axis)))
-
-    # Where all resamples lie on one side of the value, BCa warns and gives NaN, noticed below.
-    with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        interval = stats.bootstrap(
-            (arm, scratch),
-            statistic,
-            n_resamples=n_resamples,
-            vectorized=True,
-            axis=-1,
-            confidence_level=confidence,
-            method="BCa",
-            rng=rng,
-        ).confidence_interval
-    low, high = float(interval.low), float(interval.high)
+        return Estimate(float(arm.mean() / scratch.mean()), note=no_interval)
+    ratio, error = (float(number) for number in _ratio(arm, scratch))
+    arms = rng.choice(arm, (n_resamples, arm.size))
+    scratches = rng.choice(scratch, (n_resamples, scratch.size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios, errors = _ratio(arms, scratches)
+        t = (ratios - ratio) / errors
+    usable = (scratches.mean(axis=-1) >= least) & (_spread(arms) | _spread(scratches))
+    usable &= errors > 0.0  # An arm of zeros makes the error zero whatever scratch does.
+    tail = (1.0 - confidence) / 2.0
+    low = float(np.quantile(np.where(usable, t, -np.inf), tail, method="lower"))
+    high = float(np.quantile(np.where(usable, t, np.inf), 1.0 - tail, method="higher"))
     if not (math.isfinite(low) and math.isfinite(high)):
-        return Estimate(value, note=_NO_BCA)
-    few = min(arm.size, scratch.size) < _FEW_SEEDS
-    return Estimate(value, low, high, "bca", _NARROW if few else "")
+        return Estimate(ratio, note=_NO_TAILS)
+    return Estimate(ratio, ratio - high * error, ratio - low * error, "studentised bootstrap")
+
+
+def _ratio(
+    arm: NDArray[np.float64], scratch: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ratio of means along the last axis, and its standard error.
+
+    error² = (s_arm² / n_arm + ratio² · s_scratch² / n_scratch) / mean_scratch², the delta method
+    for two independent means. It takes two seeds in each arm.
+    """
+    below = scratch.mean(axis=-1)
+    ratio = arm.mean(axis=-1) / below
+    square = _squared_error(arm) + ratio**2 * _squared_error(scratch)
+    return ratio, np.sqrt(square) / np.abs(below)
+
+
+def _squared_error(sample: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squared standard error of the mean along the last axis."""
+    return np.asarray(sample.var(axis=-1, ddof=1)) / sample.shape[-1]
 
 
 def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> str:
     """Why these samples carry no interval; empty if they do."""
     if min(arm.size, scratch.size) < 2:
         return _TOO_FEW
-    if not (_spread(arm) or _spread(scratch)):
+    if not (_spread(arm) | _spread(scratch)):
         return _NO_SPREAD
     return ""
 
 
-def _spread(sample: NDArray[np.float64]) -> bool:
-    """Whether the numbers differ by more than rounding."""
-    return bool(np.ptp(sample) > max(_LEAST_SPREAD, _ROUNDING * float(np.abs(sample).max())))
+def _spread(sample: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether the numbers along the last axis differ by more than rounding."""
+    size = np.abs(sample).max(axis=-1)
+    return np.asarray(np.ptp(sample, axis=-1) > np.maximum(_LEAST_SPREAD, _ROUNDING * size))
 
 
 def _check_confidence(confidence: float) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.transfer.metrics.curves import LearningCurves, check_comparable
 from shapechanger.transfer.metrics.intervals import (
@@ -133,8 +132,8 @@ def auc_ratio(
         arm: Scores of the arm.
         scratch: Scores of the baseline, evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Of the BCa interval.
-        n_resamples: Resamples of the BCa interval.
+        confidence: Of the studentised bootstrap interval.
+        n_resamples: Resamples of the studentised bootstrap.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -142,14 +141,12 @@ def auc_ratio(
     check_comparable(arm, scratch)
     if arm.n_evals == 1:
         return undefined(NO_CURVE)
-    baseline = scratch.auc()
-    if not baseline.mean() > _ZERO_AREA:
-        return undefined("Undefined: the area under scratch's curve is not above zero.")
     return estimate_ratio(
-        _quotient, arm.auc(), baseline, rng=rng, confidence=confidence, n_resamples=n_resamples
+        arm.auc(),
+        scratch.auc(),
+        least=_ZERO_AREA,
+        too_small="Undefined: the area under scratch's curve is not above zero.",
+        rng=rng,
+        confidence=confidence,
+        n_resamples=n_resamples,
     )
-
-
-def _quotient(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Arm over scratch, NaN where scratch is not above zero."""
-    return np.divide(arm, scratch, out=np.full_like(arm, np.nan), where=scratch > _ZERO_AREA)

@@ -1,0 +1,67 @@
+"""Numbers as a reader wants them: no more digits than the interval bears, and no -0."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from shapechanger.transfer.metrics import Estimate
+
+__all__ = ["count", "estimate_text", "interval_text", "number"]
+
+# From here on thousands separators make a number longer than its powers of ten.
+_HUGE: Final = 1e10
+_MOST_DECIMALS: Final = 6
+# Of a number without an interval; an interval bears two digits of its width.
+_SIGNIFICANT: Final = 4
+
+
+def number(value: float, decimals: int | None = None, *, signed: bool = False) -> str:
+    """A number with separated thousands, or with a power of ten where it is huge.
+
+    Args:
+        value: The number, finite.
+        decimals: Digits after the point; None for four digits in all.
+        signed: Whether a number above zero bears its sign, as a difference should.
+    """
+    sign = "+" if signed and value > 0.0 else ""
+    if abs(value) >= _HUGE:
+        mantissa, exponent = f"{value:.3e}".split("e")
+        return f"{sign}{mantissa}e{int(exponent)}"
+    if decimals is None:
+        decimals = 0 if value == int(value) else _decimals(abs(value), _SIGNIFICANT)
+    rounded = round(value, decimals) + 0.0  # -0.0 turns into 0.0.
+    return f"{sign if rounded else ''}{rounded:,.{decimals}f}"
+
+
+def count(value: float) -> str:
+    """A number of steps, whole."""
+    return number(value, 0)
+
+
+def interval_text(value: float, low: float, high: float, *, signed: bool = False) -> str:
+    """An estimate with its interval, as in `+0.31 [+0.22, +0.40]`."""
+    decimals = _decimals(high - low, 2)
+    # An end that is not zero must not look as if it were: it decides whether 0 is in the interval.
+    while decimals < _MOST_DECIMALS and any(
+        end != 0.0 and round(end, decimals) == 0.0 for end in (low, high)
+    ):
+        decimals += 1
+    texts = (number(x, decimals, signed=signed) for x in (value, low, high))
+    return "{} [{}, {}]".format(*texts)
+
+
+def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
+    """An estimate in one line, whether it has a value and an interval or not."""
+    if estimate.value is None:
+        return "undefined"
+    if estimate.low is None or estimate.high is None:
+        return f"{number(estimate.value, signed=signed)} (no interval)"
+    return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
+
+
+def _decimals(size: float, significant: int) -> int:
+    """Digits after the point that show so many significant digits of `size`."""
+    if size == 0.0:
+        return 0
+    return min(max(significant - 1 - math.floor(math.log10(size)), 0), _MOST_DECIMALS)

@@ -1,0 +1,750 @@
+"""Policies in the shapes of another body: what they compute there is what they computed before."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from torch import nn
+
+from shapechanger.errors import MissingExtra, SpaceMismatch, TransplantError
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero, mirror
+from shapechanger.transfer.transplant import transplant, transplant_normalisation
+from tests.transfer.body_map.bodies import (
+    ANT_FLIP,
+    ANT_SWAP,
+    ant_action,
+    ant_observation,
+    motor,
+    pendulum_action,
+    pendulum_observation,
+)
+
+Model = PPO | SAC
+Numbers = dict[str, NDArray[np.float64]]
+
+
+class Box(gym.Env[np.ndarray, np.ndarray]):
+    """An env of these layouts, in which nothing happens that anybody would understand."""
+
+    def __init__(self, observation: Layout, action: Layout) -> None:
+        n = observation.size
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (n,), np.float64)
+        low, high = (bound.astype(np.float32) for bound in (action.low, action.high))
+        self.action_space = gym.spaces.Box(low, high, dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start somewhere."""
+        super().reset(seed=seed)
+        return self.np_random.normal(size=self.observation_space.shape), {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Go anywhere; now and then an episode ends."""
+        end = bool(self.np_random.uniform() < 0.1)
+        observation = self.np_random.normal(size=self.observation_space.shape)
+        return observation, float(action.sum()), end, False, {}
+
+
+def envs(observation: Layout, action: Layout, *, normalised: bool = False) -> Any:
+    """One env, with fresh statistics if normalised."""
+    one = DummyVecEnv([lambda: Box(observation, action)])
+    return VecNormalize(one) if normalised else one
+
+
+def ant_map(source_feet: bool, target_feet: bool, **options: Any) -> BodyMap:
+    """The map between two ants."""
+    return BodyMap.between(
+        ant_observation(feet=source_feet),
+        ant_observation(feet=target_feet),
+        ant_action(feet=source_feet),
+        ant_action(feet=target_feet),
+        **options,
+    )
+
+
+def mirrored() -> BodyMap:
+    """The ant whose left is right."""
+    symmetry = mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
+    return BodyMap.identity(ant_observation(), ant_action()).with_symmetry(symmetry)
+
+
+MAPS: dict[str, BodyMap] = {
+    "identity": BodyMap.identity(ant_observation(), ant_action()),
+    "growth": ant_map(False, True, rules={"foot_[12]/motor": "zero", "foot_*": Hold(0.25)}),
+    "shrink": ant_map(True, False, rules={"foot_*/angle": "hold"}),
+    "mirror": mirrored(),
+    "copies": ant_map(
+        False,
+        True,
+        rules={"foot_*/motor": "copy ankle_*/motor"},
+        observation_rules={"hip_1/angle": "copy hip_2/angle", "torso/vx": Take("torso/vx", -2.0)},
+    ),
+}
+ARCHITECTURES: dict[str, tuple[Any, Any]] = {
+    "[64, 64]": ([64, 64], [64, 64]),
+    "[]": ([], []),
+    "asymmetric": ({"pi": [12], "vf": [10, 8]}, {"pi": [12], "qf": [10, 8]}),
+}
+
+each_map = pytest.mark.parametrize("body_map", MAPS.values(), ids=MAPS.keys())
+each_net = pytest.mark.parametrize("net_arch", ARCHITECTURES.values(), ids=ARCHITECTURES.keys())
+each_class = pytest.mark.parametrize("kind", [PPO, SAC])
+
+
+def trained(
+    kind: type[Model],
+    body_map: BodyMap,
+    net_arch: Any = ([16], [16]),
+    *,
+    normalised: bool = False,
+    seed: int = 0,
+    env: Any = None,
+    policy: Mapping[str, Any] | None = None,
+    **settings: Any,
+) -> Model:
+    """A model of the source with weights and statistics that no untrained model has."""
+    env = env or envs(body_map.source_observation, body_map.source_action, normalised=normalised)
+    kwargs = {"net_arch": net_arch[kind is SAC], **(policy or {})}
+    quick = {"n_steps": 32, "batch_size": 16} if kind is PPO else {"buffer_size": 64}
+    model = kind("MlpPolicy", env, policy_kwargs=kwargs, seed=seed, **(quick | settings))
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter += 0.2 * torch.randn(parameter.shape, generator=generator)
+    if normalised:
+        rng = np.random.default_rng(seed)
+        env.obs_rms.mean = rng.normal(size=body_map.source_observation.size)
+        env.obs_rms.var = rng.uniform(0.01, 4.0, size=body_map.source_observation.size)
+        env.obs_rms.count = 1234.0
+        env.ret_rms.var = np.asarray(7.0)
+    return model
+
+
+def sensed(model: Model, observation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the network sees of an observation, in double precision."""
+    normalize = model.get_vec_normalize_env()
+    if normalize is None or not normalize.norm_obs:
+        return observation
+    rms = normalize.obs_rms
+    assert isinstance(rms, RunningMeanStd)
+    z = (observation - rms.mean) / np.sqrt(rms.var + normalize.epsilon)
+    return np.clip(z, -normalize.clip_obs, normalize.clip_obs)
+
+
+def computed(model: Model, z: NDArray[np.float64], u: NDArray[np.float64] | None = None) -> Numbers:
+    """All that the networks give, in the precision of their weights."""
+    dtype = next(model.policy.parameters()).dtype
+    inputs = torch.as_tensor(z, dtype=dtype)
+    with torch.no_grad():
+        if isinstance(model, PPO):
+            policy = model.policy
+            mean = policy.action_net(policy.mlp_extractor.forward_actor(inputs))
+            value = policy.value_net(policy.mlp_extractor.forward_critic(inputs))
+            results = {"mean": mean, "log_std": policy.log_std.expand(mean.shape), "value": value}
+        else:
+            latent = model.actor.latent_pi(inputs)
+            results = {"mean": model.actor.mu(latent), "log_std": model.actor.log_std(latent)}  # type: ignore[operator]
+            both = torch.cat([inputs, torch.as_tensor(u, dtype=dtype)], dim=1)
+            for name, critic in (("q", model.critic), ("target q", model.critic_target)):
+                for i, network in enumerate(critic.q_networks):
+                    results[f"{name} {i}"] = network(both)
+    return {name: tensor.detach().double().numpy() for name, tensor in results.items()}
+
+
+def expected(
+    source: Model, body_map: BodyMap, observation: NDArray[np.float64], u: NDArray[np.float64]
+) -> tuple[Numbers, NDArray[np.float64]]:
+    """What the source gives through the map, and which actions take something.
+
+    Args:
+        source: The trained model.
+        body_map: The map.
+        observation: What the target senses.
+        u: Target actions to judge.
+    """
+    z = sensed(source, body_map.adapt_observation(observation))
+    numbers = computed(source, z, back_to_source(body_map, u))
+    taken = body_map.action_matrix.any(axis=1)
+    rows = np.abs(body_map.action_matrix)
+    numbers["mean"] = numbers["mean"] @ body_map.action_matrix.T
+    if isinstance(source, PPO):
+        numbers["mean"] += body_map.action_offset
+    scales = np.log(np.where(taken, rows.sum(axis=1), 1.0))
+    numbers["log_std"] = numbers["log_std"] @ (rows != 0).T + scales
+    return numbers, taken
+
+
+def back_to_source(body_map: BodyMap, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Source actions from target actions: by namesakes, and by others where there are none."""
+    column = {name: place.start for name, place in body_map.target_action.slices.items()}
+    signed: dict[str, NDArray[np.float64]] = {}
+    for entry in body_map.action:
+        if isinstance(entry.rule, Take):
+            taken = entry.rule.feature
+            if taken not in signed or entry.feature == taken:
+                signed[taken] = u[:, column[entry.feature]] * np.sign(entry.rule.scale)
+    still = np.zeros(len(u))
+    return np.stack([signed.get(name, still) for name in body_map.source_action.names], axis=1)
+
+
+def check_same_function(source: Model, target: Model, body_map: BodyMap, atol: float) -> None:
+    """Compare what both models compute, wherever an action takes something."""
+    rng = np.random.default_rng(5)
+    normalize = target.get_vec_normalize_env()
+    observation = rng.normal(size=(32, body_map.target_observation.size))
+    if normalize is not None and isinstance(normalize.obs_rms, RunningMeanStd):
+        observation = normalize.obs_rms.mean + observation * np.sqrt(normalize.obs_rms.var)
+    u = rng.uniform(-1.0, 1.0, size=(32, body_map.target_action.size))
+    numbers, taken = expected(source, body_map, observation, u)
+    ours = computed(target, sensed(target, observation), u)
+    for name in ours.keys() - {"mean", "log_std"}:
+        np.testing.assert_allclose(ours[name], numbers[name], rtol=atol, atol=atol, err_msg=name)
+    for name in ("mean", "log_std"):
+        np.testing.assert_allclose(
+            ours[name][:, taken], numbers[name][:, taken], rtol=atol, atol=atol, err_msg=name
+        )
+
+
+@each_class
+@each_map
+@each_net
+@pytest.mark.parametrize("normalised", [False, True], ids=["raw", "normalised"])
+def test_the_transplanted_networks_compute_the_same(
+    kind: type[Model], body_map: BodyMap, net_arch: Any, normalised: bool
+) -> None:
+    """Actor, value and critics agree with the source's, in double precision to rounding."""
+    source = trained(kind, body_map, net_arch, normalised=normalised)
+    source.policy.double()
+    env = envs(body_map.target_observation, body_map.target_action, normalised=normalised)
+    target = transplant(source, body_map, env, seed=1)
+    assert next(target.policy.parameters()).dtype == torch.float64
+    check_same_function(source, target, body_map, 1e-12)
+
+
+@each_class
+@each_map
+@pytest.mark.parametrize("normalised", [False, True], ids=["raw", "normalised"])
+def test_the_transplanted_policy_does_the_same(
+    kind: type[Model], body_map: BodyMap, normalised: bool
+) -> None:
+    """The deterministic action, through everything that Stable-Baselines3 does, is the source's."""
+    source = trained(kind, body_map, normalised=normalised)
+    env = envs(body_map.target_observation, body_map.target_action, normalised=normalised)
+    target = transplant(source, body_map, env, seed=1)
+    observation = np.random.default_rng(2).normal(size=(16, body_map.target_observation.size))
+    seen = [body_map.adapt_observation(observation), observation]
+    if normalised:
+        normalizers = source.get_vec_normalize_env(), target.get_vec_normalize_env()
+        seen = [n.normalize_obs(o) for n, o in zip(normalizers, seen, strict=True)]  # type: ignore[union-attr]
+    theirs, _ = source.predict(seen[0], deterministic=True)
+    ours, _ = target.predict(seen[1], deterministic=True)
+    np.testing.assert_allclose(ours, body_map.adapt_action(theirs), rtol=0, atol=1e-6)
+
+
+@each_class
+def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
+    """A policy that stays in its body keeps its parameters, optimisers apart."""
+    source = trained(kind, MAPS["identity"], normalised=True)
+    env = envs(ant_observation(), ant_action(), normalised=True)
+    target = transplant(source, MAPS["identity"], env)
+    theirs, ours = source.policy.state_dict(), target.policy.state_dict()
+    assert theirs.keys() == ours.keys()
+    for name, values in theirs.items():
+        assert torch.equal(values, ours[name]), name
+
+
+@each_class
+def test_there_and_back_changes_no_bit(kind: type[Model]) -> None:
+    """The ant visits the ant with feet and comes home as it went."""
+    there = MAPS["growth"]
+    source = trained(kind, there, normalised=True)
+    away = transplant(
+        source, there, envs(there.target_observation, there.target_action, normalised=True)
+    )
+    home = transplant(away, there.inverse(), envs(ant_observation(), ant_action(), normalised=True))
+    for name, values in source.policy.state_dict().items():
+        assert torch.equal(values, home.policy.state_dict()[name]), name
+
+
+def test_each_weight_goes_to_its_name() -> None:
+    """A linear policy, worked out by hand: a column in the wrong place shows."""
+    observation = Layout(tuple(Feature(name, "1") for name in ("a", "b", "c")))
+    seen = Layout(tuple(Feature(name, "1") for name in ("c", "new", "a", "b")))
+    body_map = BodyMap.between(
+        observation,
+        seen,
+        Layout((motor("x"), motor("y"))),
+        Layout((motor("y"), motor("z"), motor("x"))),
+        rules={"b": Take("b", -3.0)},
+    )
+    source = trained(PPO, body_map, ([], []))
+    with torch.no_grad():
+        source.policy.action_net.weight.copy_(torch.tensor([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]))
+        source.policy.action_net.bias.copy_(torch.tensor([0.1, 0.2]))
+        source.policy.value_net.weight.copy_(torch.tensor([[7.0, 8.0, 9.0]]))
+    target = transplant(source, body_map, envs(seen, body_map.target_action))
+    expected_weight = [[6.0, 0.0, 4.0, -15.0], [0.0] * 4, [3.0, 0.0, 1.0, -6.0]]
+    np.testing.assert_array_equal(target.policy.action_net.weight.detach(), expected_weight)
+    np.testing.assert_allclose(target.policy.action_net.bias.detach(), [0.2, 0.0, 0.1])
+    np.testing.assert_array_equal(target.policy.value_net.weight.detach(), [[9.0, 0.0, 7.0, -24.0]])
+
+
+@each_class
+def test_new_inputs_are_open_to_training(kind: type[Model]) -> None:
+    """Their weights begin at 0, and their gradients do not."""
+    body_map = MAPS["growth"]
+    source = trained(kind, body_map)
+    target = transplant(source, body_map, envs(body_map.target_observation, body_map.target_action))
+    new = [
+        place
+        for name, place in body_map.target_observation.slices.items()
+        if name not in body_map.source_observation
+    ]
+    network = target.policy.mlp_extractor.policy_net if kind is PPO else target.actor.latent_pi
+    layer = network[0]
+    assert isinstance(layer, nn.Linear)
+    network(torch.ones(1, body_map.target_observation.size)).sum().backward()
+    for place in new:
+        assert not layer.weight[:, place].any()
+        assert layer.weight.grad is not None
+        assert layer.weight.grad[:, place].any()
+
+
+@pytest.mark.parametrize("net_arch", [([16], [16]), ([], [])], ids=["[16]", "[]"])
+@each_class
+def test_what_is_to_be_learned_is_fresh(kind: type[Model], net_arch: Any) -> None:
+    """It has the weights of an untrained policy of that seed, and another seed has others."""
+    body_map = ant_map(False, True, rules={"foot_*": "learn"})
+    source = trained(kind, body_map, net_arch, policy={"log_std_init": -1.5})
+
+    def rows(seed: int) -> tuple[np.ndarray, np.ndarray]:
+        env = envs(body_map.target_observation, body_map.target_action)
+        target = transplant(source, body_map, env, seed=seed)
+        layer = target.policy.action_net if kind is PPO else target.actor.mu
+        spread = target.policy.log_std if kind is PPO else target.actor.log_std.weight  # type: ignore[union-attr]
+        return layer.weight[8:].detach().numpy(), spread[8:].detach().numpy()  # type: ignore[union-attr]
+
+    first, spread = rows(1)
+    assert np.all(np.any(first != 0.0, axis=1))
+    np.testing.assert_array_equal(first, rows(1)[0])
+    assert not np.array_equal(first, rows(2)[0])
+    if kind is PPO:
+        assert np.abs(first).max() < 0.02  # Orthogonal rows of length 0.01.
+        np.testing.assert_array_equal(spread, -1.5)
+
+
+def test_constant_actions_are_explored() -> None:
+    """A motor that is held has a mean of that value and the mean spread of the others."""
+    body_map = MAPS["growth"]
+    env = envs(body_map.target_observation, body_map.target_action)
+    places = body_map.target_action.slices
+    held, still = places["foot_3/motor"].start, places["foot_1/motor"].start
+    observation = np.random.default_rng(0).normal(size=(4, body_map.target_observation.size))
+
+    ppo = trained(PPO, body_map)
+    ours = computed(transplant(ppo, body_map, env), observation)
+    np.testing.assert_array_equal(ours["mean"][:, held], 0.25)
+    np.testing.assert_array_equal(ours["mean"][:, still], 0.0)
+    theirs = ppo.policy.log_std.detach().double().numpy().mean()
+    np.testing.assert_allclose(ours["log_std"][:, [held, still]], theirs, rtol=1e-6)
+
+    sac = trained(SAC, body_map)
+    ours = computed(transplant(sac, body_map, env), observation, np.zeros((4, 12)))
+    np.testing.assert_allclose(np.tanh(ours["mean"][:, held]), 0.25, rtol=1e-6)
+    np.testing.assert_array_equal(ours["mean"][:, still], 0.0)
+    theirs = computed(sac, body_map.adapt_observation(observation), np.zeros((4, 8)))["log_std"]
+    np.testing.assert_allclose(ours["log_std"][:, held], theirs.mean(axis=1), atol=1e-6)
+
+
+def test_a_constant_at_the_bound_is_finite() -> None:
+    """No number has the hyperbolic tangent 1."""
+    body_map = ant_map(False, True, rules={"foot_*": Hold(1.0)})
+    env = envs(body_map.target_observation, body_map.target_action)
+    target = transplant(trained(SAC, body_map), body_map, env)
+    action, _ = target.predict(np.zeros(body_map.target_observation.size), deterministic=True)
+    np.testing.assert_allclose(action[8:], 1.0, atol=1e-5)
+
+
+def test_ppo_scales_its_actions_and_their_spread() -> None:
+    """A motor twice as strong is driven half as hard, and explored half as widely."""
+    body_map = BodyMap.between(
+        pendulum_observation(),
+        pendulum_observation(),
+        pendulum_action(100.0),
+        pendulum_action(200.0),
+        units="torque",
+    )
+    source = trained(PPO, body_map)
+    target = transplant(source, body_map, envs(pendulum_observation(), pendulum_action()))
+    z = np.random.default_rng(0).normal(size=(8, 4))
+    theirs, ours = computed(source, z), computed(target, z)
+    np.testing.assert_allclose(ours["mean"], 0.5 * theirs["mean"], rtol=1e-6)
+    np.testing.assert_allclose(np.exp(ours["log_std"]), 0.5 * np.exp(theirs["log_std"]), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-0.5, 0.5), (-1.0, 3.0)])
+def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
+    """The hyperbolic tangent stands between the weights and the motor."""
+    wide = Layout((Feature("slide/motor", "1", low, high, gain=100.0, gain_unit="N"),))
+    sensing = pendulum_observation(), pendulum_observation()
+    body_map = BodyMap.between(*sensing, pendulum_action(), wide)
+    with pytest.raises(TransplantError, match=r"tanh, .* 'slide/motor' the source's range"):
+        transplant(trained(SAC, body_map), body_map, envs(sensing[1], wide))
+
+
+def test_sac_follows_the_range() -> None:
+    """A motor of half the range that is driven half as hard is the same number to the network."""
+    narrow = Layout((Feature("slide/motor", "1", -0.5, 0.5, gain=200.0, gain_unit="N"),))
+    sensing = pendulum_observation(), pendulum_observation()
+    body_map = BodyMap.between(*sensing, pendulum_action(), narrow, units="torque")
+    source = trained(SAC, body_map)
+    target = transplant(source, body_map, envs(sensing[1], narrow))
+    z = np.random.default_rng(0).normal(size=(8, 4))
+    ours, _ = target.predict(z, deterministic=True)
+    np.testing.assert_allclose(ours, 0.5 * source.predict(z, deterministic=True)[0], atol=1e-6)
+
+
+def test_critics_judge_copies_by_the_namesake_or_the_mean() -> None:
+    """On what the policy does, both are exact; a new motor and a lost one count for nothing."""
+    sensing = pendulum_observation(), pendulum_observation()
+    cart = Layout((motor("a"), motor("b"), motor("lost")))
+    copies = Layout((motor("c"), motor("d"), motor("e"), motor("b"), motor("new")))
+    body_map = BodyMap.between(
+        *sensing,
+        cart,
+        copies,
+        rules={
+            "[cd]/motor": "copy a/motor",
+            "e/motor": Take("b/motor", -1.0),
+            "new/motor": "learn",
+        },
+    )
+    source = trained(SAC, body_map)
+    target = transplant(source, body_map, envs(sensing[1], copies))
+    rng = np.random.default_rng(0)
+    z, u = rng.normal(size=(8, 4)), rng.uniform(-1.0, 1.0, size=(8, 5))
+    judged = np.stack([0.5 * (u[:, 0] + u[:, 1]), u[:, 3], np.zeros(8)], axis=1)
+    theirs, ours = computed(source, z, judged), computed(target, z, u)
+    for name in ("q 0", "q 1", "target q 0", "target q 1"):
+        np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-5, atol=1e-5)
+
+
+def test_a_lost_motor_is_judged_as_standing_still() -> None:
+    """Where 0 is not the middle of the range, the critic must be told so."""
+    sensing = pendulum_observation(), pendulum_observation()
+    pump = Layout((motor("a"), Feature("pump/motor", "1", 0.0, 1.0)))
+    body_map = BodyMap.between(*sensing, pump, Layout((motor("a"),)))
+    source = trained(SAC, body_map)
+    target = transplant(source, body_map, envs(sensing[1], body_map.target_action))
+    rng = np.random.default_rng(0)
+    z, u = rng.normal(size=(8, 4)), rng.uniform(-1.0, 1.0, size=(8, 1))
+    still = np.concatenate([u, -np.ones((8, 1))], axis=1)
+    theirs, ours = computed(source, z, still), computed(target, z, u)
+    np.testing.assert_allclose(ours["q 0"], theirs["q 0"], rtol=1e-5, atol=1e-5)
+
+
+def test_statistics_go_with_their_names() -> None:
+    """Matched numbers keep mean and variance, through the scale; new ones get a guess."""
+    body_map = BodyMap.between(
+        Layout((Feature("z", "m"), Feature("copy", "m"), Feature("angle", "rad"))),
+        Layout(
+            (
+                Feature("new", "rad", -1.0, 3.0),
+                Feature("angle", "rad"),
+                Feature("free", "m"),
+                Feature("z", "m"),
+                Feature("stuck", "m", 2.0, 2.0),
+            )
+        ),
+        pendulum_action(),
+        pendulum_action(),
+        rules={"copy": "copy z", "angle": Take("angle", -2.0)},
+    )
+    source = RunningMeanStd(shape=(3,))
+    source.mean, source.var = np.array([1.0, 5.0, 8.0]), np.array([4.0, 9.0, 16.0])
+    source.count = 1000.0
+    carried = transplant_normalisation(source, body_map)
+    np.testing.assert_array_equal(carried.mean, [1.0, -4.0, 0.0, 1.0, 2.0])
+    np.testing.assert_allclose(carried.var, [16.0 / 12.0, 4.0, 1.0, 4.0, 1.0])
+    assert carried.count == 1000.0
+    assert source.mean.tolist() == [1.0, 5.0, 8.0]
+
+
+@each_class
+def test_statistics_of_the_target_env_are_replaced(kind: type[Model]) -> None:
+    """Also how it clips, and what returns were divided by; the source's stay its own."""
+    body_map = MAPS["growth"]
+    source = trained(kind, body_map, normalised=True)
+    theirs = source.get_vec_normalize_env()
+    assert theirs is not None
+    theirs.clip_obs, theirs.epsilon = 5.0, 1e-3
+    env = envs(body_map.target_observation, body_map.target_action, normalised=True)
+    target = transplant(source, body_map, env)
+    assert (env.clip_obs, env.epsilon, env.ret_rms.var) == (5.0, 1e-3, 7.0)
+    assert env.ret_rms is not theirs.ret_rms
+    assert env.obs_rms.count == 1234.0
+    check_same_function(source, target, body_map, 1e-4)
+
+
+@each_class
+def test_statistics_can_be_folded_into_the_weights(kind: type[Model]) -> None:
+    """A target that is not normalised, such as a robot, gets the same policy all the same."""
+    body_map = MAPS["mirror"]
+    source = trained(kind, body_map, normalised=True)
+    theirs = source.get_vec_normalize_env()
+    assert theirs is not None
+    theirs.clip_obs = np.inf
+    source.policy.double()
+    target = transplant(source, body_map, envs(ant_observation(), ant_action()))
+    check_same_function(source, target, body_map, 1e-12)
+
+
+def test_statistics_can_be_named_for_a_model_without_an_env(tmp_path: Any) -> None:
+    """A model that was loaded from a file does not know how its observations were normalised."""
+    body_map = MAPS["growth"]
+    source = trained(PPO, body_map, normalised=True)
+    source.save(tmp_path / "model")
+    loaded = PPO.load(tmp_path / "model")
+    theirs = source.get_vec_normalize_env()
+    assert theirs is not None
+    assert isinstance(theirs.obs_rms, RunningMeanStd)
+    for normalisation in (theirs, theirs.obs_rms):
+        env = envs(body_map.target_observation, body_map.target_action, normalised=True)
+        target = transplant(loaded, body_map, env, normalisation=normalisation)
+        check_same_function(source, target, body_map, 1e-4)
+        bare = envs(body_map.target_observation, body_map.target_action)
+        folded = transplant(loaded, body_map, bare, normalisation=normalisation)
+        assert not torch.equal(
+            folded.policy.mlp_extractor.policy_net[0].weight,
+            target.policy.mlp_extractor.policy_net[0].weight,
+        )
+
+
+def test_only_the_target_normalises() -> None:
+    """Statistics that go on changing would undo the policy; frozen ones are taken into account."""
+    body_map = MAPS["growth"]
+    source = trained(PPO, body_map)
+    env = envs(body_map.target_observation, body_map.target_action, normalised=True)
+    with pytest.raises(TransplantError, match="statistics that go on changing"):
+        transplant(source, body_map, env)
+    env.training = False
+    env.obs_rms.mean += 0.5
+    env.obs_rms.var *= 4.0
+    check_same_function(source, transplant(source, body_map, env), body_map, 1e-4)
+    env.training, env.norm_obs = True, False
+    assert transplant(source, body_map, env).get_vec_normalize_env() is env
+
+
+def test_rewards_alone_may_be_normalised() -> None:
+    """Then observations are left alone on both sides, and return statistics are moved."""
+    body_map = MAPS["growth"]
+    source = trained(PPO, body_map, normalised=True)
+    theirs = source.get_vec_normalize_env()
+    assert theirs is not None
+    theirs.norm_obs = False
+    env = envs(body_map.target_observation, body_map.target_action, normalised=True)
+    env.norm_obs = False
+    target = transplant(source, body_map, env)
+    assert env.ret_rms.var == 7.0
+    check_same_function(source, target, body_map, 1e-4)
+
+
+def test_settings_are_kept_or_changed() -> None:
+    """The new model learns as the old one did, unless it is told otherwise."""
+    body_map = MAPS["growth"]
+    env = envs(body_map.target_observation, body_map.target_action)
+    ppo = trained(PPO, body_map, gamma=0.9, clip_range=0.3, target_kl=0.5, learning_rate=1e-4)
+    target = transplant(ppo, body_map, env, seed=3, gae_lambda=0.8)
+    assert (target.gamma, target.target_kl, target.learning_rate) == (0.9, 0.5, 1e-4)
+    assert target.clip_range(1.0) == 0.3  # type: ignore[operator]
+    assert (target.seed, target.gae_lambda, target.n_steps) == (3, 0.8, 32)
+    assert target.policy_kwargs == ppo.policy_kwargs
+    assert target.policy_kwargs is not ppo.policy_kwargs
+
+    sac = trained(SAC, body_map, tau=0.1, n_steps=3, train_freq=(2, "step"))
+    moved = transplant(sac, body_map, env)
+    assert (moved.tau, moved.n_steps, moved.target_entropy) == (0.1, 3, -12.0)
+    assert moved.train_freq == sac.train_freq
+    assert moved.replay_buffer_class is sac.replay_buffer_class
+    assert (
+        transplant(trained(SAC, body_map, target_entropy=-3.0), body_map, env).target_entropy
+        == -3.0
+    )
+
+
+def test_the_entropy_coefficient_is_moved() -> None:
+    """Whether it was learned or set."""
+    body_map = MAPS["growth"]
+    env = envs(body_map.target_observation, body_map.target_action)
+    source = trained(SAC, body_map, ent_coef="auto_0.1")
+    assert source.log_ent_coef is not None
+    with torch.no_grad():
+        source.log_ent_coef.fill_(-4.5)
+    target = transplant(source, body_map, env)
+    assert target.log_ent_coef is not None
+    assert target.log_ent_coef.item() == -4.5
+    assert target.log_ent_coef.requires_grad
+    source = trained(SAC, body_map, ent_coef=0.2)
+    assert transplant(source, body_map, env).ent_coef_tensor.item() == pytest.approx(0.2)
+
+
+def test_action_noise_is_not_guessed() -> None:
+    """It is made for the number of motors."""
+    body_map = MAPS["growth"]
+    env = envs(body_map.target_observation, body_map.target_action)
+    noise = NormalActionNoise(np.zeros(8), np.ones(8))
+    source = trained(SAC, body_map, action_noise=noise)
+    with pytest.raises(TransplantError, match=r"action_noise=None"):
+        transplant(source, body_map, env)
+    assert transplant(source, body_map, env, action_noise=None).action_noise is None
+
+
+@each_class
+def test_a_transplanted_model_goes_on_learning(kind: type[Model]) -> None:
+    """In its new env, from its first step, and the source model is left as it was."""
+    body_map = MAPS["growth"]
+    source = trained(kind, body_map, normalised=True)
+    before = {name: values.clone() for name, values in source.policy.state_dict().items()}
+    env = envs(body_map.target_observation, body_map.target_action, normalised=True)
+    settings = {} if kind is PPO else {"learning_starts": 8, "batch_size": 8}
+    target = transplant(source, body_map, env, **settings)
+    start = {name: values.clone() for name, values in target.policy.state_dict().items()}
+    target.learn(32)
+    assert target.num_timesteps == 32
+    changed = target.policy.state_dict()
+    assert any(not torch.equal(values, changed[name]) for name, values in start.items())
+    for name, values in source.policy.state_dict().items():
+        assert torch.equal(values, before[name])
+
+
+def test_a_plain_env_will_do() -> None:
+    """Stable-Baselines3 wraps it by itself."""
+    body_map = MAPS["growth"]
+    env = Box(body_map.target_observation, body_map.target_action)
+    assert transplant(trained(PPO, body_map), body_map, env, device="cpu").n_envs == 1
+
+
+def test_activations_with_parameters_are_copied() -> None:
+    """Everything between the edges belongs to the skill and not to the body."""
+    body_map = MAPS["growth"]
+    source = trained(PPO, body_map, policy={"activation_fn": nn.PReLU})
+    source.policy.double()
+    env = envs(body_map.target_observation, body_map.target_action)
+    check_same_function(source, transplant(source, body_map, env), body_map, 1e-12)
+
+
+def test_feature_extractors_need_not_be_shared() -> None:
+    """Flattening has no weights, shared or not."""
+    body_map = MAPS["growth"]
+    env = envs(body_map.target_observation, body_map.target_action)
+    for kind, share in ((PPO, False), (SAC, True)):
+        source = trained(kind, body_map, policy={"share_features_extractor": share})
+        check_same_function(source, transplant(source, body_map, env), body_map, 1e-4)
+
+
+class Extra(nn.Module):
+    """A layer that depends on the body where none should."""
+
+    def __init__(self, n: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.zeros(n))
+
+
+def _gsde(body_map: BodyMap) -> Any:
+    return trained(PPO, body_map, use_sde=True)
+
+
+def _sac_gsde(body_map: BodyMap) -> Any:
+    return trained(SAC, body_map, use_sde=True)
+
+
+def _custom_mlp(body_map: BodyMap) -> Any:
+    source = trained(PPO, body_map)
+    source.policy.mlp_extractor = nn.Sequential()  # type: ignore[assignment]
+    return source
+
+
+def _own_extractor(body_map: BodyMap) -> Any:
+    from stable_baselines3.common.torch_layers import FlattenExtractor
+
+    class Own(FlattenExtractor):
+        """Not known."""
+
+    return trained(SAC, body_map, policy={"features_extractor_class": Own})
+
+
+def _discrete(body_map: BodyMap) -> Any:
+    env = gym.make("CartPole-v1")
+    return PPO("MlpPolicy", env, n_steps=32, batch_size=16)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (_gsde, "explores with gSDE"),
+        (_sac_gsde, "explores with gSDE"),
+        (_custom_mlp, "has a Sequential in place of a MlpExtractor"),
+        (_own_extractor, "extracts features with Own"),
+        (_discrete, "has a CategoricalDistribution in place"),
+        (lambda body_map: nn.Linear(1, 1), "This model is Linear"),
+    ],
+)
+def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str) -> None:
+    """The message says what there is and what would do."""
+    body_map = MAPS["identity"]
+    with pytest.raises(TransplantError, match=message) as caught:
+        transplant(make(body_map), body_map, envs(ant_observation(), ant_action()))
+    assert "PPO or SAC with an MlpPolicy" in str(caught.value)
+
+
+def test_parameters_that_nobody_knows_are_refused() -> None:
+    """A policy with a part of its own is not moved half."""
+    body_map = MAPS["identity"]
+    source = trained(PPO, body_map)
+    source.policy.extra = Extra(3)
+    with pytest.raises(TransplantError, match=r"parameters extra\.weight of this policy"):
+        transplant(source, body_map, envs(ant_observation(), ant_action()))
+
+
+@pytest.mark.parametrize("wrong", ["source", "target"])
+def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
+    """A map for other bodies is found before anything is built."""
+    there, stay = MAPS["growth"], MAPS["identity"]
+    source = trained(PPO, stay)
+    with pytest.raises(SpaceMismatch, match=f"{wrong} observation layout holds 59"):
+        transplant(
+            source,
+            there if wrong == "target" else there.inverse(),
+            envs(ant_observation(), ant_action()),
+        )
+
+
+def test_without_torch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The message holds the command that installs it."""
+    spec = importlib.util.find_spec("shapechanger.transfer.transplant")
+    assert spec is not None
+    assert spec.loader is not None
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(MissingExtra, match=r"pip install 'shapechanger\[learn\]'"):
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+
+
+def test_the_rules_of_the_cases() -> None:
+    """The maps above hold each kind of rule, so that the tests are about what they say."""
+    kinds = {type(e.rule) for m in MAPS.values() for e in (*m.observation, *m.action)}
+    assert kinds == {Take, Zero, Hold}
+    assert Learn not in kinds
