@@ -41,11 +41,12 @@ check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(BIN)/ruff check .
 	$(RUN) -m pyright
 
-bench: $(INSTALLED_DEV)  ## measure how fast the envs step and the learners learn
+bench: $(INSTALLED_DEV)  ## measure every number that the project promises
 	$(RUN) benchmarks/run.py
 
 clean:  ## remove what the other targets made, but keep results/
-	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
+		MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(RUN):

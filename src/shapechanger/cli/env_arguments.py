@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -42,7 +42,7 @@ def default_learner(env: EnvRef) -> str:
 
 
 @contextmanager
-def opened(env: EnvRef, **more: Any) -> Iterator[gym.Env[Any, Any]]:
+def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
     """An env that is closed again.
 
     Raises:

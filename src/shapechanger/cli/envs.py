@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
 from shapechanger.cli.env_arguments import env_ref, opened
-from shapechanger.cli.pictures import write_picture
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
 __all__ = ["Envs"]
 
-_EnvId = Annotated[str, tyro.conf.Positional]
+_EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 
 
 @dataclass(frozen=True)
@@ -59,9 +58,9 @@ class Show:
 class Compare:
     """Say what changes from one env to another, in words and numbers."""
 
-    source: _EnvId
+    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Id of the env to come from."""
-    target: _EnvId
+    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
     """Id of the env to go to."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
@@ -74,7 +73,7 @@ class Compare:
             opened(env_ref(self.source, self.source_body)) as source,
             opened(env_ref(self.target, self.target_body)) as target,
         ):
-            certificate = source.unwrapped.certify_shift(source, target)  # type: ignore[attr-defined]
+            certificate = cast("Any", source.unwrapped).certify_shift(source, target)
             Console(soft_wrap=True, highlight=False).print(str(certificate), markup=False)
 
 
@@ -113,8 +112,11 @@ class Render:
 
     def run(self) -> None:
         """Write the picture."""
+        from shapechanger.cli.pictures import write_picture
+
         with opened(env_ref(self.env, self.body)) as env:
-            write_picture(env.unwrapped.picture(self.width, self.height), self.out)  # type: ignore[attr-defined]
+            picture = cast("Any", env.unwrapped).picture(self.width, self.height)
+            write_picture(picture, self.out)
         Console().print(f"wrote {self.out}", highlight=False)
 
 
@@ -165,5 +167,5 @@ def _in_words(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, tuple):
-        return ", ".join(_in_words(item) for item in value)
+        return ", ".join(_in_words(item) for item in cast("tuple[Any, ...]", value))
     return str(value)

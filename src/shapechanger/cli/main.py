@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         prog="shapechanger",
         description="Learn a skill in one body, move it to another, and measure the gain.",
         args=arguments,
-        config=(tyro.conf.OmitSubcommandPrefixes,),
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
     )
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from numpy.typing import NDArray
 
@@ -38,6 +38,6 @@ def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
 def _write(path: Path, content: Any, **options: Any) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        iio.imwrite(path, content, **options)
+        cast("Any", iio).imwrite(path, content, **options)
     except (OSError, ValueError) as error:
         raise OutputError(f"Cannot write {path}: {error}.") from error

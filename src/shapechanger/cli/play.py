@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from shapechanger.cli.env_arguments import env_ref, opened
-from shapechanger.cli.pictures import write_film
 from shapechanger.envs.headless import has_screen
 from shapechanger.errors import StudyError
 
@@ -23,7 +22,7 @@ __all__ = ["Play"]
 class Play:
     """Watch a policy in an env: in a window, or as a film where there is no screen."""
 
-    env: Annotated[str, tyro.conf.Positional]
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
     policy: Path | None = None
     """A policy that `train` or a study has written; random actions if not given. One of another
@@ -61,6 +60,8 @@ class Play:
                         frames.append(cast("NDArray[Any]", env.render()))
                 console.print(f"episode {episode}: return {worth:.1f} in {steps} steps")
             if out is not None:
+                from shapechanger.cli.pictures import write_film
+
                 write_film(frames, out, float(env.metadata["render_fps"]))
                 console.print(f"wrote {out}")
 

@@ -19,6 +19,7 @@ from rich.progress import (
 __all__ = ["StudyProgress"]
 
 _LINE_EVERY_S: Final = 10.0
+_ENOUGH_TO_TELL: Final = 0.05
 
 
 class StudyProgress:
@@ -78,14 +79,17 @@ class StudyProgress:
         now = time.monotonic()
         if ended or now - self._last_line >= _LINE_EVERY_S:
             self._last_line = now
-            self._console.print(self._line(run, ended, now - self._began))
+            self._console.print(self._line(run, ended, now - self._began), soft_wrap=True)
 
     def _line(self, run: str, ended: bool, elapsed: float) -> str:
         """How far it all is, and how long it takes yet."""
         done, total = sum(self._done.values()), sum(self._steps.values())
-        left = elapsed * (total - done) / done if done else 0.0
         state = "ended" if ended else "at work"
-        return (
+        line = (
             f"{run} {state}; {len(self._ended)} of {len(self._steps)} runs, "
-            f"{100 * done // total} % of the steps, about {left:.0f} s left"
+            f"{100 * done // total} % of the steps"
         )
+        # The first steps wait for everything to be loaded, and say nothing of the rest.
+        if done < _ENOUGH_TO_TELL * total:
+            return line
+        return f"{line}, about {elapsed * (total - done) / done:.0f} s left"

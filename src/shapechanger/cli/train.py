@@ -20,7 +20,7 @@ __all__ = ["Train"]
 class Train:
     """Train a policy in one env, and write it to a file that `play` and `transfer` take."""
 
-    env: Annotated[str, tyro.conf.Positional]
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
@@ -37,21 +37,20 @@ class Train:
 
     def run(self) -> None:
         """Train, showing the evaluations as they come."""
-        import torch
-
         from shapechanger.transfer.evaluation import Evaluation
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.policy_file import save_policy
         from shapechanger.transfer.settings import learner_settings
-        from shapechanger.transfer.training import train
+        from shapechanger.transfer.training import require_budget, train, use_one_thread
 
         env = env_ref(self.env, self.body)
         learner = self.learner or default_learner(env)
         settings = learner_settings(learner)
-        steps = settings.whole_updates(self.steps or settings.steps)
+        steps = settings.steps if self.steps is None else self.steps
+        require_budget(steps, settings)
         out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
         make_folder(out.parent)
-        torch.set_num_threads(1)  # These networks are small; more threads wait for one another.
+        use_one_thread()
         console = Console(highlight=False)
 
         def show(result: Evaluation) -> None:
@@ -62,12 +61,12 @@ class Train:
             )
 
         try:
-            with StudyProgress({env.id: steps}) as progress:
+            with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
                 policy = train(
                     env,
                     learner,
                     settings,
-                    self.steps or settings.steps,
+                    steps,
                     self.seed,
                     on_evaluation=show,
                     on_steps=lambda done: progress(env.id, done, False),

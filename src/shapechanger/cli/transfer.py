@@ -37,16 +37,16 @@ class Transfer:
     Stopped half-way, the same command goes on where it was.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
+    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Id of the env that the policy is learned in, such as Ant."""
-    target: Annotated[str, tyro.conf.Positional]
+    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
     """Id of the env that it is moved to, such as ExtendedAnt."""
     seeds: int | None = None
     """Runs of each arm; 5 if not given."""
     steps: int | None = None
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; as many as target steps if not given."""
+    """Source steps of a source policy; half as many as target steps if not given."""
     quick: bool = False
     """Two seeds and an eighth of the steps: to see that it works, not to believe the numbers."""
     out: Path | None = None
@@ -79,14 +79,18 @@ class Transfer:
 
     def run(self) -> None:
         """Do the study, print its table, and write its report."""
+        import shapechanger.transfer.report.curves  # noqa: F401  # Not there? Say so before the work.
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.study import run_study
+        from shapechanger.transfer.study import run_study, unfinished
 
         console = Console(highlight=False)
         executor = Processes(self.workers)
         plan = self._plan()
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
-        steps = {run.name: _steps(plan, run.kind) for run in plan.runs()}
+        to_do = unfinished(plan, out)
+        if len(to_do) < len(plan.runs()):
+            console.print(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
+        steps = {run.name: _steps(plan, run.kind) for run in to_do}
         try:
             with StudyProgress(steps) as progress:
                 study = run_study(
@@ -210,11 +214,12 @@ def _command() -> str:
 
 def _print(console: Console, study: Study) -> None:
     """The table of measures, and what they come to."""
-    from shapechanger.transfer.report.table import measure_rows, verdict
+    from shapechanger.transfer.report.table import measure_rows
+    from shapechanger.transfer.report.verdict import verdict
 
-    rows = measure_rows(study)
-    table = Table("arm", "measure", "in target steps", "in total steps", box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(row.arm, row.measure, row.in_target_steps, row.in_total_steps)
+    table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
+    # What an arm leaves undefined, as zero-shot does most, is in the report with the reason.
+    for row in [row for row in measure_rows(study) if row.target != "undefined"]:
+        table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     console.print(table)
     console.print(f"\n{verdict(study)}", soft_wrap=True)

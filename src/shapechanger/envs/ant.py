@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, cast
 
-from gymnasium.envs.mujoco.ant_v5 import AntEnv as GymnasiumAntEnv
+import gymnasium as gym
+
+from shapechanger.errors import MissingExtra
+
+try:
+    from gymnasium.envs.mujoco.ant_v5 import AntEnv as GymnasiumAntEnv
+except (ImportError, gym.error.DependencyNotInstalled) as error:
+    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.embodiments.ant import ANT
 from shapechanger.embodiments.family import BodyLike
@@ -20,7 +27,7 @@ __all__ = ["AntEnv", "ExtendedAntEnv"]
 _HIGHEST_STANDS: Final = 1.9
 
 
-class AntEnv(Reshapable, GymnasiumAntEnv):
+class AntEnv(Reshapable, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Gymnasium's `Ant-v5` with any body of the family of ants.
 
     Actions, observations, rewards and infos are those of `Ant-v5`; `observation_layout` and
@@ -54,7 +61,7 @@ class AntEnv(Reshapable, GymnasiumAntEnv):
         self._place_hidden = arguments.get("exclude_current_positions_from_observation", True)
         self._force_range = arguments.get("contact_force_range", (-1.0, 1.0))
         self._begin(body, arguments)
-        GymnasiumAntEnv.__init__(
+        cast("Any", GymnasiumAntEnv).__init__(
             self, healthy_z_range=healthy_z_range or (-math.inf, math.inf), **arguments
         )
         self._finish({"healthy_z_range": healthy_z_range, **arguments})

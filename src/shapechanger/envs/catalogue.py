@@ -108,7 +108,7 @@ def register_all() -> None:
     """Register every env of the catalogue with Gymnasium, once."""
     for entry in CATALOGUE.values():
         if entry.id not in gym.registry:
-            gym.register(
+            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
                 entry.id,
                 entry.entry_point,
                 reward_threshold=entry.reward_threshold,

@@ -10,7 +10,7 @@ from typing import Final
 
 from shapechanger.errors import RenderError
 
-__all__ = ["choose_gl", "has_screen"]
+__all__ = ["choose_gl", "has_screen", "require_screen"]
 
 # From the Khronos registry: EGL_EXT_platform_device.
 _EGL_PLATFORM_DEVICE_EXT: Final = 0x313F
@@ -22,6 +22,19 @@ def has_screen() -> bool:
     return sys.platform != "linux" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
+
+
+def require_screen() -> None:
+    """Refuse to open a window where there is no screen; GLFW would end the process.
+
+    Raises:
+        RenderError: If there is none.
+    """
+    if not has_screen():
+        raise RenderError(
+            "There is no screen to open a window on: make the env with render_mode='rgb_array', "
+            "or run the program under `xvfb-run`."
+        )
 
 
 def choose_gl() -> None:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
-from gymnasium.envs.mujoco.inverted_pendulum_v5 import (
-    InvertedPendulumEnv as GymnasiumInvertedPendulumEnv,
-)
+import gymnasium as gym
+
+from shapechanger.errors import MissingExtra
+
+try:
+    from gymnasium.envs.mujoco.inverted_pendulum_v5 import (
+        InvertedPendulumEnv as GymnasiumInvertedPendulumEnv,
+    )
+except (ImportError, gym.error.DependencyNotInstalled) as error:
+    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.embodiments.family import BodyLike
 from shapechanger.embodiments.pendulum import PENDULUM
@@ -15,7 +22,9 @@ from shapechanger.envs.reshapable import Reshapable
 __all__ = ["InvertedPendulumEnv"]
 
 
-class InvertedPendulumEnv(Reshapable, GymnasiumInvertedPendulumEnv):
+class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    Reshapable, GymnasiumInvertedPendulumEnv
+):
     """Gymnasium's `InvertedPendulum-v5` with any body of the family of pendulums.
 
     Actions, observations, rewards, infos and the start are those of `InvertedPendulum-v5`;
@@ -31,5 +40,5 @@ class InvertedPendulumEnv(Reshapable, GymnasiumInvertedPendulumEnv):
 
     def __init__(self, body: BodyLike = "InvertedPendulum", **arguments: Any) -> None:
         self._begin(body, arguments)
-        GymnasiumInvertedPendulumEnv.__init__(self, **arguments)
+        cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
         self._finish(arguments)

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import copy
-from typing import Final
+from typing import Any, Final, cast
 
 import mujoco
 import numpy as np
-from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 from numpy.typing import NDArray
 
 from shapechanger.envs.headless import choose_gl
+from shapechanger.envs.renderer import Renderer
 
 __all__ = ["body_reach", "draw"]
 
 _AZIMUTH_DEG: Final = 105.0
 _ELEVATION_DEG: Final = -25.0
-# With MuJoCo's default angle of view, 45 degrees, a ball of radius 1 fills the height at 2.6.
-_DISTANCE_PER_REACH: Final = 2.6
+# With MuJoCo's default angle of view, 45 degrees, a ball of radius 1 fills the height at 2.6; the
+# rest is margin.
+_DISTANCE_PER_REACH: Final = 3.0
 # A model without lamps is lit by the camera's own, which is dim by default.
 _HEADLIGHT: Final = 0.5
+# Where the depth buffer, from 0 to 1, holds nothing.
+_FARTHEST: Final = 1.0
+_BACKGROUND: Final = 235
 
 
 def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
@@ -47,12 +51,21 @@ def draw(
         "azimuth": _AZIMUTH_DEG,
         "elevation": _ELEVATION_DEG,
     }
-    renderer = MujocoRenderer(lit, data, camera, width, height, camera_id=-1)
+    renderer = Renderer(lit, data, camera, width, height, camera_id=-1)
     try:
-        picture = renderer.render("rgb_array")
+        picture, depth = cast("Any", renderer.render("rgbd_tuple"))
     finally:
         renderer.close()
-    return np.array(picture, dtype=np.uint8)
+    result = np.array(picture, dtype=np.uint8)
+    if not has_sky(lit):
+        # A model without a sky is drawn before black, in which dark bodies drown.
+        result[depth >= _FARTHEST] = _BACKGROUND
+    return result
+
+
+def has_sky(model: mujoco.MjModel) -> bool:
+    """Whether the model brings its own background."""
+    return bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
 
 
 def _well_lit(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:

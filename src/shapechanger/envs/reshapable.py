@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.envs.headless import choose_gl
+from shapechanger.envs.headless import choose_gl, require_screen
 from shapechanger.errors import MissingExtra, SpaceMismatch
 
 try:
     import mujoco
     from gymnasium.envs.mujoco import MujocoEnv
-    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.embodiments.family import BodyLike, Family
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.picture import body_reach, draw
+from shapechanger.envs.renderer import Renderer
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, to_json
 from shapechanger.morphology.certifiable import Wrapped
@@ -64,10 +63,19 @@ class Reshapable(MujocoEnv):
     standing_height: float | None
     _spec: EnvSpec | None = None
 
+    if TYPE_CHECKING:
+        # Gymnasium's own, which it leaves untyped.
+        def _get_obs(self) -> NDArray[np.float64]: ...
+        def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
+            """Put the body at a pose (nq,) with velocities (nv,)."""
+
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
         """What must be there before Gymnasium's constructor compiles the model."""
         self.body = self.family.body(body)
-        if arguments.get("render_mode") is not None:
+        mode = arguments.get("render_mode")
+        if mode == "human":
+            require_screen()
+        elif mode is not None:
             choose_gl()
         self._renderer_arguments = {
             "max_geom": arguments.get("max_geom", 1000),
@@ -79,8 +87,10 @@ class Reshapable(MujocoEnv):
     def _finish(self, arguments: dict[str, Any]) -> None:
         """What follows from the compiled model, and what a pickle needs to build it again."""
         self._follow_body()
+        self._renew_renderer()
         # Gymnasium's constructor has recorded its own arguments; these are ours.
-        EzPickle.__init__(self, body=to_json(self.body), **arguments)
+        self._ezpickle_args: tuple[Any, ...] = ()
+        self._ezpickle_kwargs: dict[str, Any] = {"body": to_json(self.body), **arguments}
 
     # The spec is what `gym.make`, Minari and a vector env build the env from again.
 
@@ -98,7 +108,7 @@ class Reshapable(MujocoEnv):
         """Write the present body where pickling and the spec look for it."""
         if self._spec is not None:
             self._spec.kwargs["body"] = to_json(self.body)
-        cast("dict[str, Any]", self._ezpickle_kwargs)["body"] = to_json(self.body)
+        self._ezpickle_kwargs["body"] = to_json(self.body)
 
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Compile the present body in place of the file as it is."""
@@ -136,7 +146,7 @@ class Reshapable(MujocoEnv):
         """
         if options is not None and "body" in options:
             self._change_body(self.family.body(options["body"]))
-        return super().reset(seed=seed, options=options)
+        return cast("Any", super()).reset(seed=seed, options=options)
 
     def reset_model(self) -> NDArray[np.float64]:
         """Draw a start state as Gymnasium does, and make it possible.
@@ -173,11 +183,15 @@ class Reshapable(MujocoEnv):
         self.model, self.data = model, data
         self._follow_body()
         self._record_body()
+        self._renew_renderer()
+
+    def _renew_renderer(self) -> None:
+        """Draw the present body from here on."""
         renderer = self.mujoco_renderer
         renderer.close()
-        self.mujoco_renderer = MujocoRenderer(
-            model,
-            data,
+        self.mujoco_renderer = Renderer(
+            self.model,
+            self.data,
             renderer.default_cam_config,
             self.width,
             self.height,
@@ -195,15 +209,17 @@ class Reshapable(MujocoEnv):
             bounds_move = space == "action" and not (
                 np.array_equal(old.low, new.low) and np.array_equal(old.high, new.high)
             )
-            if lost or gained or bounds_move:
+            if old.names != new.names or bounds_move:
                 change = "; ".join(
                     f"{word} {', '.join(names[:3])}{' and more' * (len(names) > 3)}"
                     for word, names in (("it loses", lost), ("it gains", gained))
                     if names
                 )
+                if not change:
+                    change = "its bounds move" if bounds_move else "its order changes"
                 raise SpaceMismatch(
                     f"This body would change the {space} space from {old.size} to {new.size} "
-                    f"numbers ({change or 'its bounds move'}): a reset cannot change a space, so "
+                    f"numbers ({change}): a reset cannot change a space, so "
                     "make another env with this body and cross over with a body map."
                 )
 

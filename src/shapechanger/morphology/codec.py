@@ -49,7 +49,7 @@ def from_json(text: str | bytes) -> Body:
     """
     try:
         parsed: Any = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:  # No JSON, no UTF-8, or nested without end.
         raise MorphologyError(f"A body must be a JSON list of edits: {error}.") from error
     items = cast("list[Any]", parsed if isinstance(parsed, list) else [parsed])
     return tuple(_edit(item) for item in items)

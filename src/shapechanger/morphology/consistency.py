@@ -65,7 +65,11 @@ def inconsistencies(model: mujoco.MjModel) -> tuple[str, ...]:
     `mujoco.mj_setConst` computes, against a recomputed copy.
     """
     names = names_of(model)
-    return (*_impossible_inertias(model, names), *_stale_constants(model, names))
+    return (
+        *_impossible_inertias(model, names),
+        *_late_bits(model, names),
+        *_stale_constants(model, names),
+    )
 
 
 def lone_masses(source: mujoco.MjModel, target: mujoco.MjModel) -> tuple[str, ...]:
@@ -100,6 +104,19 @@ def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
                 "kg·m², of which the largest is more than the other two together."
             )
     return found
+
+
+def _late_bits(model: mujoco.MjModel, names: Names) -> list[str]:
+    """Geoms whose contact bits were set after their body's were compiled."""
+    owner = model.geom_bodyid
+    late = (model.geom_contype & ~model.body_contype[owner]) | (
+        model.geom_conaffinity & ~model.body_conaffinity[owner]
+    )
+    return [
+        f"{names.geoms[i]}: geom_contype or geom_conaffinity has bits that its body was compiled "
+        "without, so they are ignored. Compile the model again."
+        for i in np.flatnonzero(late).tolist()
+    ]
 
 
 def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:

@@ -94,10 +94,13 @@ def require_factor(name: str, value: float) -> None:
 
 
 def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
-    """Refuse a vector that is not finite or, if `nonzero`, has no direction.
+    """Refuse what is not three finite numbers or, if `nonzero`, has no direction.
 
     Raises:
         MorphologyError: If so.
     """
-    if not all(math.isfinite(x) for x in value) or (nonzero and not any(value)):
-        raise MorphologyError(f"{name} must be finite{' and not zero' * nonzero}, got {value}.")
+    given: object = value  # What a type checker knows, a notebook may not.
+    if not isinstance(given, tuple) or len(value) != 3 or not all(map(math.isfinite, value)):
+        raise MorphologyError(f"{name} must be a tuple of three finite numbers, got {value}.")
+    if nonzero and not any(value):
+        raise MorphologyError(f"{name} must not be zero.")

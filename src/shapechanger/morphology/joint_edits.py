@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -11,12 +11,10 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edit import Edit, part_of_the_way
 from shapechanger.morphology.elements import select
-from shapechanger.morphology.segments import orientation, rotation
+from shapechanger.morphology.geoms import orientation, rotation
+from shapechanger.morphology.references import delete_joint
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["JointRange", "Lock"]
+__all__ = ["JointRange", "Lock", "set_limits"]
 
 _J = mujoco.mjtJoint
 # A joint without limits turns all the way round; a slide without limits has no such number.
@@ -27,6 +25,8 @@ _NARROWEST_RAD: Final = 1e-3
 
 class JointRange(Edit, frozen=True):
     """Change how far hinges and slides move; a joint without limits becomes limited.
+
+    A slide without limits needs both of them. On the way there they come nearer from far away.
 
     Attributes:
         joint: Name or glob of the joints.
@@ -49,7 +49,9 @@ class JointRange(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that fits."""
         for joint in select("joint", self.joint, spec.joints):
-            old = limits(spec, joint)
+            old = limits(joint)
+            if old is None:
+                old = self._far_limits(joint)
             new = [
                 o if n is None else part_of_the_way(o, n, self.amount)
                 for o, n in zip(old, (self.lower, self.upper), strict=True)
@@ -58,7 +60,18 @@ class JointRange(Edit, frozen=True):
                 raise MorphologyError(
                     f"The range of {joint.name!r} would be {new[0]:.4g} to {new[1]:.4g}."
                 )
-            set_limits(spec, joint, *new)
+            set_limits(joint, *new)
+
+    def _far_limits(self, joint: mujoco.MjsJoint) -> tuple[float, float]:
+        """Where the limits of a slide that has none come from: the farther, the smaller the part.
+
+        Raises:
+            MorphologyError: If the edit gives one limit only.
+        """
+        if self.lower is None or self.upper is None:
+            raise MorphologyError(f"{joint.name!r} slides without limits: give both of them.")
+        reach = (self.upper - self.lower) / self.amount
+        return self.lower - reach, self.upper + reach
 
 
 class Lock(Edit, frozen=True):
@@ -83,56 +96,75 @@ class Lock(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Lock every joint that fits."""
         for joint in select("joint", self.joint, spec.joints):
-            lower, upper = limits(spec, joint)
-            position = 0.5 * (lower + upper) if self.position is None else self.position
+            old = limits(joint)
+            position = self.position
+            if position is None:
+                if old is None:
+                    raise MorphologyError(
+                        f"{joint.name!r} slides without limits, so it has no middle: "
+                        "give a position."
+                    )
+                position = 0.5 * (old[0] + old[1])
             if self.amount == 1.0:
                 _weld(spec, joint, position)
                 continue
+            far = 1.0 / self.amount
+            lower, upper = old or (position - far, position + far)
             narrow = max(1.0 - self.amount, _NARROWEST_RAD / (upper - lower))
             set_limits(
-                spec,
                 joint,
                 position + narrow * (lower - position),
                 position + narrow * (upper - position),
             )
 
 
-def limits(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> tuple[float, float]:
-    """The range of a hinge or slide, rad or m; a full turn for a hinge without limits.
+def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
+    """The range of a hinge or slide, rad or m.
+
+    Returns:
+        A full turn for a hinge without limits, None for a slide without.
 
     Raises:
-        MorphologyError: For other joints, and for a slide without limits.
+        MorphologyError: For other joints.
     """
     if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
         raise MorphologyError(f"{joint.name!r} is no hinge and no slide, so it has no range.")
     lower, upper = (float(x) for x in joint.range)
     automatic = joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     if joint.limited != mujoco.mjtLimited.mjLIMITED_TRUE and not automatic:
-        if joint.type == _J.mjJNT_SLIDE:
-            raise MorphologyError(f"{joint.name!r} slides without limits: give both of them.")
-        return _FULL_TURN
-    if _in_degrees(spec, joint):
+        return None if joint.type == _J.mjJNT_SLIDE else _FULL_TURN
+    if _in_degrees(joint):
         return math.radians(lower), math.radians(upper)
     return lower, upper
 
 
-def set_limits(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
+def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
     """Limit a hinge or slide to `lower` ... `upper`, rad or m."""
     joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-    in_degrees = _in_degrees(spec, joint)
-    joint.range = [math.degrees(x) if in_degrees else x for x in (lower, upper)]
+    in_degrees = _in_degrees(joint)
+    joint.range = [_degrees(x) if in_degrees else x for x in (lower, upper)]
 
 
-def _in_degrees(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> bool:
+def _in_degrees(joint: mujoco.MjsJoint) -> bool:
     """Whether the model writes this joint's angles in degrees."""
-    return bool(spec.compiler.degree) and joint.type == _J.mjJNT_HINGE
+    return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
+
+
+def _degrees(angle: float) -> float:
+    """The degrees that MuJoCo turns back into exactly `angle` (rad), where there are such.
+
+    There are for every angle that was written in degrees: 30° is not 29.999999999999996°.
+    """
+    near = math.degrees(angle)
+    candidates = (round(near, 9), near, math.nextafter(near, 0.0), math.nextafter(near, 2.0 * near))
+    return next((degrees for degrees in candidates if math.radians(degrees) == angle), near)
 
 
 def _weld(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> None:
     """Move the joint's displacement at `position` into its body's pose, and delete the joint."""
     body = joint.parent
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-    reference = math.radians(joint.ref) if _in_degrees(spec, joint) else float(joint.ref)
+    reference = math.radians(joint.ref) if _in_degrees(joint) else float(joint.ref)
     displacement = position - reference
     turn, shift = np.eye(3), np.zeros(3)
     quaternion = np.array([1.0, 0.0, 0.0, 0.0])
@@ -152,19 +184,4 @@ def _weld(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> None:
     body.pos = body.pos + rotation(parent) @ shift
     body.quat = turned
     body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    for element in (*spec.actuators, *spec.sensors, *spec.equalities):
-        if joint.name in _joints_of(element):
-            spec.delete(element)
-    spec.delete(joint)
-
-
-def _joints_of(element: mujoco.MjsActuator | mujoco.MjsSensor | mujoco.MjsEquality) -> set[str]:
-    """The names of the joints that an element acts on or reads."""
-    if isinstance(element, mujoco.MjsActuator):
-        joint_drives = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-        return {element.target} if element.trntype in joint_drives else set()
-    if isinstance(element, mujoco.MjsSensor):
-        return {element.objname} if element.objtype == mujoco.mjtObj.mjOBJ_JOINT else set()
-    if element.type != mujoco.mjtEq.mjEQ_JOINT:
-        return set()
-    return {element.name1, element.name2}
+    delete_joint(spec, joint)

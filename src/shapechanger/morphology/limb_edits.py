@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import mujoco
@@ -21,21 +22,29 @@ from shapechanger.morphology.elements import (
     require_free_name,
     require_limb,
     select,
+    subtree,
 )
-from shapechanger.morphology.grafting import graft_copy, move_limb
+from shapechanger.morphology.geoms import (
+    move_by,
+    place_of,
+    scale_geom_mass,
+    stretch_geom,
+    volume,
+)
+from shapechanger.morphology.grafting import copy_geom, graft_copy, move_limb, move_point
 from shapechanger.morphology.joint_edits import set_limits
 from shapechanger.morphology.segments import (
     anchor,
     far_end,
+    held_at,
     require_geometry,
     resize_limb,
-    scale_mass,
     stretch_segment,
-    volume,
 )
 
 __all__ = ["AddLimb", "AddSegment", "Cut", "Remove", "Split"]
 
+_SPHERE: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 # MuJoCo refuses bodies of almost no mass, so a limb that appears or goes is never smaller than this
 # part of its full size: a millionth of its mass.
 _SMALLEST_PART: Final = 0.01
@@ -60,7 +69,10 @@ class Cut(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Cut every segment that fits."""
-        for body in select("body", self.body, limbs_and_trunks(spec)):
+        for name in [body.name for body in select("body", self.body, limbs_and_trunks(spec))]:
+            body = spec.body(name)
+            if body is None:
+                continue  # It hung on one that was cut before it.
             require_limb(body, "cut")
             require_geometry(spec, body)
             beyond = _children_beyond(spec, body, self.keep)
@@ -90,8 +102,9 @@ class Remove(Edit, frozen=True):
 class Split(Edit, frozen=True):
     """Split a segment in two, with a hinge where it was split.
 
-    The nearer part keeps the body's name and joint; what hung on the farther part goes with it. The
-    new hinge has the armature, damping and stiffness of the body's own joint.
+    The nearer part keeps the body's name and joint; what hung on the farther part goes with it, as
+    do its sites and spheres. The new hinge has the armature, damping and stiffness of the body's
+    own joint.
 
     Attributes:
         body: Name of the segment; not a trunk.
@@ -123,25 +136,31 @@ class Split(Edit, frozen=True):
         require_limb(body, "split")
         require_geometry(spec, body)
         place = anchor(body) + self.at * (far_end(spec, body) - anchor(body))
-        beyond = _children_beyond(spec, body, self.at)
+        is_beyond = _beyond(spec, body, self.at)
+        children = _children_beyond(spec, body, self.at)
         part = _new_segment(spec, body, self.name, place)
-        for geom in body.geoms:
-            _copy_geom(spec, geom, part, f"{geom.name}_of_{self.name}")
-        for geom in part.geoms:
-            geom.pos = geom.pos - anchor(body)
-            if not math.isnan(geom.fromto[0]):
-                geom.fromto = geom.fromto - np.tile(anchor(body), 2)
-        whole = sum(volume(spec, geom) for geom in body.geoms)
-        stretch_segment(spec, part, 1.0 - self.at)
-        stretch_segment(spec, body, self.at, carry_children=False)
-        # The rounded ends at the split overlap. Their mass comes with the amount of the split.
-        halves = sum(volume(spec, geom) for geom in (*body.geoms, *part.geoms))
-        for segment in (body, part):
-            scale_mass(segment, part_of_the_way(whole / halves, 1.0, self.amount))
-        for child in beyond:
+        points = [*body.sites, *(geom for geom in body.geoms if geom.type == _SPHERE)]
+        for point in [point for point in points if is_beyond(place_of(point))]:
+            move_by(move_point(spec, point, part), -place)
+        self._share(spec, body, part)
+        for child in children:
             offset = child.pos - place
             move_limb(spec, child, part).pos = offset
         _add_hinge(spec, body, part, self, self.amount)
+
+    def _share(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, part: mujoco.MjsBody) -> None:
+        """Let every geom that has a length lie on both parts."""
+        held = anchor(body)
+        for geom in [geom for geom in body.geoms if geom.type != _SPHERE]:
+            whole = volume(spec, geom)
+            copy = copy_geom(spec, geom, part, f"{geom.name}_of_{self.name}")
+            move_by(copy, -held)
+            stretch_geom(spec, copy, np.zeros(3), 1.0 - self.at)
+            stretch_geom(spec, geom, held, self.at)
+            # The rounded ends at the split overlap. Their mass comes with the amount of the split.
+            without = whole / (volume(spec, geom) + volume(spec, copy))
+            for half in (geom, copy):
+                scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
 
 
 class AddSegment(Edit, frozen=True):
@@ -181,13 +200,15 @@ class AddSegment(Edit, frozen=True):
         """Add the segment."""
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_geometry(spec, body)
-        require_free_name(spec, "geom", f"{self.name}_geom")
-        model_geom = _long_geom(body)
         place = far_end(spec, body)
+        model_geom = _long_geom(body)
         part = _new_segment(spec, body, self.name, place)
-        geom = _copy_geom(spec, model_geom, part, f"{self.name}_geom")
+        geom = copy_geom(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
-        geom.mass = math.nan
+        if not math.isnan(geom.mass):
+            geom.density, geom.mass = geom.mass / volume(spec, model_geom), math.nan
+        # MuJoCo takes either both ends or a pose.
+        geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
         geom.fromto = [0.0, 0.0, 0.0, *self.end]
         if self.radius is not None:
             geom.size = [self.radius, 0.0, 0.0]
@@ -222,7 +243,11 @@ class AddLimb(Edit, frozen=True):
         """Add the limb."""
         (limb,) = select("body", self.like, limbs_and_trunks(spec))[:1]
         require_limb(limb, "copied")
-        require_free_name(spec, "body", limb.name + self.suffix)
+        for body in subtree(limb):
+            require_free_name(spec, "body", body.name + self.suffix)
+            for kind, elements in (("joint", body.joints), ("geom", body.geoms)):
+                for element in elements:
+                    require_free_name(spec, kind, element.name + self.suffix)
         copy = graft_copy(spec, limb, self.suffix, self.angle)
         size = self.size * max(self.amount, _SMALLEST_PART)
         if size != 1.0:
@@ -241,16 +266,21 @@ def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | 
         require_vector("The axis of a hinge", axis)
 
 
+def _beyond(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> Callable[[np.ndarray], bool]:
+    """Whether a point lies farther out along the segment than `part` of its length."""
+    held = anchor(body)
+    along = far_end(spec, body) - held
+    # A point exactly at the cut counts as within; rounding must not decide it.
+    reach = (part + 1e-9) * float(along @ along)
+    return lambda point: float((point - held) @ along) > reach
+
+
 def _children_beyond(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float
 ) -> list[mujoco.MjsBody]:
-    """The children that hang farther out along the segment than `part` of its length."""
-    held = anchor(body)
-    along = far_end(spec, body) - held
-    reach = part * float(along @ along)
-    # A child that hangs exactly at the cut stays on; rounding must not decide it.
-    tolerance = 1e-9 * float(along @ along)
-    return [child for child in body.bodies if float((child.pos - held) @ along) > reach + tolerance]
+    """The children that are held farther out along the segment than `part` of its length."""
+    is_beyond = _beyond(spec, body, part)
+    return [child for child in body.bodies if is_beyond(held_at(spec, child))]
 
 
 def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None:
@@ -268,7 +298,7 @@ def _new_segment(
     require_free_name(spec, "body", name)
     require_free_name(spec, "joint", name)
     require_free_name(spec, "actuator", name)
-    return body.add_body(name=name, pos=place)
+    return body.add_body(name=name, pos=place, gravcomp=body.gravcomp)
 
 
 def _long_geom(body: mujoco.MjsBody) -> mujoco.MjsGeom:
@@ -280,23 +310,11 @@ def _long_geom(body: mujoco.MjsBody) -> mujoco.MjsGeom:
     )
 
 
-# What makes a geom what it is, but for its name and its place in the tree.
-_GEOM_FIELDS: Final = (
-    *("type", "size", "pos", "quat", "fromto", "density", "mass", "typeinertia"),
-    *("contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp"),
-    *("margin", "gap", "group", "rgba", "material", "fluid_ellipsoid", "fluid_coefs"),
+# How a joint resists, but for its range.
+_HINGE_FIELDS: Final = (
+    *("armature", "damping", "stiffness", "frictionloss", "margin"),
+    *("solref_limit", "solimp_limit", "solref_friction", "solimp_friction"),
 )
-
-
-def _copy_geom(
-    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str
-) -> mujoco.MjsGeom:
-    """A geom like `geom` on another body."""
-    require_free_name(spec, "geom", name)
-    copy = body.add_geom(name=name)
-    for field in _GEOM_FIELDS:
-        setattr(copy, field, getattr(geom, field))
-    return copy
 
 
 def _add_hinge(
@@ -314,10 +332,10 @@ def _add_hinge(
     part.add_joint(name=edit.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
     hinge = spec.joint(edit.name)
     if own is not None:
-        for field in ("armature", "damping", "stiffness", "frictionloss", "margin"):
+        for field in _HINGE_FIELDS:
             setattr(hinge, field, getattr(own, field))
     strength = max(amount, _SMALLEST_PART)
-    set_limits(spec, hinge, strength * edit.lower, strength * edit.upper)
+    set_limits(hinge, strength * edit.lower, strength * edit.upper)
     if edit.gear is not None:
         motor = spec.add_actuator(
             name=edit.name,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Hashable
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
@@ -18,6 +18,9 @@ from shapechanger.morphology.codec import Body
 from shapechanger.morphology.edit import Edit
 
 __all__ = ["interpolate"]
+
+# A motor that only one of two bodies has is there in between, the weaker the farther that body is.
+_ZERO_WHERE_NONE: Final = frozenset({"gear"})
 
 
 def interpolate(a: Body, b: Body, alpha: float) -> Body:
@@ -55,7 +58,9 @@ def _key(edit: Edit) -> Hashable:
     """What must be equal for two edits to be one edit at two strengths: all but its numbers."""
     values: dict[str, Any] = msgspec.structs.asdict(edit)
     return type(edit), tuple(
-        (k, None if _is_number(v) else v) for k, v in values.items() if v is not None
+        (k, None if _is_number(v) else v)
+        for k, v in values.items()
+        if v is not None and k not in _ZERO_WHERE_NONE
     )
 
 
@@ -68,8 +73,10 @@ def _between(x: Edit, y: Edit, alpha: float) -> Edit:
     changes: dict[str, Any] = {}
     for field in x.__struct_fields__:
         old, new = getattr(x, field), getattr(y, field)
-        if old == new or not _is_number(old):
+        if old == new:
             continue
+        if field in _ZERO_WHERE_NONE:
+            old, new = old or 0.0, new or 0.0
         if isinstance(old, tuple):
             changes[field] = tuple(p + alpha * (q - p) for p, q in zip(old, new, strict=True))
         else:

@@ -71,9 +71,9 @@ def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     """How far the body's lowest point is above the floor, m; negative when it is inside.
 
     `data` must hold the geoms' places, as after `mj_kinematics`. The floor is every plane and
-    height field of the world that the body's geoms can touch; 1000 where there is none.
+    height field that is fixed to the world and that the body's geoms can touch; 1000 where there is none.
     """
-    of_world = model.geom_bodyid == 0
+    of_world = model.body_weldid[model.geom_bodyid] == 0
     gap = _FAR_M
     for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)):
         touching = (model.geom_contype & model.geom_conaffinity[floor]) | (

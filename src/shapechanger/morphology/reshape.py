@@ -6,9 +6,10 @@ from collections.abc import Iterable
 
 import mujoco
 
-from shapechanger.errors import BrokenModel
+from shapechanger.errors import BrokenModel, ShapechangerError
 from shapechanger.morphology.codec import to_json
 from shapechanger.morphology.edit import Edit
+from shapechanger.morphology.explicit import make_explicit
 
 __all__ = ["compile_body", "reshape"]
 
@@ -21,9 +22,11 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
         MorphologyError: If an element cannot be changed that way.
     """
     result = spec.copy()
-    for edit in edits:
-        if edit.amount > 0.0:
-            edit.apply(result)
+    effective = [edit for edit in edits if edit.amount > 0.0]
+    if effective:
+        make_explicit(result)
+    for edit in effective:
+        edit.apply(result)
     return result
 
 
@@ -39,7 +42,7 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     try:
         return reshape(spec, body).compile()
     except (ValueError, mujoco.FatalError) as error:
-        if isinstance(error, BrokenModel) or type(error) not in (ValueError, mujoco.FatalError):
+        if isinstance(error, ShapechangerError):
             raise
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split()).removesuffix(".")
         raise BrokenModel(f"MuJoCo does not compile the body {to_json(body)}: {reason}.") from error

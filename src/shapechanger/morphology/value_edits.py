@@ -14,7 +14,7 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edit import Edit, part_of_the_way, require_factor
 from shapechanger.morphology.elements import limbs_and_trunks, select
-from shapechanger.morphology.segments import scale_mass
+from shapechanger.morphology.segments import inertia_is_written_out, scale_mass
 
 if TYPE_CHECKING:
     import mujoco
@@ -87,6 +87,12 @@ class Density(ValueEdit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
         bodies = select("body", self.element, limbs_and_trunks(spec))
+        for body in bodies:
+            if inertia_is_written_out(spec, body):
+                raise MorphologyError(
+                    f"{body.name!r} has its inertia written out, so a density counts for nothing: "
+                    "change its mass instead."
+                )
         for geom in (geom for body in bodies for geom in body.geoms):
             if not math.isnan(geom.mass):
                 raise MorphologyError(

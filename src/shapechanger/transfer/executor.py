@@ -16,7 +16,7 @@ from typing import Any, Final, Protocol
 
 from shapechanger.errors import ShapechangerError, StudyError
 
-__all__ = ["Executor", "Job", "OnProgress", "Processes", "Report"]
+__all__ = ["Executor", "Job", "OnProgress", "Processes", "Report", "Serial"]
 
 _REPORT_EVERY_S: Final = 0.25
 
@@ -50,6 +50,26 @@ class Executor(Protocol):
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Run all jobs, each after those that it waits for; raise what one of them raised."""
         ...
+
+
+class Serial:
+    """Runs jobs one after another in this process: slower, and easy to look into."""
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        """Run all jobs; what one of them raises ends the others."""
+        ended: set[str] = {name for job in jobs for name in job.after} - {job.name for job in jobs}
+        waiting = list(jobs)
+        while waiting:
+            job = next(job for job in waiting if ended.issuperset(job.after))
+            waiting.remove(job)
+            job.function(*job.arguments, _reporting(job.name, on_progress))
+            ended.add(job.name)
+            on_progress(job.name, 0, True)
+
+
+def _reporting(name: str, on_progress: OnProgress) -> Report:
+    """A report that passes on the steps under the job's name."""
+    return lambda steps: on_progress(name, steps, False)
 
 
 class Processes:

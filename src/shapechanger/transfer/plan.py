@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -87,8 +86,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     def runs(self) -> tuple[Run, ...]:
         """Every run of the study, those that others wait for first."""
         brought = bool(self.source_policy)
-        kinds: Iterable[RunKind] = ("random", *self.arms) if brought else _KINDS
-        wanted = [kind for kind in kinds if kind not in ARMS or kind in self.arms]
+        wanted: list[RunKind] = ["random", *(arm for arm in ARMS if arm in self.arms)]
+        if not brought:
+            wanted.insert(0, "source")
         return tuple(Run(kind, i) for kind in wanted for i in range(self.seeds))
 
     def seed_of(self, run: Run) -> int:

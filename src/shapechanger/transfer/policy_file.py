@@ -11,7 +11,7 @@ import io
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -151,10 +151,12 @@ def load_policy(path: Path) -> TrainedPolicy:
     try:
         with zipfile.ZipFile(path) as archive:
             card = msgspec.json.decode(archive.read(_CARD), type=Card)
-            model = PPO.load(io.BytesIO(archive.read(_MODEL)), device="cpu")
+            model = cast("Any", PPO).load(io.BytesIO(archive.read(_MODEL)), device="cpu")
             normalisation = None
             if _STATISTICS in archive.namelist():
                 normalisation = _read_statistics(archive.read(_STATISTICS))
+    except FileNotFoundError as error:
+        raise CorruptStudy(f"There is no policy file {path}.") from error
     except (OSError, KeyError, ValueError, zipfile.BadZipFile, msgspec.MsgspecError) as error:
         raise CorruptStudy(
             f"{path} is not a policy that `shapechanger train` or a study has written ({error})."

@@ -10,19 +10,13 @@ from typing import Final
 
 import msgspec
 
-from shapechanger.errors import MissingExtra
 from shapechanger.transfer.body_map import MappedEnv
 from shapechanger.transfer.evaluation import Evaluation, evaluate, random_actions
 from shapechanger.transfer.executor import Report
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.plan import Plan, Run
 from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.training import EVALUATION_SEED, train
-
-try:
-    import torch
-except ImportError as error:
-    raise MissingExtra("torch", "learn") from error
+from shapechanger.transfer.training import EVALUATION_SEED, train, use_one_thread
 
 __all__ = ["RunResult", "finished", "perform"]
 
@@ -75,8 +69,7 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
     Raises:
         OutputError: If its files cannot be written.
     """
-    # One thread a run: several runs share the machine, and sums in another order are other sums.
-    torch.set_num_threads(1)
+    use_one_thread()
     folder = run.folder(Path(study))
     shutil.rmtree(folder, ignore_errors=True)
     make_folder(folder)

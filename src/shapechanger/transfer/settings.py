@@ -68,7 +68,7 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
 
-# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 24,576 steps, and
+# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 32,768 steps, and
 # `ppo-run` on the ant, which it takes to some 2 m/s within a million.
 LEARNERS: Final[dict[str, LearnerSettings]] = {
     "ppo-balance": LearnerSettings(
@@ -77,7 +77,7 @@ LEARNERS: Final[dict[str, LearnerSettings]] = {
         batch_size=128,
         n_epochs=10,
         learning_rate=1e-3,
-        steps=24_576,
+        steps=32_768,
         eval_every=2048,
         eval_episodes=5,
     ),

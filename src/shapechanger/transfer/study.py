@@ -25,7 +25,7 @@ from shapechanger.transfer.runs import RunResult, finished, perform
 from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.training import require_budget
 
-__all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "make_plan", "run_study"]
+__all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "make_plan", "run_study", "unfinished"]
 
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
@@ -90,7 +90,8 @@ def make_plan(
         settings: Its settings.
         seeds: Runs of each arm, at least 2.
         steps: Target steps of a run; None for the learner's own number.
-        source_steps: Source steps of a source policy; None for as many as target steps.
+        source_steps: Source steps of a source policy; None for half as many as target steps, so
+            that there is something left to compare when they are counted too.
         source_policy: File of a policy to bring along in place of training one for each seed.
         arms: What to compare.
         seed: Number that the seeds of all runs are drawn from.
@@ -106,7 +107,7 @@ def make_plan(
     """
     budget = settings.whole_updates(settings.steps if steps is None else steps)
     require_budget(settings.steps if steps is None else steps, settings)
-    source_budget = budget if source_steps is None else settings.whole_updates(source_steps)
+    source_budget = settings.whole_updates(budget // 2 if source_steps is None else source_steps)
     body_map = _body_map(task, rules, map_text, units)
     digest = ""
     if source_policy is not None:
@@ -162,10 +163,6 @@ def run_study(
     """
     claim_folder(plan, out)
     shift = _shift(plan.task)
-    done = {run: finished(out, run) for run in plan.runs()}
-    for run, result in done.items():
-        if result is not None:
-            on_progress(run.name, result.curve[-1].steps, True)
     jobs = [
         Job(
             run.name,
@@ -173,8 +170,7 @@ def run_study(
             (plan, run, str(out), str(source_policy or "")),
             after=_after(plan, run),
         )
-        for run, result in done.items()
-        if result is None
+        for run in unfinished(plan, out)
     ]
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
@@ -182,6 +178,15 @@ def run_study(
     study = _study(plan, [result for result in results if result is not None], command, shift)
     write_json(out / STUDY_FILE, study)
     return study
+
+
+def unfinished(plan: Plan, out: Path) -> tuple[Run, ...]:
+    """The runs of a plan that have not ended in `out`.
+
+    Raises:
+        CorruptStudy: If the file of one that has cannot be read.
+    """
+    return tuple(run for run in plan.runs() if finished(out, run) is None)
 
 
 def claim_folder(plan: Plan, out: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 
@@ -18,13 +18,21 @@ from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.transplant import transplant
 
 try:
+    import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["EVALUATION_SEED", "OnEvaluation", "OnSteps", "require_budget", "train"]
+__all__ = [
+    "EVALUATION_SEED",
+    "OnEvaluation",
+    "OnSteps",
+    "require_budget",
+    "train",
+    "use_one_thread",
+]
 
 # Evaluations start from seeds far from those of training, the same ones for every run and arm.
 EVALUATION_SEED = 10_000_000
@@ -133,7 +141,7 @@ def train(
         else:
             model = _moved_model(envs, settings, seed, tensorboard, source, body_map)
         watcher = _Evaluations(settings, evaluation_envs, on_evaluation, on_steps)
-        model.learn(settings.whole_updates(steps), callback=watcher)
+        cast("Any", model).learn(settings.whole_updates(steps), callback=watcher)
         watcher.evaluate_now()
         observation, action = layouts_of(evaluation_envs[0])
         card = Card(
@@ -142,7 +150,7 @@ def train(
             action,
             learner,
             settings,
-            model.num_timesteps,
+            int(cast("Any", model).num_timesteps),
             seed,
             shapechanger.__version__,
         )
@@ -151,6 +159,15 @@ def train(
         envs.close()
         for evaluation_env in evaluation_envs:
             evaluation_env.close()
+
+
+def use_one_thread() -> None:
+    """Let this process compute on one core.
+
+    Networks this small gain nothing from more, several runs share the machine, and sums in another
+    order are other sums.
+    """
+    torch.set_num_threads(1)
 
 
 def require_budget(steps: int, settings: LearnerSettings) -> None:
@@ -202,7 +219,7 @@ class _Evaluations(BaseCallback):
         """Evaluate the policy as it is."""
         assert isinstance(self.model, PPO)
         act = actor(self.model, _statistics(self.training_env))
-        result = evaluate(act, self._envs, EVALUATION_SEED, self.model.num_timesteps)
+        result = evaluate(act, self._envs, EVALUATION_SEED, self.num_timesteps)
         self.logger.record("eval/mean_return", result.mean_return)
         self.logger.record("eval/mean_length", result.mean_length)
         for name, value in result.terms.items():

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from shapechanger.errors import MapError
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero
 from tests.transfer.body_map.bodies import (
     ant_action,
     ant_observation,
@@ -11,10 +15,6 @@ from tests.transfer.body_map.bodies import (
     pendulum_action,
     pendulum_observation,
 )
-
-from shapechanger.errors import MapError
-from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero
 
 
 def grown(**options: object) -> BodyMap:

@@ -8,11 +8,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 from shapechanger.errors import MapError, SpaceMismatch
 from shapechanger.layout import Layout
 from shapechanger.transfer.body_map import BodyMap, MappedEnv, Take, body_map, wrap
+from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 
 class Recorder(gym.Env[np.ndarray, np.ndarray]):

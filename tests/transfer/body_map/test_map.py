@@ -8,6 +8,10 @@ import pickle
 import msgspec
 import numpy as np
 import pytest
+
+from shapechanger.errors import MapError, SpaceMismatch, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Entry, Hold, Learn, Row, Take, Zero
 from tests.transfer.body_map.bodies import (
     ant_action,
     ant_observation,
@@ -15,10 +19,6 @@ from tests.transfer.body_map.bodies import (
     pendulum_action,
     pendulum_observation,
 )
-
-from shapechanger.errors import MapError, SpaceMismatch, UnknownName
-from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Entry, Hold, Learn, Row, Take, Zero
 
 
 def small() -> BodyMap:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import pytest
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, RuleLike, Take, Zero
 from tests.transfer.body_map.bodies import (
     DEGREE,
     ant_action,
@@ -11,10 +15,6 @@ from tests.transfer.body_map.bodies import (
     pendulum_action,
     pendulum_observation,
 )
-
-from shapechanger.errors import MapError, UnknownName
-from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, RuleLike, Take, Zero
 
 
 def grown(**options: object) -> BodyMap:

@@ -6,6 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Symmetry, Take, mirror
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
     ANT_SWAP,
@@ -14,10 +18,6 @@ from tests.transfer.body_map.bodies import (
     pendulum_action,
     pendulum_observation,
 )
-
-from shapechanger.errors import MapError, UnknownName
-from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Symmetry, Take, mirror
 
 
 def ant_mirror() -> Symmetry:

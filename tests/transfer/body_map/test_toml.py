@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import pytest
+
+from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero, mirror
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
     ANT_SWAP,
@@ -11,10 +15,6 @@ from tests.transfer.body_map.bodies import (
     pendulum_action,
     pendulum_observation,
 )
-
-from shapechanger.errors import MapError, UnknownName
-from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero, mirror
 
 GROWN = ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
 SHRUNK = ant_observation(feet=True), ant_observation(), ant_action(feet=True), ant_action()

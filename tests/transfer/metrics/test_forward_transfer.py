@@ -33,10 +33,24 @@ SCRATCH = curves((0.0, 0.1, 0.2), (0.1, 0.3, 0.5))
 
 
 def test_forward_transfer() -> None:
-    """(0.5 - 0.2) / (1 - 0.2), and a BCa interval around it."""
-    estimate = transfer(ARM, SCRATCH)
-    assert estimate.value == pytest.approx(0.375)
-    assert estimate.method == "bca"
+    """(0.5 - 0.2) / (1 - 0.2)."""
+    assert transfer(ARM, SCRATCH).value == pytest.approx(0.375)
+
+
+def test_interval() -> None:
+    """A bootstrap interval around the value, once there are seeds enough, and no end above 1."""
+    heights = np.linspace(0.0, 0.3, 5)
+    arm = curves(*((h, 0.3 + h, 0.6 + h) for h in heights))
+    scratch = curves(*((h, h, h) for h in heights))
+    estimate = transfer(arm, scratch)
+    assert estimate.method == "studentised bootstrap"
+    assert estimate.value is not None
+    assert estimate.low is not None
+    assert estimate.high is not None
+    assert 0.0 < estimate.low < estimate.value < estimate.high < 1.0
+    # Most seeds can do nearly everything at once: less than nothing might seem to be left.
+    skewed = curves(*((h, h, h) for h in (0.99, 0.98, 1.0, 0.95, 0.2)))
+    assert transfer(skewed, scratch).high == 1.0
 
 
 def test_forward_transfer_in_total_steps() -> None:

@@ -20,14 +20,24 @@ ARM = np.array([0.9, 1.1, 1.0, 1.3, 0.7])
 SCRATCH = np.array([0.5, 0.4, 0.7, 0.6])
 
 
-def quotient(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A ratio that is undefined where the denominator is not above zero."""
-    return np.divide(arm, scratch, out=np.full_like(arm, np.nan), where=scratch > 0.0)
-
-
-def ratio(arm: NDArray[np.float64], scratch: NDArray[np.float64], seed: int = 0) -> Estimate:
-    """The ratio of two samples, with few resamples."""
-    return estimate_ratio(quotient, arm, scratch, rng=np.random.default_rng(seed), n_resamples=2000)
+def ratio(
+    arm: NDArray[np.float64],
+    scratch: NDArray[np.float64],
+    *,
+    seed: int = 0,
+    confidence: float = 0.95,
+    n_resamples: int = 2000,
+) -> Estimate:
+    """The ratio of two samples over a mean of at least 0.01, with few resamples."""
+    return estimate_ratio(
+        arm,
+        scratch,
+        least=0.01,
+        too_small="Undefined: too small.",
+        rng=np.random.default_rng(seed),
+        confidence=confidence,
+        n_resamples=n_resamples,
+    )
 
 
 @pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
@@ -35,7 +45,7 @@ def test_welch_agrees_with_scipy(confidence: float) -> None:
     """The six lines here are scipy's Welch test, which warns where these need not."""
     ours = estimate_difference(ARM, SCRATCH, confidence=confidence)
     theirs = stats.ttest_ind(ARM, SCRATCH, equal_var=False).confidence_interval(confidence)
-    assert ours.method == "welch"
+    assert ours.method == "Welch's t"
     np.testing.assert_allclose([ours.value], [ARM.mean() - SCRATCH.mean()])
     np.testing.assert_allclose([ours.low, ours.high], [theirs.low, theirs.high], rtol=1e-12)
 
@@ -55,28 +65,56 @@ def test_welch_takes_one_arm_without_spread() -> None:
     np.testing.assert_allclose([estimate.low, estimate.high], [2 - half, 2 + half])
 
 
-def test_bca_agrees_with_scipy() -> None:
-    """The interval is `scipy.stats.bootstrap` of two unpaired samples, and it holds the ratio."""
-    ours = ratio(ARM, SCRATCH)
-    theirs = stats.bootstrap(
-        (ARM, SCRATCH),
-        lambda x, y, axis: x.mean(axis=axis) / y.mean(axis=axis),
-        n_resamples=2000,
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    assert ours.method == "bca"
-    assert ours.value == pytest.approx(ARM.mean() / SCRATCH.mean())
-    np.testing.assert_allclose([ours.low, ours.high], [theirs.low, theirs.high])
-    assert ours.low is not None
-    assert ours.high is not None
-    assert ours.low < ARM.mean() / SCRATCH.mean() < ours.high
+@pytest.mark.parametrize("scratch", [SCRATCH, SCRATCH[:3]], ids=["5 and 4 seeds", "3 and 3"])
+@pytest.mark.parametrize("confidence", [0.8, 0.95])
+def test_studentised_bootstrap_by_the_book(confidence: float, scratch: NDArray[np.float64]) -> None:
+    """Efron & Tibshirani's algorithm, one resample after the other.
+
+    Of three seeds in each arm one resample in 81 has no error: far out in both tails.
+    """
+    arm = ARM if scratch.size > 3 else ARM[:3]
+    value = arm.mean() / scratch.mean()
+
+    def error(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+        """Delta method, as relative errors that add up."""
+        relative = [s.std(ddof=1) / np.sqrt(s.size) / s.mean() for s in (a, b)]
+        return float(np.hypot(*relative) * a.mean() / b.mean())
+
+    drawn = np.random.default_rng(0)
+    arms, scratches = (
+        drawn.choice(arm, (2000, arm.size)),
+        drawn.choice(scratch, (2000, scratch.size)),
+    )
+    ts: list[float] = []
+    silent = 0
+    for a, b in zip(arms, scratches, strict=True):
+        if len(set(a)) == len(set(b)) == 1:
+            silent += 1
+        else:
+            ts.append((a.mean() / b.mean() - value) / error(a, b))
+    outside = (1.0 - confidence) / 2.0
+    high = np.sort([*ts, *[np.inf] * silent])[int(np.ceil((1.0 - outside) * 1999))]
+    low = np.sort([*ts, *[-np.inf] * silent])[int(outside * 1999)]
+
+    ours = ratio(arm, scratch, confidence=confidence)
+    assert ours.method == "studentised bootstrap"
+    assert ours.value == pytest.approx(value)
+    np.testing.assert_allclose(
+        [ours.low, ours.high], value - np.array([high, low]) * error(arm, scratch)
+    )
 
 
-def test_few_seeds_are_told_that_bca_is_narrow() -> None:
-    """What 95 % means with five seeds stands next to the interval, and not with twenty."""
+def test_many_seeds_make_the_ratio_normal() -> None:
+    """With two hundred seeds the interval is the textbook one, value ± 1.96 errors."""
     rng = np.random.default_rng(1)
-    assert "87 %" in ratio(ARM, SCRATCH).note
-    assert ratio(rng.normal(2.0, 0.1, 20), rng.normal(1.0, 0.1, 20)).note == ""
+    arm, scratch = rng.normal(2.0, 0.2, 200), rng.normal(1.0, 0.1, 200)
+    estimate = ratio(arm, scratch, n_resamples=10_000)
+    assert estimate.note == ""
+    half = 1.96 * 2.0 * np.hypot(0.1, 0.1) / np.sqrt(200.0)
+    assert estimate.value is not None
+    np.testing.assert_allclose(
+        [estimate.low, estimate.high], [estimate.value - half, estimate.value + half], atol=0.006
+    )
 
 
 def test_same_generator_same_interval() -> None:
@@ -107,20 +145,37 @@ def test_no_interval_is_better_than_a_false_one(
         assert why in estimate.note
 
 
-def test_ratio_undefined_in_some_resamples_has_no_interval() -> None:
-    """A denominator that may be zero leaves the ratio unbounded; the point remains."""
-    estimate = ratio(ARM, np.array([0.5, 0.4, -2.0, 1.5]))
-    assert estimate.value == pytest.approx(10.0)
+def test_ratio_over_too_little_is_undefined() -> None:
+    """The reason is the caller's, who knows what was divided by."""
+    assert ratio(ARM, np.array([0.02, -0.02])) == undefined("Undefined: too small.")
+
+
+@pytest.mark.parametrize(
+    ("arm", "scratch"),
+    [
+        # Below the least that may be divided by in one resample of ten.
+        (ARM, np.array([0.5, 0.4, -2.0, 1.5])),
+        # So far below it in eight of 27 that the ratio is beyond what floats can hold.
+        (ARM, np.array([0.5, 1e-310, 1e-310])),
+        # Both seeds the same in half the resamples of each arm.
+        (ARM[:2], SCRATCH[:2]),
+        # Scratch shows no spread, and the arm none in one resample of nine, up to rounding.
+        (np.array([0.1, 0.2, 0.7]), np.full(5, 0.5)),
+        # Three zeros of five seeds: a ratio of zero without an error in one resample of thirteen.
+        (np.array([0.0, 0.0, 0.0, 0.1, 0.2]), SCRATCH),
+        # Nothing but zeros, which is a ratio of exactly zero and no error at all.
+        (np.zeros(5), SCRATCH),
+    ],
+    ids=["undefined", "overflow", "two seeds", "one arm without spread", "some zeros", "all zeros"],
+)
+def test_resamples_that_say_nothing_are_not_dropped(
+    arm: NDArray[np.float64], scratch: NDArray[np.float64]
+) -> None:
+    """Once they may fill a tail there is no interval; the point and a reason remain."""
+    estimate = ratio(arm, scratch)
+    assert estimate.value == pytest.approx(arm.mean() / scratch.mean())
     assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
     assert "resamples" in estimate.note
-
-
-def test_degenerate_bca_is_noticed() -> None:
-    """Two resamples on one side of the value: a reason instead of a number or a warning."""
-    estimate = estimate_ratio(quotient, ARM, SCRATCH, rng=np.random.default_rng(0), n_resamples=2)
-    assert estimate.value == pytest.approx(1.0 / 0.55)
-    assert estimate.low is None
-    assert "BCa is undefined" in estimate.note
 
 
 @pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
@@ -129,13 +184,15 @@ def test_confidence_is_a_share(confidence: float) -> None:
     with pytest.raises(StudyError, match=r"such as 0\.95"):
         estimate_difference(ARM, SCRATCH, confidence=confidence)
     with pytest.raises(StudyError, match=r"such as 0\.95"):
-        estimate_ratio(quotient, ARM, SCRATCH, rng=np.random.default_rng(0), confidence=confidence)
+        ratio(ARM, SCRATCH, confidence=confidence)
 
 
-def test_one_resample_is_no_bootstrap() -> None:
-    """The fewest that have a spread are two."""
-    with pytest.raises(StudyError, match="at least two resamples, got 1"):
-        estimate_ratio(quotient, ARM, SCRATCH, rng=np.random.default_rng(0), n_resamples=1)
+@pytest.mark.parametrize(("confidence", "fewest"), [(0.9, 20), (0.95, 40), (0.99, 200)])
+def test_each_tail_needs_a_resample(confidence: float, fewest: int) -> None:
+    """Fewer cannot tell how far out the tail is."""
+    assert ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest).value is not None
+    with pytest.raises(StudyError, match=f"at least {fewest} resamples, got {fewest - 1}"):
+        ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest - 1)
 
 
 def test_estimates_survive_json() -> None:

@@ -38,7 +38,7 @@ def test_jumpstart() -> None:
     """0.4 - 0.1 at the first evaluation, and Welch's interval around it."""
     estimate = jumpstart(ARM, SCRATCH)
     assert estimate.value == pytest.approx(0.3)
-    assert estimate.method == "welch"
+    assert estimate.method == "Welch's t"
     assert estimate.low is not None
     assert estimate.low < 0.3
 
@@ -90,10 +90,14 @@ def test_total_reward_gain_in_total_steps() -> None:
 
 
 def test_auc_ratio() -> None:
-    """30 over 16.5, and a BCa interval around it."""
-    estimate = ratio(ARM, SCRATCH)
-    assert estimate.value == pytest.approx(30.0 / 16.5)
-    assert estimate.method == "bca"
+    """30 over 16.5, and a bootstrap interval around it once there are seeds enough."""
+    assert ratio(ARM, SCRATCH).value == pytest.approx(30.0 / 16.5)
+    twice = [LearningCurves(STEPS, np.tile(c.returns, (2, 1))) for c in (ARM, SCRATCH)]
+    estimate = ratio(*twice)
+    assert estimate.method == "studentised bootstrap"
+    assert estimate.low is not None
+    assert estimate.high is not None
+    assert estimate.low < 30.0 / 16.5 < estimate.high
 
 
 def test_auc_ratio_in_total_steps() -> None:
@@ -123,7 +127,7 @@ def test_zero_shot_has_a_start_and_an_end() -> None:
     assert (
         end.note == "The arm is not trained on the target: its one evaluation stands for its end."
     )
-    assert end.method == "welch"
+    assert end.method == "Welch's t"
 
 
 def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:

@@ -55,7 +55,7 @@ def test_no_seed_is_dropped() -> None:
     assert times.arm == ReachTimes(fraction=0.75, restricted_mean=18.75, restricted_median=5.0)
     assert times.scratch == ReachTimes(fraction=0.5, restricted_mean=40.0, restricted_median=40.0)
     assert times.steps_saved.value == pytest.approx(21.25)
-    assert times.steps_saved.method == "welch"
+    assert times.steps_saved.method == "Welch's t"
 
 
 def test_median_is_unknown_if_most_never_arrive() -> None:

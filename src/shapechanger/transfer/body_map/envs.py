@@ -84,6 +84,7 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
     Args:
         env: The target env.
         body_map: How the bodies correspond; as JSON too, so that a spec can be written down.
+            Gymnasium cannot write down a spec that holds spaces.
         observation_space: The source's, shape (source_observation.size,); by default a float64
             box with the ranges of its layout.
         action_space: The source's, shape (source_action.size,); by default a float32 box.

@@ -89,7 +89,7 @@ class Gather:
         dtype = np.result_type(given.dtype, np.float32)
         filled = np.empty((*given.shape[:-1], self.offset.size), dtype)
         filled[...] = self.offset
-        filled[..., self.rows] = given[..., self.columns] * self.scale.astype(dtype)
+        filled[..., self.rows] = given[..., self.columns] * self.scale
         return filled
 
     def matrix(self) -> NDArray[np.float64]:

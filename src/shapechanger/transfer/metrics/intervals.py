@@ -136,7 +136,7 @@ def estimate_ratio(
     ratio, error = (float(number) for number in _ratio(arm, scratch))
     arms = rng.choice(arm, (n_resamples, arm.size))
     scratches = rng.choice(scratch, (n_resamples, scratch.size))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ratios, errors = _ratio(arms, scratches)
         t = (ratios - ratio) / errors
     usable = (scratches.mean(axis=-1) >= least) & (_spread(arms) | _spread(scratches))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from shapechanger.transfer.evaluation import Evaluation
 from shapechanger.transfer.plan import RunKind
-from shapechanger.transfer.report.numbers import number
+from shapechanger.transfer.report.numbers import list_text, number
 from shapechanger.transfer.report.spread import spread_text
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
@@ -74,7 +74,7 @@ def _row(study: Study, kind: RunKind) -> ArmRow:
         final_return=spread_text(at_the_end),
         length=number(float(np.mean([e.mean_length for e in ends]))),
         good=_good(study, kind),
-        per_seed="; ".join(number(float(value)) for value in at_the_end),
+        per_seed=list_text([float(value) for value in at_the_end]),
         terms=_terms(ends),
     )
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra
 from shapechanger.transfer.plan import RunKind
-from shapechanger.transfer.report.numbers import number
 from shapechanger.transfer.report.spread import t_interval
 from shapechanger.transfer.study import Study
 
@@ -95,14 +94,15 @@ def _draw(axes: Axes, study: Study, source_steps: float) -> None:
     _level(axes, study, "random", 0.0, source_steps + last)
     if source_steps:
         axes.axvline(source_steps, color="#999999", linewidth=0.8)
+        early = source_steps < last
         axes.text(
             source_steps,
-            1.0,
-            " source ends",
+            0.99,
+            " source ends ",
             color="#555555",
             fontsize=9.0,
-            va="bottom",
-            ha="center",
+            va="top",
+            ha="left" if early else "right",
             transform=axes.get_xaxis_transform(),
         )
     for arm in study.plan.arms:
@@ -166,4 +166,4 @@ def _heights(study: Study) -> tuple[float, float]:
 
 def _return_text(value: float, place: int | None) -> str:
     """The label of a tick; `place` is matplotlib's."""
-    return number(value)
+    return f"{value:,.10g}".replace("e+", "e")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from shapechanger.transfer.metrics import Estimate
 
-__all__ = ["count", "estimate_text", "interval_text", "number"]
+__all__ = ["UNDEFINED", "count", "estimate_text", "interval_text", "list_text", "number"]
+
+UNDEFINED: Final = "undefined"
 
 # From here on thousands separators make a number longer than its powers of ten.
 _HUGE: Final = 1e10
@@ -54,10 +57,16 @@ def interval_text(value: float, low: float, high: float, *, signed: bool = False
 def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
     """An estimate in one line, whether it has a value and an interval or not."""
     if estimate.value is None:
-        return "undefined"
+        return UNDEFINED
     if estimate.low is None or estimate.high is None:
         return f"{number(estimate.value, signed=signed)} (no interval)"
     return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
+
+
+def list_text(values: Sequence[float]) -> str:
+    """Several numbers with the same digits after the point, enough to tell them apart."""
+    decimals = _decimals(max(values) - min(values), 3)
+    return "; ".join(number(value, decimals) for value in values)
 
 
 def _decimals(size: float, significant: int) -> int:

@@ -41,8 +41,8 @@ _PAGE: Final = """\
 _CURVES_NOTE: Final = (
     "A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over "
     "seeds, cut off at the edges of the picture. A level is that of a policy that is not trained "
-    "on the target. On the right everything that comes from the source starts after its source "
-    "steps."
+    "on the target. Counted in total steps, everything that comes from the source starts after its "
+    "source steps."
 )
 
 
@@ -115,8 +115,8 @@ def _bodies(study: Study, pictures: Pictures | None, note: str) -> Html:
         _figure(
             png_uri(picture),
             f"The body of {env}",
-            f"{side}: {evidence.short_name(env)}, {observation.size} observations, "
-            f"{action.size} actions",
+            f"{side}: {evidence.short_name(env)}, {_counted(observation.size, 'observation')}, "
+            f"{_counted(action.size, 'action')}",
         )
         for picture, (side, env, observation, action) in zip(pictures, names, strict=True)
     ]
@@ -146,3 +146,8 @@ def _curves(study: Study) -> Html:
 def _figure(source: str, alternative: str, caption: str) -> Html:
     image = Html(f'<img src="{text(source)}" alt="{text(alternative)}">')
     return element("figure", image, element("figcaption", text(caption)))
+
+
+def _counted(number: int, what: str) -> str:
+    """As in `1 action` and `2 actions`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -16,7 +16,7 @@ from shapechanger.transfer.report.markup import (
     table,
     text,
 )
-from shapechanger.transfer.report.numbers import count, number
+from shapechanger.transfer.report.numbers import UNDEFINED, count, number
 from shapechanger.transfer.report.table import Row, measure_rows
 from shapechanger.transfer.report.verdict import caveats
 from shapechanger.transfer.report.words import (
@@ -35,8 +35,9 @@ _HEADLINE: Final = (TOTAL_REWARD_GAIN, JUMPSTART, ASYMPTOTIC_GAIN)
 _INTERVALS: Final = (
     "Intervals are over training seeds, never over episodes: the episodes of one run share a "
     "policy, and counting them as independent would make every interval too narrow. Arms are not "
-    "paired. Differences have Welch's t-interval; auc_ratio and forward transfer have a BCa "
-    "bootstrap interval, for which the seeds of both arms are drawn again apart."
+    "paired. Differences have Welch's t-interval (Biometrika 34, 1947); auc_ratio and forward "
+    "transfer have a studentised bootstrap interval, for which the seeds of both arms are drawn "
+    "again apart (Efron & Tibshirani, An Introduction to the Bootstrap, 1993)."
 )
 
 
@@ -46,13 +47,14 @@ def headline(study: Study) -> Html:
     rows = [row for row in measure_rows(study) if row.arm == arm]
     wanted = [row for name in _HEADLINE for row in rows if row.measure == name]
     wanted += [row for row in rows if row.measure.startswith(TIME_TO_THRESHOLD)][-1:]
-    cards = [_card(row) for row in wanted if row.target != "undefined"]
+    cards = [_card(row) for row in wanted if row.target != UNDEFINED]
     return joined(
         (
             element("div", *cards, class_="cards"),
             paragraph(
-                f"{arm.capitalize()} against scratch, estimate [95 % interval over seeds]; counted "
-                "in target steps, and below that in total steps.",
+                f"{arm.capitalize()} against scratch, {study.plan.seeds} seeds each: estimate "
+                "[95 % interval over seeds], counted in target steps, and below that in total "
+                "steps.",
                 class_="note",
             ),
         )
@@ -62,17 +64,15 @@ def headline(study: Study) -> Html:
 def measures(study: Study) -> Html:
     """Every measure, what it means, and how the intervals are made."""
     rows = measure_rows(study)
-    told = {row.note: None for row in rows if row.note and _arms_with(rows, row.note) > 0}
-    marks = {note: str(place) for place, note in enumerate(told, start=1)}
+    defined = [row for row in rows if _defined(row)]
+    notes = {row.note: None for row in defined if row.note}
+    marks = {note: f"({place})" for place, note in enumerate(notes, start=1)}
+    items = (element("li", text(note)) for note in notes)
     summary = next(iter(study.summaries.values()))
     return joined(
         (
             *(_measure_table(arm, rows, marks) for arm in study.summaries),
-            element(
-                "ol",
-                *(element("li", text(note)) for note in marks),
-                class_="notes",
-            ),
+            *([element("ol", *items, class_="notes")] if notes else []),
             element("h3", text("What the measures say")),
             pairs((name, text(words)) for name, words in EXPLANATIONS.items()),
             element("h3", text("How to read the numbers")),
@@ -119,26 +119,45 @@ def _card(row: Row) -> Html:
     )
 
 
-def _arms_with(rows: tuple[Row, ...], note: str) -> int:
-    return sum(row.note == note for row in rows)
+def _defined(row: Row) -> bool:
+    """Whether a row holds any number."""
+    return {row.target, row.total} != {UNDEFINED}
+
+
+def _estimate(words: str) -> Html:
+    """An estimate, broken into two lines before its interval if at all."""
+    value, bracket, interval = words.partition(" [")
+    parts = (value, f"[{interval}") if bracket else (value,)
+    numbers = joined(element("span", text(part), class_="number") for part in parts)
+    return element("span", numbers)
 
 
 def _measure_table(arm: Arm, rows: tuple[Row, ...], marks: dict[str, str]) -> Html:
-    """The measures of one arm, with the marks of their notes."""
-    cells = [
-        (
-            text(row.measure),
-            element("span", text(row.target), class_="number"),
-            element("span", text(row.total), class_="number"),
-            text(row.unit),
-            text(row.method),
-            text(f"({marks[row.note]})" if row.note else ""),
-        )
-        for row in rows
-        if row.arm == arm
-    ]
+    """The measures of one arm with the marks of their notes; below, what is undefined and why."""
+    cells: list[tuple[Html, ...]] = []
+    undefined: dict[str, list[str]] = {}
+    for row in rows:
+        if row.arm == arm and _defined(row):
+            cells.append(
+                (
+                    text(row.measure),
+                    _estimate(row.target),
+                    _estimate(row.total),
+                    text(row.unit),
+                    text(row.method),
+                    text(marks.get(row.note, "")),
+                )
+            )
+        elif row.arm == arm:
+            undefined.setdefault(row.note, []).append(row.measure)
     header = ("Measure", "In target steps", "In total steps", "Unit", "Interval", "Note")
-    return table(f"{arm.capitalize()} against scratch", header, cells)
+    reasons = (f"{'; '.join(names)}. {note}" for note, names in undefined.items())
+    return joined(
+        (
+            table(f"{arm.capitalize()} against scratch", header, cells),
+            *(paragraph(reason, class_="note") for reason in reasons),
+        )
+    )
 
 
 def _scale(summary: Summary) -> str:
@@ -164,8 +183,8 @@ def _arm_cells(row: ArmRow) -> tuple[Html, ...]:
     return (
         text(name.get(row.kind, row.kind)),
         text(str(row.seeds)),
-        element("span", text(row.first_return), class_="number"),
-        element("span", text(row.final_return), class_="number"),
+        _estimate(row.first_return),
+        _estimate(row.final_return),
         text(row.length),
         text(row.good or "not measured"),
         text(row.per_seed),
@@ -199,7 +218,7 @@ def _terms(rows: tuple[ArmRow, ...]) -> list[Html]:
     return [
         table("Reward terms: mean sum over a final episode", header, cells),
         paragraph(
-            "The terms add up to the return. A body that merely stays upright shows here: it "
+            "Terms as the env reports them. A body that merely stays upright shows here: it "
             "collects what it gets for surviving and nothing for moving.",
             class_="note",
         ),

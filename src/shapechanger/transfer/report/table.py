@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from shapechanger.transfer.metrics import Estimate, Measures, ReachTimes, Summary, TimeToThreshold
 from shapechanger.transfer.plan import Arm
@@ -20,8 +20,6 @@ from shapechanger.transfer.study import Study
 
 __all__ = ["Row", "measure_rows"]
 
-_METHODS: Final = {"welch": "Welch", "bca": "BCa", "none": "none"}
-
 
 class Row(NamedTuple):
     """One measure of one arm against scratch, in both ways of counting.
@@ -32,7 +30,7 @@ class Row(NamedTuple):
         unit: "score", "return", "steps" or "pure number".
         target: Value and interval, counted in target steps.
         total: Value and interval, counted in total steps.
-        method: How the intervals were made: "Welch", "BCa" or "none"; both, where they differ.
+        method: How the intervals were made, in words, or "none"; both ways, where they differ.
         note: What a reader must know; empty if nothing.
     """
 
@@ -95,7 +93,7 @@ def _row(
     arm: Arm, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
 ) -> Row:
     """One row, with what both ways of counting share told once."""
-    methods = [_METHODS[estimate.method] for estimate in (target, total)]
+    methods = [estimate.method for estimate in (target, total)]
     return Row(
         arm=arm,
         measure=measure,
@@ -121,15 +119,16 @@ def _reached(
     """How many seeds reached a threshold, and how soon; empty where that is undefined."""
     if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
         return ""
-    times = (
-        (f"{arm} {_seeds(in_target.arm, summary.n_seeds_arm)}", in_target.arm),
-        (f"in total steps {_seeds(in_total.arm, summary.n_seeds_arm)}", in_total.arm),
-        (f"scratch {_seeds(in_target.scratch, summary.n_seeds_scratch)}", in_target.scratch),
-    )
-    told = "; ".join(f"{who}, mean {count(reach.restricted_mean)} steps" for who, reach in times)
-    missed = any(reach.fraction < 1.0 for _, reach in times)
+    reaches = (in_target.arm, in_total.arm, in_target.scratch)
+    missed = any(reach.fraction < 1.0 for reach in reaches)
     censored = f" Runs that did not get there count as {count(summary.horizon)}." if missed else ""
-    return f"Reached by {told}.{censored}"
+    return (
+        f"Reached by {_seeds(in_target.arm, summary.n_seeds_arm)} of {arm} after a mean of "
+        f"{count(in_target.arm.restricted_mean)} steps; in total steps by "
+        f"{_seeds(in_total.arm, summary.n_seeds_arm)} after {count(in_total.arm.restricted_mean)}; "
+        f"by {_seeds(in_target.scratch, summary.n_seeds_scratch)} of scratch after "
+        f"{count(in_target.scratch.restricted_mean)}.{censored}"
+    )
 
 
 def _seeds(reach: ReachTimes, n_seeds: int) -> str:

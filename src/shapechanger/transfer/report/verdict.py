@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple
 
 from shapechanger.transfer.metrics import Estimate, Measures, Summary, estimate_difference
@@ -53,13 +52,14 @@ def verdict(study: Study) -> str:
     """
     if "fine-tune" in study.summaries:
         summary = study.summaries["fine-tune"]
-        sentences = [_trained(summary, total=False), _trained(summary, total=True)]
+        sentences = [_in_target_steps(summary), _in_total_steps(summary)]
     else:
         sentences = _untrained(study.summaries["zero-shot"])
     if direction(scratch_gain(study)) != "up":
         sentences.append(
             f"Scratch itself did not clearly learn: it ended at {_end(study, 'scratch')}, and the "
-            f"random policy is worth {_end(study, 'random')}, so the comparison means little."
+            f"random policy is worth {_end(study, 'random')}, so the comparison means little: "
+            "try more target steps."
         )
     return " ".join(sentences)
 
@@ -81,20 +81,22 @@ def caveats(study: Study) -> tuple[str, ...]:
     """What a reader must not make of the numbers, one sentence or two each."""
     summary = next(iter(study.summaries.values()))
     source, budget = count(summary.source_steps), count(summary.horizon)
-    told = [
-        f"In total steps the budget stays {budget}: an arm is worth what the random policy is "
-        f"until its {source} source steps have passed."
-    ]
+    told: list[str] = []
     if source_takes_all(summary):
-        told = [
+        told.append(
             f"The source has cost {source} steps and the budget is {budget}, so in total steps "
             "nothing is left for the target: there only the jumpstart says something, and the "
             "other measures compare the random policy with scratch."
-        ]
+        )
+    elif summary.source_steps > 0.0:
+        told.append(
+            f"In total steps the budget stays {budget}: an arm is worth what the random policy is "
+            f"until its {source} source steps have passed."
+        )
     if study.plan.source_policy:
         told.append(
-            "All runs start from the one source policy that was brought along: the intervals say "
-            "nothing about another policy of the same source."
+            "All runs of zero-shot and fine-tune start from the one source policy that was brought "
+            "along: the intervals say nothing about another policy of the same source."
         )
     if study.plan.seeds < _FEW_SEEDS:
         told.append(
@@ -104,32 +106,40 @@ def caveats(study: Study) -> tuple[str, ...]:
     return tuple(told)
 
 
-def _trained(summary: Summary, *, total: bool) -> str:
-    """The sentence on fine-tune in one way of counting."""
-    if total and source_takes_all(summary):
+def _in_target_steps(summary: Summary) -> str:
+    """The sentence on fine-tune, counted in target steps."""
+    findings = _findings(summary.in_target_steps, summary.unit)
+    towards = direction(findings[0].estimate)
+    against = {"up": "down", "down": "up", "unclear": ""}[towards]
+    text = f"Counted in target steps, transfer {_TRANSFER[towards]}: fine-tune {findings[0].text}"
+    for finding in findings[1:]:
+        link = " and" if finding is findings[-1] else ","
+        text += f"{', but' if direction(finding.estimate) == against else link} {finding.text}"
+    return f"{text}."
+
+
+def _in_total_steps(summary: Summary) -> str:
+    """The sentence on fine-tune, counted in total steps."""
+    if source_takes_all(summary):
         return _nothing_left(summary)
-    measures = summary.in_total_steps if total else summary.in_target_steps
-    counted = (
-        f"Counted in total steps, with {count(summary.source_steps)} source steps in the budget,"
-        if total
-        else "Counted in target steps,"
+    gain = summary.in_total_steps.total_reward_gain
+    return (
+        f"Counted in total steps, {count(summary.source_steps)} of which go to the source, it "
+        f"{_TRANSFER[direction(gain)]} (total reward gain {estimate_text(gain, signed=True)}, "
+        f"{summary.unit})."
     )
-    deciding, *others = _findings(measures, summary.unit)
-    towards = direction(deciding.estimate)
-    return f"{counted} transfer {_TRANSFER[towards]}: {_joined(towards, (deciding, *others))}."
 
 
 def _findings(measures: Measures, unit: str) -> list[_Finding]:
-    """What the three measures of the verdict say; the first one decides."""
+    """What the three measures of the verdict say of fine-tune; the first one decides."""
     gain, end = measures.total_reward_gain, measures.asymptotic_gain
-    last = measures.times_to_threshold[-1] if measures.times_to_threshold else None
     found = [
         _Finding(
             {
-                "up": "fine-tune earned more than scratch over its whole learning curve",
-                "down": "fine-tune earned less than scratch over its whole learning curve",
-                "unclear": "fine-tune earned neither clearly more nor clearly less than scratch "
-                "over its whole learning curve",
+                "up": "earned more than scratch over the whole of its learning curve",
+                "down": "earned less than scratch over the whole of its learning curve",
+                "unclear": "earned neither clearly more nor clearly less than scratch over the "
+                "whole of its learning curve",
             },
             gain,
             f"total reward gain {estimate_text(gain, signed=True)}, {unit}",
@@ -144,30 +154,21 @@ def _findings(measures: Measures, unit: str) -> list[_Finding]:
             f"asymptotic gain {estimate_text(end, signed=True)}, {unit}",
         ),
     ]
+    last = measures.times_to_threshold[-1] if measures.times_to_threshold else None
     if last is not None and last.steps_saved.value is not None:
-        score = f"came to the score {last.threshold:g}"
+        reached = f"reached the score {last.threshold:g}"
         found.append(
             _Finding(
                 {
-                    "up": f"{score} sooner",
-                    "down": f"{score} later",
-                    "unclear": f"{score} neither clearly sooner nor clearly later",
+                    "up": f"{reached} sooner",
+                    "down": f"{reached} later",
+                    "unclear": f"{reached} neither clearly sooner nor clearly later",
                 },
                 last.steps_saved,
                 f"{estimate_text(last.steps_saved, signed=True)} steps saved",
             )
         )
     return found
-
-
-def _joined(towards: Direction, findings: Sequence[_Finding]) -> str:
-    """The findings as one clause; what goes the other way is joined by "but"."""
-    against = {"up": "down", "down": "up", "unclear": ""}[towards]
-    text = findings[0].text
-    for finding in findings[1:]:
-        link = "but" if direction(finding.estimate) == against else "and"
-        text += f", {link} it {finding.text}"
-    return text
 
 
 def _nothing_left(summary: Summary) -> str:
@@ -191,6 +192,11 @@ def _untrained(summary: Summary) -> list[str]:
     measures, unit = summary.in_target_steps, summary.unit
     start, end = measures.jumpstart, measures.asymptotic_gain
     late = summary.in_total_steps.jumpstart
+    when = (
+        f"at its end, though the source has cost {count(summary.source_steps)} steps"
+        if source_takes_all(summary)
+        else f"after {count(summary.source_steps)} steps, as many as the source has cost"
+    )
     better = {"up": "better than", "down": "worse than", "unclear": "not clearly different from"}
     return [
         f"Counted in target steps, transfer {_TRANSFER[direction(start)]} at the start: the moved "
@@ -198,9 +204,8 @@ def _untrained(summary: Summary) -> list[str]:
         f"one (jumpstart {estimate_text(start, signed=True)}, {unit}) and "
         f"{better[direction(end)]} what scratch ends with (asymptotic gain "
         f"{estimate_text(end, signed=True)}, {unit}).",
-        f"Counted in total steps, it is {better[direction(late)]} what scratch has come to after "
-        f"as many steps as the source has cost, {count(summary.source_steps)}, or at its end if "
-        f"that is sooner (jumpstart {estimate_text(late, signed=True)}, {unit}).",
+        f"Counted in total steps, it is {better[direction(late)]} scratch {when} "
+        f"(jumpstart {estimate_text(late, signed=True)}, {unit}).",
     ]
 
 

@@ -183,8 +183,8 @@ def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: Outputs, judged: Affi
         ),
         np.concatenate([sensed.offset, judged.offset]),
     )
-    for name, critic in (("critic", policy.critic), ("critic_target", policy.critic_target)):
-        for index, network in enumerate(critic.q_networks):
+    for index, network in enumerate(policy.critic.q_networks):
+        for name in ("critic", "critic_target"):
             for layer in first_linear(network, f"{name}.qf{index}"):
                 edges.inputs[layer] = both
     return edges

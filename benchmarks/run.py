@@ -1,0 +1,163 @@
+"""Measure every number that Shapechanger promises, beside what it promised.
+
+`make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times of
+the machine are the best of several rounds, with the spread; compare ratios, not milliseconds, between
+machines.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import mujoco
+from gymnasium.envs.mujoco.mujoco_env import expand_model_path
+from rich.console import Console
+from rich.table import Table
+
+from shapechanger.embodiments.ant import ANT
+from shapechanger.morphology import compile_body
+from shapechanger.morphology.fingerprint import fingerprint
+
+RESULTS = Path(__file__).parent / "results"
+ROUNDS = 30
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number beside what was promised.
+
+    Attributes:
+        name: What was measured.
+        value: What came out.
+        spread: How far the rounds lay apart, or what else the number needs to be read.
+        target: What was promised.
+        met: Whether it was kept.
+    """
+
+    name: str
+    value: str
+    spread: str
+    target: str
+    met: bool
+
+
+def times_ms(work: Callable[[], object]) -> list[float]:
+    """Milliseconds of each round, sorted."""
+    work()
+    times: list[float] = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        work()
+        times.append(1e3 * (time.perf_counter() - began))
+    return sorted(times)
+
+
+def timed_row(name: str, work: Callable[[], object], limit_ms: float) -> Row:
+    """A row for something that may take so many milliseconds."""
+    times = times_ms(work)
+    median = times[len(times) // 2]
+    spread = f"{times[0]:.2f} to {times[-1]:.2f} ms in {ROUNDS} rounds"
+    return Row(name, f"{median:.2f} ms", spread, f"< {limit_ms:g} ms", median < limit_ms)
+
+
+def bodies() -> list[Row]:
+    """Edits and compilation."""
+    ant_xml = expand_model_path("ant.xml")
+    spec = ANT.load(ant_xml)
+    rows = [
+        timed_row(
+            f"edit and compile {name}",
+            lambda body=body: compile_body(spec, body),
+            10.0,
+        )
+        for name, body in ANT.bodies.items()
+    ]
+    bare = times_ms(lambda: mujoco.MjModel.from_xml_path(ant_xml))
+    whole = times_ms(lambda: compile_body(ANT.load(ant_xml), ANT.bodies["ExtendedAnt"]))
+    ratio = whole[0] / bare[0]
+    rows.append(
+        Row(
+            "load, edit and compile ExtendedAnt, over loading ant.xml",
+            f"{ratio:.2f}x",
+            f"best of {ROUNDS} rounds each",
+            "< 6x",
+            ratio < 6.0,
+        )
+    )
+    model = compile_body(spec)
+    rows.append(timed_row("fingerprint of Ant", lambda: fingerprint(model), 20.0))
+    return rows
+
+
+def demo() -> list[Row]:
+    """The demo as a user runs it."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "demo"
+        command = ["shapechanger", "transfer", "InvertedPendulum", "BigInvertedPendulum"]
+        call = f"import sys; sys.argv = {command!r} + ['--out', {str(out)!r}]; "
+        began = time.monotonic()
+        subprocess.run(
+            [sys.executable, "-c", call + "from shapechanger.cli import main; main()"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        took = time.monotonic() - began
+        study = json.loads((out / "study.json").read_text())
+    finals = [
+        run["curve"][-1]["mean_return"] for run in study["runs"] if run["run"]["kind"] == "scratch"
+    ]
+    solved = sum(final >= 900.0 for final in finals)
+    ends = ", ".join(f"{final:.0f}" for final in finals)
+    gain = study["summaries"]["fine-tune"]["in_target_steps"]["total_reward_gain"]
+    return [
+        Row("make demo, 5 seeds an arm", f"{took:.0f} s", "one round", "< 180 s", took < 180.0),
+        Row("scratch reaches 900", f"{solved} of {len(finals)} seeds", ends, "4 of 5", solved >= 4),
+        Row(
+            "demo: total reward gain of fine-tune, score",
+            f"{gain['value']:+.2f}",
+            f"[{gain['low']:+.2f}, {gain['high']:+.2f}]",
+            "none: whatever comes out",
+            True,
+        ),
+    ]
+
+
+SUITES: dict[str, Callable[[], list[Row]]] = {"bodies": bodies, "demo": demo}
+
+
+def main() -> None:
+    """Run the suites named on the command line, or all."""
+    names = sys.argv[1:] or list(SUITES)
+    table = Table("measured", "value", "spread", "target", "met", box=None)
+    for name in names:
+        rows = SUITES[name]()
+        for row in rows:
+            table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
+        RESULTS.mkdir(exist_ok=True)
+        facts = {
+            "command": f"python benchmarks/run.py {name}",
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "python": platform.python_version(),
+            "versions": {
+                package: version(package)
+                for package in ("shapechanger", "mujoco", "gymnasium", "torch")
+            },
+            "rows": [asdict(row) for row in rows],
+        }
+        (RESULTS / f"{name}.json").write_text(json.dumps(facts, indent=1) + "\n")
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

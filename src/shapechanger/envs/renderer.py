@@ -1,0 +1,46 @@
+"""Gymnasium's renderer, with others drawing in the same process."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any, cast
+
+from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
+
+__all__ = ["Renderer"]
+
+
+class Renderer(MujocoRenderer):
+    """A renderer that touches what it drew itself, and nothing else.
+
+    OpenGL draws into, and deletes from, whichever context is current. Gymnasium makes a context
+    current only when it is new: with two of them one draws black frames, and closing one deletes
+    the textures of the other. It also shuts GLFW down, and all windows with it.
+    """
+
+    _viewers: dict[str, OffScreenViewer | WindowViewer]
+
+    def __init__(self, *arguments: Any, **more: Any) -> None:
+        super().__init__(*arguments, **more)  # pyright: ignore[reportUnknownMemberType]
+        # An env that is dropped without being closed must not take the pictures of another along.
+        weakref.finalize(self, _free, self._viewers).atexit = False
+
+    def render(self, render_mode: str | None) -> Any:
+        """A frame of `render_mode`, as Gymnasium's renderer draws it."""
+        if self.viewer is not None:
+            self.viewer.make_context_current()
+        return cast("Any", super().render(render_mode))
+
+    def close(self) -> None:
+        """Free the contexts; the next frame is drawn in a new one."""
+        self.viewer = None
+        _free(self._viewers)
+
+
+def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
+    """Free each viewer's part of OpenGL, and then its context."""
+    while viewers:
+        _, viewer = viewers.popitem()
+        viewer.make_context_current()
+        viewer.con.free()
+        viewer.free()

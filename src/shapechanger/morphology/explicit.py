@@ -1,0 +1,112 @@
+"""What a model says indirectly, said outright: names, frames and a total mass.
+
+Edits change numbers in place. A name that is missing cannot be asked for, a pose that is seen from
+a frame has other axes than its body, and a total mass that the compiler restores undoes any change.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology.elements import limbs_and_trunks, name_elements
+from shapechanger.morphology.geoms import Array, has_ends, orientation, rotation
+from shapechanger.morphology.segments import scale_mass
+
+__all__ = ["make_explicit", "resolve_frames"]
+
+_UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
+
+
+def make_explicit(spec: mujoco.MjSpec) -> None:
+    """Name every element, and write out frames and a total mass, in place; the physics stays.
+
+    Raises:
+        MorphologyError: If a frame scales what it holds.
+    """
+    name_elements(spec)
+    resolve_frames(spec)
+    if spec.compiler.settotalmass > 0.0:
+        total = spec.compiler.settotalmass
+        spec.compiler.settotalmass = -1.0
+        factor = total / float(spec.copy().compile().body_mass.sum())
+        for body in limbs_and_trunks(spec):
+            scale_mass(body, factor)
+
+
+def resolve_frames(spec: mujoco.MjSpec) -> None:
+    """Write every pose as seen from its body, and let the frames be where their bodies are.
+
+    Raises:
+        MorphologyError: If a frame scales what it holds.
+    """
+    frames = [frame for frame in spec.frames if not _is_trivial(frame)]
+    if not frames:
+        return
+    for frame in frames:
+        if np.any(frame.scale != 1.0) or frame.massscale:
+            raise MorphologyError(
+                f"The frame {frame.name!r} scales what it holds: write the sizes out instead."
+            )
+    for body in limbs_and_trunks(spec):
+        _resolve(spec, body)
+    for element in (*spec.geoms, *spec.sites, *spec.cameras):
+        _resolve(spec, element)
+    for joint in spec.joints:
+        turn, shift = _pose_of_frames(spec, joint.frame)
+        joint.pos = shift + rotation(turn) @ joint.pos
+        joint.axis = rotation(turn) @ joint.axis
+    for light in spec.lights:
+        turn, shift = _pose_of_frames(spec, light.frame)
+        light.pos = shift + rotation(turn) @ light.pos
+        light.dir = rotation(turn) @ light.dir
+    for frame in frames:
+        frame.pos = np.zeros(3)
+        frame.quat = _UPRIGHT
+        frame.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _is_trivial(frame: mujoco.MjsFrame) -> bool:
+    """Whether a frame changes nothing."""
+    return (
+        not np.any(frame.pos)
+        and tuple(frame.quat) == _UPRIGHT
+        and frame.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+        and bool(np.all(frame.scale == 1.0))
+        and not frame.massscale
+    )
+
+
+def _resolve(
+    spec: mujoco.MjSpec,
+    element: mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera,
+) -> None:
+    """Write an element's pose as seen from its body."""
+    if element.frame is None:
+        return
+    turn, shift = _pose_of_frames(spec, element.frame)
+    if isinstance(element, mujoco.MjsGeom | mujoco.MjsSite) and has_ends(element):
+        ends = element.fromto.reshape(2, 3)
+        element.fromto = (shift + ends @ rotation(turn).T).ravel()
+        return
+    element.pos = shift + rotation(turn) @ element.pos
+    turned = np.empty(4)
+    mujoco.mju_mulQuat(turned, turn, orientation(spec, element))
+    element.quat = turned
+    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> tuple[Array, Array]:
+    """Quaternion (w, x, y, z) and position, m, of a frame and those around it, in the body's."""
+    turn, shift = np.array(_UPRIGHT), np.zeros(3)
+    while frame is not None:
+        around = orientation(spec, frame)
+        shift = frame.pos + rotation(around) @ shift
+        inner = turn
+        turn = np.empty(4)
+        mujoco.mju_mulQuat(turn, around, inner)
+        frame = frame.frame
+    return turn, shift

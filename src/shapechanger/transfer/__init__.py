@@ -1,0 +1,23 @@
+"""Moving a skill from one body to another, and measuring what the move was worth.
+
+Here are the parts that need no learner. `shapechanger.transfer.study` runs whole studies,
+`shapechanger.transfer.transplant` moves the weights of a policy; both need the extra `learn`.
+"""
+
+from __future__ import annotations
+
+from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.settings import LEARNERS, LearnerSettings
+
+__all__ = [
+    "LEARNERS",
+    "BodyMap",
+    "EnvRef",
+    "LearnerSettings",
+    "MappedEnv",
+    "Plan",
+    "TransferTask",
+    "layouts_of",
+]

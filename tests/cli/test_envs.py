@@ -1,0 +1,113 @@
+"""`shapechanger envs`: what it prints, and what it says to nonsense."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imageio.v3 as iio
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.envs import CATALOGUE
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What a command prints."""
+    main(arguments)
+    return capsys.readouterr().out
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The one sentence with which a command is refused."""
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    message = capsys.readouterr().err
+    assert "Traceback" not in message
+    return message
+
+
+def test_list_names_every_env(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each id of the catalogue is a line."""
+    text = said(capsys, "envs", "list")
+    assert all(env_id in text for env_id in CATALOGUE)
+
+
+def test_show_prints_the_layout_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    """Names, units, ranges, what each number belongs to and what an action gives."""
+    text = said(capsys, "envs", "show", "BigInvertedPendulum")
+    for word in ("hinge/velocity", "rad/s", "-1.571", "joint slider", "100 N", "slide/motor"):
+        assert word in text
+    text = said(capsys, "envs", "show", "Ant", "--body", "BigAnt")
+    assert "standing height: 0.9467 m" in text
+
+
+def test_compare_says_what_changes(capsys: pytest.CaptureFixture[str]) -> None:
+    """The certificate of the shift, in words and numbers."""
+    text = said(capsys, "envs", "compare", "Ant", "AmputatedAnt")
+    assert "shank_4: length 0.5657 m -> 0.1414 m (x0.25)" in text
+
+
+def test_compare_refuses_a_shift_that_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    """A foot's friction below that of the floor does nothing, and that is said."""
+    body = '[{"edit":"friction","element":"*ankle_geom","scale":0.2}]'
+    message = refused(capsys, "envs", "compare", "Ant", "Ant", "--target-body", body)
+    assert "nothing to transfer across" in message
+
+
+def test_check_goes_through_the_promises(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each promise that is kept is a line."""
+    assert said(capsys, "envs", "check", "SmallInvertedPendulum").count("kept") == 7
+
+
+@pytest.mark.gl
+def test_render_writes_a_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A PNG file of the size asked for."""
+    out = tmp_path / "new" / "ant.png"
+    said(capsys, "envs", "render", "Ant", "--out", str(out), "--width", "160", "--height", "120")
+    assert iio.imread(out).shape == (120, 160, 3)
+
+
+@pytest.mark.gl
+def test_render_refuses_a_place_that_cannot_be_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A file where a folder should be."""
+    (tmp_path / "file").touch()
+    out = str(tmp_path / "file" / "ant.png")
+    assert "Cannot write" in refused(capsys, "envs", "render", "Ant", "--out", out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("show", "BigAmt"), "No environment matches 'BigAmt'. Did you mean 'BigAnt'?"),
+        (("show", "Ant", "--body", "BigAmt"), "Did you mean 'BigAnt'?"),
+        (("show", "Ant", "--body", "[{"), "must be a JSON list of edits"),
+        (("show", "Ant", "--body", '[{"edit":"strech"}]'), "Did you mean 'stretch'?"),
+        (
+            ("show", "Ant", "--body", '[{"edit":"stretch","body":"shank_9","factor":2}]'),
+            "No body matches 'shank_9'. Did you mean",
+        ),
+        (
+            ("show", "Ant", "--body", '[{"edit":"stretch","body":"shank_1","factor":-2}]'),
+            "must be a ratio between 0.01 and 100, got -2",
+        ),
+        (("show", "Ant", "--body", '[{"edit":"remove","body":"torso"}]'), "is the trunk"),
+        (("compare", "Ant", "Cart"), "No environment matches 'Cart'"),
+    ],
+)
+def test_nonsense_gets_one_sentence(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+) -> None:
+    """What exists and the nearest spelling, exit code 2, no traceback."""
+    message = refused(capsys, "envs", *arguments)
+    assert message.startswith("error: ")
+    assert message.count("\n") == 1
+    assert words in message
+
+
+def test_an_unknown_command_lists_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """The commands, and exit code 2."""
+    assert "compare" in refused(capsys, "envs", "shwo")
+    assert "transfer" in refused(capsys, "trasnfer")

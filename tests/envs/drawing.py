@@ -1,0 +1,43 @@
+"""What is there to draw with, and what a test does without it."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from typing import Final, NoReturn
+
+import pytest
+
+__all__ = ["CHOICE", "draws", "missing", "run_python"]
+
+# The variables that decide what draws.
+CHOICE: Final = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
+
+
+def missing(reason: str) -> NoReturn:
+    """Skip the test; but where CI is set everything must be there, so fail."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"{reason}, and on CI nothing may be missing.")
+    pytest.skip(reason)
+
+
+@functools.cache
+def draws(library: str) -> bool:
+    """Whether a context of `egl`, `osmesa` or `glfw` opens here."""
+    script = f"from mujoco.{library} import GLContext; GLContext(16, 16).make_current()"
+    screen = {name: os.environ[name] for name in CHOICE[:2] if name in os.environ}
+    return run_python(script, **screen).returncode == 0
+
+
+def run_python(script: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a script in an interpreter of its own, in which nobody has chosen what draws."""
+    kept = {name: value for name, value in os.environ.items() if name not in CHOICE}
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        env=kept | variables,
+        timeout=120,
+    )

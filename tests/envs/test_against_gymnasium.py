@@ -1,0 +1,120 @@
+"""The body as it is: what Gymnasium's env does, to the last bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+
+
+def _same_info(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
+    assert ours.keys() == theirs.keys()
+    for name, value in theirs.items():
+        np.testing.assert_array_equal(ours[name], value, err_msg=name)
+
+
+def test_the_pendulum_is_gymnasiums() -> None:
+    """The same seed gives the same starts, observations, rewards, ends and infos."""
+    rng = np.random.default_rng(3)
+    ends = 0
+    with (
+        gym.make("shapechanger/InvertedPendulum-v1") as ours,
+        gym.make("InvertedPendulum-v5") as theirs,
+    ):
+        assert ours.action_space == theirs.action_space
+        assert ours.observation_space == theirs.observation_space
+        for seed in range(1, 100):
+            (observation, info), (expected, expected_info) = (
+                env.reset(seed=seed if seed % 2 else None) for env in (ours, theirs)
+            )
+            np.testing.assert_array_equal(observation, expected)
+            _same_info(info, expected_info)
+            over = False
+            while not over:
+                action = rng.uniform(-1.0, 1.0, 1).astype(np.float32)
+                (observation, *rest, info), (expected, *expected_rest, expected_info) = (
+                    env.step(action) for env in (ours, theirs)
+                )
+                np.testing.assert_array_equal(observation, expected)
+                assert rest == expected_rest
+                _same_info(info, expected_info)
+                ends += 1
+                over = rest[1] or rest[2]
+            if ends >= 300:
+                break
+    assert 300 <= ends
+    assert seed > 3
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {},
+        {"exclude_current_positions_from_observation": False, "contact_force_range": (-5.0, 5.0)},
+        {"include_cfrc_ext_in_observation": False, "forward_reward_weight": 2.0, "frame_skip": 2},
+    ],
+    ids=["as it is", "place seen", "contacts unseen"],
+)
+def test_the_ant_steps_like_gymnasiums(arguments: dict[str, Any]) -> None:
+    """From the same state the same actions give the same numbers; names change no physics."""
+    more = arguments | {"healthy_z_range": (0.2, 1.0)}
+    rng = np.random.default_rng(4)
+    with gym.make("shapechanger/Ant-v1", **more) as made, gym.make("Ant-v5", **more) as other:
+        ours: Any = made.unwrapped
+        theirs: Any = other.unwrapped
+        assert ours.action_space == theirs.action_space
+        assert ours.observation_space == theirs.observation_space
+        assert ours.metadata == theirs.metadata
+        ours.reset(seed=0)
+        pose, velocity = ours.data.qpos.copy(), ours.data.qvel.copy()
+        for env in (ours, theirs):
+            # Of an episode the physics remembers more than its state: begin without.
+            mujoco.mj_resetData(env.model, env.data)
+            env.set_state(pose, velocity)
+        for _ in range(100):
+            action = rng.uniform(-1.0, 1.0, 8).astype(np.float32)
+            (observation, *rest, info), (expected, *expected_rest, expected_info) = (
+                env.step(action) for env in (ours, theirs)
+            )
+            np.testing.assert_array_equal(observation, expected)
+            assert rest == expected_rest
+            _same_info(info, expected_info)
+
+
+def test_the_ant_starts_with_gymnasiums_noise() -> None:
+    """The same draws as in Ant-v5 about the start pose, but for what limits and floor forbid."""
+    with gym.make("shapechanger/Ant-v1") as made, gym.make("Ant-v5") as other:
+        ours: Any = made.unwrapped
+        theirs: Any = other.unwrapped
+        for seed in range(10):
+            ours.reset(seed=seed)
+            theirs.reset(seed=seed)
+            np.testing.assert_array_equal(ours.data.qvel, theirs.data.qvel)
+            noise = theirs.data.qpos - theirs.init_qpos
+            drawn = ours.init_qpos + noise
+            np.testing.assert_allclose(ours.data.qpos[:2], drawn[:2], atol=1e-12)
+            hips = [ours.model.joint(f"hip_{leg}").qposadr[0] for leg in (1, 2, 3, 4)]
+            np.testing.assert_allclose(ours.data.qpos[hips], drawn[hips], atol=1e-12)
+            turned = drawn[3:7] / np.linalg.norm(drawn[3:7])
+            np.testing.assert_allclose(ours.data.qpos[3:7], turned, atol=1e-12)
+
+
+def test_the_arguments_are_gymnasiums() -> None:
+    """A reward weight means what it means there."""
+    arguments = {"ctrl_cost_weight": 0.25, "healthy_reward": 3.0, "contact_cost_weight": 0.0}
+    with gym.make("shapechanger/BigAnt-v1", **arguments) as env:
+        env.reset(seed=0)
+        action = np.full(8, 0.5, np.float32)
+        *_, info = env.step(action)
+    assert info["reward_ctrl"] == pytest.approx(-0.25 * 8 * 0.25)
+    assert info["reward_survive"] == 3.0
+    assert info["reward_contact"] == 0.0
+
+
+def test_unknown_arguments_are_refused() -> None:
+    """A misspelt argument must not be swallowed on its way to Gymnasium."""
+    with pytest.raises(TypeError, match="helthy_reward"):
+        gym.make("shapechanger/Ant-v1", helthy_reward=2.0)

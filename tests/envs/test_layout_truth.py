@@ -1,0 +1,333 @@
+"""Each number is what its layout says: move one thing, and see which numbers move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.envs import CATALOGUE
+from shapechanger.layout import Feature
+from shapechanger.morphology import AddLimb, Lock, Split, to_json
+
+_PLACE = {"exclude_current_positions_from_observation": False}
+_NO_CONTACTS = {"include_cfrc_ext_in_observation": False}
+_OTHER_BODY = (
+    AddLimb("aux_1", "_5", 0.8, 0.7),
+    Lock("ankle_3"),
+    Split("shank_2", "shin_2", 0.4, -0.3, 0.6, 55.0),
+)
+_CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    **{env_id.removeprefix("shapechanger/"): (env_id, {}) for env_id in CATALOGUE},
+    "Ant with its place": ("shapechanger/Ant-v1", _PLACE),
+    "BigAnt without contacts": ("shapechanger/BigAnt-v1", _NO_CONTACTS),
+    "ExtendedAnt with place, without contacts": (
+        "shapechanger/ExtendedAnt-v1",
+        _PLACE | _NO_CONTACTS,
+    ),
+    "ExtendedAnt without foot motors": (
+        "shapechanger/ExtendedAnt-v1",
+        {"actuated_extension": False},
+    ),
+    "five legs, a stiff ankle and a shin": (
+        "shapechanger/Ant-v1",
+        {"body": to_json(_OTHER_BODY)} | _PLACE,
+    ),
+}
+_J = mujoco.mjtJoint
+_ONE_NUMBER = {_J.mjJNT_HINGE: "angle", _J.mjJNT_SLIDE: "position"}
+_HIGH_M = 50.0
+_STEP = 0.01
+
+
+def _made(case: str) -> Iterator[Any]:
+    env_id, arguments = _CASES[case]
+    with gym.make(env_id, **arguments) as made:
+        made.reset(seed=0)
+        yield made.unwrapped
+
+
+@pytest.fixture(params=_CASES)
+def env(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """An env at its start, as it is below all wrappers."""
+    yield from _made(request.param)
+
+
+@pytest.fixture(params=[case for case in _CASES if "Pendulum" not in case])
+def ant(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """The same, of those whose trunk is free."""
+    yield from _made(request.param)
+
+
+def _sensed(env: Any, pose: np.ndarray, velocity: np.ndarray) -> dict[str, float]:
+    """What the env senses in a state, by the name of the feature."""
+    env.set_state(pose, velocity)
+    return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
+
+
+def _moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
+    """The features that changed, with what they are now."""
+    return {name: value for name, value in after.items() if value != before[name]}
+
+
+def _state(env: Any) -> tuple[np.ndarray, np.ndarray]:
+    """A pose near the start, but high up and turned, and velocities; no two numbers are alike."""
+    rng = np.random.default_rng(1)
+    pose = env.init_qpos.copy()
+    mujoco.mj_integratePos(env.model, pose, 0.05 * rng.normal(size=env.model.nv), 1.0)
+    return _lifted(env, pose), rng.normal(size=env.model.nv)
+
+
+def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
+    """The pose where nothing touches the body; the pendulum's rail is high enough."""
+    result = pose.copy()
+    if env.model.jnt_type[0] == _J.mjJNT_FREE:
+        result[2] += _HIGH_M
+    return result
+
+
+def _in_the_air(env: Any) -> None:
+    """Start an episode where nothing touches the body."""
+    env.reset(seed=0)
+    env.set_state(_lifted(env, env.data.qpos), env.data.qvel.copy())
+
+
+def _visible(env: Any, values: dict[str, float]) -> dict[str, float]:
+    """Those that the env shows: it may hide where its trunk is."""
+    return {name: value for name, value in values.items() if name in env.observation_layout}
+
+
+def test_a_joint_moves_its_own_position(env: Any) -> None:
+    """Each hinge and slide is one number, in radians or metres, and no other number knows of it."""
+    pose, velocity = _state(env)
+    before = _sensed(env, pose, velocity)
+    for j in range(env.model.njnt):
+        kind = _J(env.model.jnt_type[j])
+        if kind not in _ONE_NUMBER:
+            continue
+        changed = pose.copy()
+        place = env.model.jnt_qposadr[j]
+        changed[place] += _STEP
+        moved = _moved(before, _sensed(env, changed, velocity))
+        assert moved == {f"{env.model.joint(j).name}/{_ONE_NUMBER[kind]}": changed[place]}
+
+
+def test_the_trunk_moves_its_own_place(ant: Any) -> None:
+    """Its height is always seen; where it is in the plane only if asked for."""
+    pose, velocity = _state(ant)
+    before = _sensed(ant, pose, velocity)
+    for place, axis in enumerate("xyz"):
+        changed = pose.copy()
+        changed[place] += _STEP
+        moved = _moved(before, _sensed(ant, changed, velocity))
+        assert moved == _visible(ant, {f"torso/{axis}": changed[place]})
+    assert "torso/z" in before
+
+
+def test_a_turn_of_the_trunk_moves_its_quaternion(ant: Any) -> None:
+    """Four numbers move together, w first, and no others."""
+    pose, velocity = _state(ant)
+    pose[3:7] = [1.0, 0.0, 0.0, 0.0]
+    before = _sensed(ant, pose, velocity)
+    for axis, name in enumerate(("qx", "qy", "qz")):
+        changed = pose.copy()
+        mujoco.mju_axisAngle2Quat(changed[3:7], np.eye(3)[axis], 0.3)
+        moved = _moved(before, _sensed(ant, changed, velocity))
+        assert moved == pytest.approx(
+            {"torso/qw": math.cos(0.15), f"torso/{name}": math.sin(0.15)}, rel=1e-12
+        )
+    changed[3:7] = [0.5, 0.1, -0.7, 0.5]
+    moved = _moved(before, _sensed(ant, changed, velocity))
+    assert moved.keys() == {"torso/qw", "torso/qx", "torso/qy", "torso/qz"}
+    np.testing.assert_array_equal(list(moved.values()), changed[3:7])
+
+
+def test_a_velocity_moves_its_own_number(env: Any) -> None:
+    """Each degree of freedom is one number."""
+    pose, velocity = _state(env)
+    before = _sensed(env, pose, velocity)
+    for j in range(env.model.njnt):
+        first = env.model.jnt_dofadr[j]
+        if env.model.jnt_type[j] == _J.mjJNT_FREE:
+            names = [f"torso/{quantity}" for quantity in ("vx", "vy", "vz", "wx", "wy", "wz")]
+        else:
+            names = [f"{env.model.joint(j).name}/velocity"]
+        for place, name in enumerate(names, start=first):
+            changed = velocity.copy()
+            changed[place] += _STEP
+            moved = _moved(before, _sensed(env, pose, changed))
+            assert moved == {name: changed[place]}
+
+
+def test_velocities_are_rates(env: Any) -> None:
+    """A velocity of 1 changes the position by 1 per second: m/s of m, rad/s of rad."""
+    pose, velocity = _state(env)
+    before = _sensed(env, pose, velocity)
+    later, dt = pose.copy(), 1e-6
+    mujoco.mj_integratePos(env.model, later, velocity, dt)
+    after = _sensed(env, later, velocity)
+    rates = {"angle": "velocity", "position": "velocity", "x": "vx", "y": "vy", "z": "vz"}
+    checked = 0
+    for feature in env.observation_layout:
+        element, _, quantity = feature.name.partition("/")
+        if quantity not in rates:
+            continue
+        rate = env.observation_layout[f"{element}/{rates[quantity]}"]
+        assert rate.unit == f"{feature.unit}/s"
+        change = (after[feature.name] - before[feature.name]) / dt
+        assert change == pytest.approx(before[rate.name], rel=1e-4, abs=1e-6)
+        checked += 1
+    assert checked >= 2
+
+
+def test_the_trunk_turns_about_its_own_axes(ant: Any) -> None:
+    """Angular velocities are in the trunk's frame: turned on its side, its z axis is the world's x.
+
+    Velocities are in the world's frame all the same.
+    """
+    pose, _ = _state(ant)
+    mujoco.mju_axisAngle2Quat(pose[3:7], np.array([0.0, 1.0, 0.0]), math.pi / 2)
+    for axis, in_world in zip("xyz", ([0, 0, -1], [0, 1, 0], [1, 0, 0]), strict=True):
+        velocity = np.zeros(ant.model.nv)
+        velocity[3 + "xyz".index(axis)] = 1.0
+        sensed = _sensed(ant, pose, velocity)
+        assert sensed[f"torso/w{axis}"] == 1.0
+        # MuJoCo's own measure of the same: rotation first, in the axes of the world.
+        six = np.zeros(6)
+        mujoco.mj_objectVelocity(
+            ant.model, ant.data, mujoco.mjtObj.mjOBJ_BODY, ant.data.body("torso").id, six, 0
+        )
+        np.testing.assert_allclose(six[:3], in_world, atol=1e-12)
+
+
+def test_a_force_moves_the_contacts_of_its_body(env: Any) -> None:
+    """Six numbers of each body: torque before force, in the axes of the world, N·m and N."""
+    for body in (env.model.body(b).name for b in range(1, env.model.nbody)):
+        # A force has a lever, so it is a torque as well; a torque alone is no force.
+        for kind, first, others in (("f", 0, "tf"), ("t", 3, "t")):
+            _in_the_air(env)
+            applied = np.array([0.2, -0.3, 0.4])
+            env.data.body(body).xfrc_applied[first : first + 3] = applied
+            observation, *_ = env.step(np.zeros(env.model.nu))
+            env.data.body(body).xfrc_applied[:] = 0.0
+            sensed = dict(zip(env.observation_layout.names, observation, strict=True))
+            moved = {name: x for name, x in sensed.items() if "/contact/" in name and x != 0.0}
+            assert moved.keys() <= {f"{body}/contact/{q}{axis}" for q in others for axis in "xyz"}
+            names = [f"{body}/contact/{kind}{axis}" for axis in "xyz"]
+            expected = _visible(env, dict(zip(names, applied, strict=True)))
+            assert {name: moved[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+
+
+def test_contacts_are_those_of_the_last_step(env: Any) -> None:
+    """Six numbers of a body stand for its six of `cfrc_ext`, clipped, and a reset clears them."""
+    observation, _ = env.reset(seed=0)
+    sensed = dict(zip(env.observation_layout.names, observation, strict=True))
+    assert not any(value for name, value in sensed.items() if "/contact/" in name)
+    pose, velocity = _state(env)
+    before = _sensed(env, pose, velocity)
+    assert _moved(sensed, before).keys() <= {n for n in before if "/contact/" not in n}
+    rng = np.random.default_rng(2)
+    for body in (env.model.body(b).name for b in range(1, env.model.nbody)):
+        written = rng.uniform(-2.0, 2.0, 6)
+        env.data.body(body).cfrc_ext[:] = written
+        after = dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
+        env.data.body(body).cfrc_ext[:] = 0.0
+        names = [f"{body}/contact/{quantity}{axis}" for quantity in "tf" for axis in "xyz"]
+        expected = dict(zip(names, np.clip(written, -1.0, 1.0), strict=True))
+        assert _moved(before, after) == _visible(env, expected)
+
+
+@pytest.mark.parametrize(("push_n", "seen"), [(50.0, 2.0), (-50.0, -0.5), (0.25, 0.25)])
+def test_contacts_are_clipped_to_their_range(push_n: float, seen: float) -> None:
+    """The range is an argument, and the layout states it."""
+    with gym.make("shapechanger/Ant-v1", contact_force_range=(-0.5, 2.0)) as made:
+        env: Any = made.unwrapped
+        _in_the_air(env)
+        env.data.body("shank_2").xfrc_applied[1] = push_n
+        observation, *_ = env.step(np.zeros(8))
+    feature = env.observation_layout["shank_2/contact/fy"]
+    assert (feature.low, feature.high, feature.unit) == (-0.5, 2.0, "N")
+    places = env.observation_layout.slices["shank_2/contact/fy"]
+    np.testing.assert_allclose(observation[places], seen, rtol=1e-12)
+
+
+def test_a_motor_pulls_its_own_joint(env: Any) -> None:
+    """A control of c gives gain times c, in N·m or N, on one joint and on no other."""
+    for a, feature in enumerate(env.action_layout):
+        control = 0.5
+        action = np.zeros(env.model.nu)
+        action[a] = control
+        _in_the_air(env)
+        env.step(action)
+        assert feature.element is not None
+        # The pendulum's motor is called slide, and what it drives is called slider.
+        joint = {"slide": "slider"}.get(feature.element.name, feature.element.name)
+        hinge = env.model.joint(joint).type == _J.mjJNT_HINGE
+        assert (feature.unit, feature.gain_unit) == ("1", "N·m" if hinge else "N")
+        expected = np.zeros(env.model.nv)
+        expected[env.model.joint(joint).dofadr] = feature.gain * control
+        np.testing.assert_allclose(env.data.qfrc_actuator, expected, rtol=1e-12)
+
+
+def test_ranges_are_those_of_the_model(env: Any) -> None:
+    """A joint's limits are its feature's; what has no limits has none."""
+    limits = {
+        env.model.joint(j).name: env.model.jnt_range[j]
+        for j in range(env.model.njnt)
+        if env.model.jnt_limited[j]
+    }
+    assert len(limits) == env.model.njnt - (env.model.jnt_type[0] == _J.mjJNT_FREE)
+
+    def expected(feature: Feature) -> tuple[float, float]:
+        element, _, quantity = feature.name.partition("/")
+        if quantity in ("angle", "position"):
+            return tuple(limits[element])
+        if quantity in ("qw", "qx", "qy", "qz"):
+            return -1.0, 1.0
+        if quantity.startswith("contact/"):
+            return -1.0, 1.0
+        return -math.inf, math.inf
+
+    for feature in env.observation_layout:
+        assert (feature.low, feature.high) == expected(feature)
+        assert (feature.gain, feature.gain_unit) == (1.0, "")
+    for feature, bounds in zip(env.action_layout, env.model.actuator_ctrlrange, strict=True):
+        assert (feature.low, feature.high) == tuple(bounds)
+
+
+def test_features_belong_to_parts_of_the_model(env: Any) -> None:
+    """Each feature's element is a joint, body or actuator of that name."""
+    for feature in (*env.observation_layout, *env.action_layout):
+        assert feature.element is not None
+        assert getattr(env.model, feature.element.kind)(feature.element.name).id >= 0
+        assert feature.name.startswith(f"{feature.element.name}/")
+
+
+def test_the_units_of_the_ant() -> None:
+    """SI throughout; a number without a unit is 1."""
+    with gym.make("shapechanger/ExtendedAnt-v1") as made:
+        layout = made.unwrapped.observation_layout
+    assert {str(feature).partition("/")[2] for feature in layout} == {
+        *("z [m]", "qw [1]", "qx [1]", "qy [1]", "qz [1]", "angle [rad]", "velocity [rad/s]"),
+        *("vx [m/s]", "vy [m/s]", "vz [m/s]", "wx [rad/s]", "wy [rad/s]", "wz [rad/s]"),
+        *("contact/tx [N·m]", "contact/ty [N·m]", "contact/tz [N·m]"),
+        *("contact/fx [N]", "contact/fy [N]", "contact/fz [N]"),
+    }
+
+
+def test_the_order_of_the_pendulum() -> None:
+    """Positions before velocities, the cart before the pole."""
+    with gym.make("shapechanger/InvertedPendulum-v1") as made:
+        env: Any = made.unwrapped
+        assert [str(feature) for feature in env.observation_layout] == [
+            *("slider/position [m]", "hinge/angle [rad]"),
+            *("slider/velocity [m/s]", "hinge/velocity [rad/s]"),
+        ]
+        (motor,) = env.action_layout
+    assert (str(motor), motor.low, motor.high) == ("slide/motor [1]", -3.0, 3.0)
+    assert (motor.gain, motor.gain_unit) == (100.0, "N")

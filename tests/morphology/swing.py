@@ -1,0 +1,140 @@
+"""A tiny environment, and wrappers around it, that certificates are tested on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from shapechanger.layout import Feature, Layout
+
+_XML = """
+<mujoco>
+  <worldbody>
+    <body name="arm"><joint name="hinge" axis="0 1 0" damping="0.1"/>
+      <geom name="arm" type="capsule" fromto="0 0 0 0 0 -{length}" size=".02" mass="{mass}"/>
+      {more}
+    </body>
+  </worldbody>
+  <actuator><motor name="motor" joint="hinge" gear="{gear}"/>{motors}</actuator>
+</mujoco>
+"""
+_WRIST = """
+<body name="hand" pos="0 0 -.5"><joint name="wrist" axis="0 1 0"/>
+  <geom name="hand" type="capsule" fromto="0 0 0 0 0 -.2" size=".02" mass=".3"/></body>
+"""
+
+
+class Swing:
+    """A pendulum with a motor, and with a second one at its wrist if asked for."""
+
+    def __init__(
+        self,
+        *,
+        length: float = 0.5,
+        mass: float = 1.0,
+        gear: float = 1.0,
+        wrist: bool = False,
+        limit: int = 1000,
+        bonus: float = 0.0,
+        standing_height: float | None = None,
+    ) -> None:
+        motors = "<motor name='wrist' joint='wrist'/>" if wrist else ""
+        self.model = mujoco.MjModel.from_xml_string(
+            _XML.format(
+                length=length, mass=mass, gear=gear, more=_WRIST if wrist else "", motors=motors
+            )
+        )
+        self.standing_height = standing_height
+        joints = ("hinge", "wrist") if wrist else ("hinge",)
+        self.observation_layout = Layout(
+            tuple(Feature(f"{joint}/angle", "rad") for joint in joints)
+            + tuple(Feature(f"{joint}/velocity", "rad/s") for joint in joints)
+        )
+        names = ("motor", "wrist") if wrist else ("motor",)
+        self.action_layout = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in names))
+        self.commands: list[np.ndarray] = []
+        self._limit = limit
+        self._bonus = bonus
+        self._data = mujoco.MjData(self.model)
+
+    def reset(self, *, seed: int | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start at a random angle."""
+        mujoco.mj_resetData(self.model, self._data)
+        self._data.qpos[0] = np.random.default_rng(seed).uniform(-0.1, 0.1)
+        self.commands = []
+        return self._observation(), {}
+
+    def step(self, action: Any, /) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Push for ten steps of the simulation."""
+        self.commands.append(action)
+        self._data.ctrl[:] = action
+        mujoco.mj_step(self.model, self._data, nstep=10)
+        reward = self._bonus - float(self._data.qpos[0] ** 2)
+        return self._observation(), reward, False, len(self.commands) >= self._limit, {}
+
+    def _observation(self) -> np.ndarray:
+        return np.concatenate([self._data.qpos, self._data.qvel])
+
+
+class Wrapper:
+    """What Gymnasium's wrappers are to us: something with `unwrapped`."""
+
+    def __init__(self, env: Any) -> None:
+        self.env = env
+
+    @property
+    def unwrapped(self) -> Any:
+        """The environment inside all wrappers."""
+        return getattr(self.env, "unwrapped", self.env)
+
+    def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
+        """Pass on."""
+        observation, info = self.env.reset(seed=seed)
+        return self.sensed(observation), info
+
+    def step(self, action: Any, /) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Pass on."""
+        observation, *rest = self.env.step(action)
+        return (self.sensed(observation), *rest)
+
+    def sensed(self, observation: Any) -> Any:
+        """What becomes of an observation."""
+        return observation
+
+
+class Noisy(Wrapper):
+    """Adds noise to what is sensed, from its own seed."""
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        self._random = np.random.default_rng(7)
+
+    def sensed(self, observation: Any) -> Any:
+        """With noise."""
+        return observation + self._random.normal(scale=0.01, size=np.shape(observation))
+
+
+class Dictionary(Wrapper):
+    """Splits the observation over a dictionary."""
+
+    def sensed(self, observation: Any) -> Any:
+        """Two parts."""
+        return {"velocity": observation[1:], "angle": observation[:1]}
+
+
+class Longer(Wrapper):
+    """Adds a number that no layout describes."""
+
+    def sensed(self, observation: Any) -> Any:
+        """One more."""
+        return np.append(observation, 1.0)
+
+
+class Broken(Wrapper):
+    """Senses nothing but what is not a number."""
+
+    def sensed(self, observation: Any) -> Any:
+        """NaN in the first place."""
+        return np.concatenate([[np.nan], observation[1:]])

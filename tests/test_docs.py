@@ -1,0 +1,46 @@
+"""What the documents show works as they show it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.cli.env_arguments import env_ref
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import layouts_of
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The code blocks of a page."""
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_examples_run(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The Python blocks of a page run, one after another."""
+    names: dict[str, Any] = {"__name__": "documentation"}
+    for block in blocks(page, "python"):
+        exec(compile(block, str(page), "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    """Every link to a file of the project leads to a file."""
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text()):
+        assert (page.parent / target).exists(), target
+
+
+def test_the_map_of_the_guide_is_a_map() -> None:
+    """The TOML of docs/body-maps.md fits Ant and ExtendedAnt."""
+    (text,) = blocks(ROOT / "docs" / "body-maps.md", "toml")
+    source, target = (env_ref(name).make() for name in ("Ant", "ExtendedAnt"))
+    (so, sa), (to, ta) = layouts_of(source), layouts_of(target)
+    crossing = BodyMap.from_toml(text, so, to, sa, ta)
+    rules = {row.entry: row.rule for row in crossing.table() if row.side == "action"}
+    assert "ankle_4" in rules["foot_1/motor"]

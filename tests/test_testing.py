@@ -1,0 +1,319 @@
+"""The exam for envs can be failed: each promise has an env that breaks it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.errors import ShapechangerError
+from shapechanger.layout import Feature, Layout
+from shapechanger.testing import (
+    PROMISES,
+    BrokenPromise,
+    MakeEnv,
+    examine,
+    is_deterministic,
+    names_every_number,
+    passes_gymnasiums_checker,
+    pickles,
+    reward_is_the_sum_of_its_terms,
+    shares_no_memory,
+    starts_where_it_may,
+)
+
+_Info = dict[str, Any]
+
+
+class Walk(gym.Env[np.ndarray, np.ndarray]):
+    """A point on a line that keeps every promise."""
+
+    observation_layout = Layout((Feature("point/x", "m", -1.0, 1.0), Feature("point/vx", "m/s")))
+    action_layout = Layout((Feature("point/motor", "1", -1.0, 1.0),))
+
+    def __init__(self) -> None:
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+        self.state = np.zeros(2)
+
+    def reset(
+        self, *, seed: int | None = None, options: _Info | None = None
+    ) -> tuple[np.ndarray, _Info]:
+        """Start at rest."""
+        super().reset(seed=seed)
+        self.state = np.array([self.start(), 0.0])
+        return self.seen(), {}
+
+    def start(self) -> float:
+        """Where to start: somewhere near the middle."""
+        return self.np_random.uniform(-0.1, 0.1)
+
+    def seen(self) -> np.ndarray:
+        """The observation."""
+        return self.state.copy()
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Push the point for a tenth of a second."""
+        x, speed = self.state
+        speed += 0.1 * float(action[0])
+        self.state = np.array([x + 0.1 * speed, speed])
+        terms = {"reward_forward": speed, "reward_alive": 1.0}
+        return self.seen(), sum(terms.values()), abs(x) > 1.0, False, terms
+
+
+_count = itertools.count()
+
+
+class Unseeded(Walk):
+    """Starts somewhere else each time, whatever the seed."""
+
+    def start(self) -> float:
+        """Start where no start was."""
+        return 1e-3 * next(_count)
+
+
+class Forgetful(Walk):
+    """Ends its second episode sooner than its first, which the numbers until then do not show."""
+
+    made = 0
+
+    def __init__(self) -> None:
+        super().__init__()
+        type(self).made += 1
+        self.left = 20 - type(self).made
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """End when there are no steps left."""
+        observation, reward, _, _, info = super().step(action)
+        self.left -= 1
+        return observation, reward, self.left < 0, False, info
+
+
+class Moody(Walk):
+    """Gives another reward for the same step."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Add a reward that nobody can foresee."""
+        observation, reward, terminated, truncated, info = super().step(action)
+        info["reward_mood"] = float(next(_count))
+        return observation, reward + info["reward_mood"], terminated, truncated, info
+
+
+class Shared(Walk):
+    """Hands out its own memory."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Write the new state over the old one."""
+        memory = self.state
+        _, *rest = super().step(action)
+        memory[:] = self.state
+        self.state = memory
+        return memory, *rest
+
+
+class Nameless(Walk):
+    """Does not say what its numbers mean."""
+
+    observation_layout = None
+
+
+class Short(Walk):
+    """Names one number of two."""
+
+    observation_layout = Layout((Feature("point/x", "m", -1.0, 1.0),))
+
+
+class Strong(Walk):
+    """States bounds of its motor that are not those of the space."""
+
+    action_layout = Layout((Feature("point/motor", "1", -2.0, 2.0),))
+
+
+class Chooser(Walk):
+    """Has actions that are no numbers."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.action_space = gym.spaces.Discrete(3)
+
+
+class Holding(Walk):
+    """Holds what no pickle can."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.held = (number for number in range(3))
+
+
+class Changed(Walk):
+    """Is another env after it was pickled."""
+
+    power = 1.0
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Come back stronger."""
+        self.__dict__.update(state, power=2.0)
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Push with the power that there is."""
+        return super().step(self.power * action)
+
+
+class Richer(Changed):
+    """Moves as before when it was pickled, for twice the reward."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Reward with the power that there is."""
+        observation, reward, terminated, truncated, info = Walk.step(self, action)
+        info = {name: self.power * value for name, value in info.items()}
+        return observation, self.power * reward, terminated, truncated, info
+
+
+class Brief(Changed):
+    """Ends sooner when it was pickled."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """End at once if this is a copy."""
+        observation, reward, _, _, info = Walk.step(self, action)
+        return observation, reward, self.power > 1.0, False, info
+
+
+class Vague(Walk):
+    """Does not say what the reward is made of."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Keep the terms."""
+        *rest, _ = super().step(action)
+        return *rest, {}
+
+
+class Generous(Walk):
+    """Gives more than it says."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Add a gift."""
+        observation, reward, *rest = super().step(action)
+        return observation, reward + 1e-3, *rest
+
+
+class Still(Walk):
+    """Always starts at the same place."""
+
+    def start(self) -> float:
+        """Start at the middle."""
+        return 0.0
+
+
+class Outside(Walk):
+    """Starts where its layout says that it cannot be."""
+
+    def start(self) -> float:
+        """Start too far to the right."""
+        return 1.0 + self.np_random.random()
+
+
+class Liar(Walk):
+    """Returns observations that are not in its space."""
+
+    def seen(self) -> np.ndarray:
+        """See a number too many."""
+        return np.append(self.state, 0.0)
+
+
+class Single(Walk):
+    """Starts in one of two places at the ends of its range, in single precision."""
+
+    observation_layout = Layout((Feature("point/x", "m", -0.1, 0.1), Feature("point/vx", "m/s")))
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float32)
+
+    def start(self) -> float:
+        """Start at an end; the number of single precision next to 0.1 lies above it."""
+        return self.np_random.choice([-0.1, 0.1])
+
+    def seen(self) -> np.ndarray:
+        """Round."""
+        return self.state.astype(np.float32)
+
+
+# Each env with the promise that it breaks, and what the exam says of it.
+_BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
+    (Liar, passes_gymnasiums_checker, "Gymnasium's checker says: .*not within the observ"),
+    (Unseeded, is_deterministic, "same seed and actions differ"),
+    (Moody, is_deterministic, "same seed and actions differ"),
+    (Forgetful, is_deterministic, "same seed and actions differ"),
+    (Shared, shares_no_memory, "share memory"),
+    (Nameless, names_every_number, "Nameless publishes no observation_layout"),
+    (Short, names_every_number, "observation layout has 1 numbers, its space Box"),
+    (Strong, names_every_number, "bounds of the action layout"),
+    (Chooser, names_every_number, "action layout has 1 numbers, its space Discrete"),
+    (Holding, pickles, "cannot be copied: cannot pickle 'generator' object"),
+    (Changed, pickles, "copy of the env does something else"),
+    (Richer, pickles, "copy of the env does something else"),
+    (Brief, pickles, "copy of the env does something else"),
+    (Vague, reward_is_the_sum_of_its_terms, "reports no reward terms"),
+    (Generous, reward_is_the_sum_of_its_terms, "its terms add up to"),
+    (Still, starts_where_it_may, "Every start is the same"),
+    (Outside, starts_where_it_may, "Starts out of range: point/x"),
+    (Nameless, starts_where_it_may, "Nameless publishes no observation_layout"),
+]
+
+
+@pytest.mark.filterwarnings("ignore:.*value is -?infinity:UserWarning")
+@pytest.mark.parametrize("make", [Walk, Single])
+def test_an_env_that_keeps_its_promises_passes(make: MakeEnv) -> None:
+    """The exam asks nothing that a small env of somebody else cannot do."""
+    sentences = list(examine(make))
+    assert len(sentences) == len(PROMISES)
+    assert all(sentence.endswith(".") for sentence in sentences)
+
+
+@pytest.mark.parametrize(("make", "promise", "sentence"), _BROKEN)
+def test_a_broken_promise_is_found(
+    make: MakeEnv, promise: Callable[[MakeEnv], None], sentence: str
+) -> None:
+    """An exam that everybody passes examines nothing."""
+    with pytest.raises(BrokenPromise, match=sentence):
+        promise(make)
+
+
+def test_every_promise_is_broken_by_some_env() -> None:
+    """A promise that is added needs an env that breaks it."""
+    assert {promise for _, promise, _ in _BROKEN} == set(PROMISES)
+
+
+def test_the_exam_ends_at_the_first_broken_promise() -> None:
+    """What was kept until then has been said."""
+    kept: list[str] = []
+    with pytest.raises(BrokenPromise, match="Every start is the same"):
+        kept.extend(examine(Still))
+    assert len(kept) == PROMISES.index(starts_where_it_may)
+
+
+def test_a_broken_promise_is_an_assertion_that_failed() -> None:
+    """Test runners show it as one, and ours is caught with all the others."""
+    assert issubclass(BrokenPromise, AssertionError)
+    assert issubclass(BrokenPromise, ShapechangerError)
+
+
+def test_a_spec_that_makes_another_env_is_found() -> None:
+    """What a study writes down must make the same env again."""
+    gym.register("testing_test/Walk-v0", f"{__name__}:Walk")
+    try:
+
+        def make() -> gym.Env[Any, Any]:
+            env = gym.make("testing_test/Walk-v0", disable_env_checker=True)
+            assert env.unwrapped.spec is not None
+            env.unwrapped.spec.entry_point = f"{__name__}:Generous"
+            return env
+
+        with pytest.raises(BrokenPromise, match="does something else"):
+            pickles(make)
+    finally:
+        del gym.registry["testing_test/Walk-v0"]

@@ -1,0 +1,88 @@
+"""Numbers: as many digits as the interval bears."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.transfer.metrics import Estimate, undefined
+from shapechanger.transfer.report.numbers import (
+    count,
+    estimate_text,
+    interval_text,
+    list_text,
+    number,
+)
+from shapechanger.transfer.report.spread import spread_text, t_interval
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (3.0, "3"),
+        (0.12345, "0.1235"),
+        (-880.61, "-880.6"),
+        (1234567.0, "1,234,567"),
+        (-1.5e12, "-1.500e12"),
+        (1e-9, "0.000000"),
+    ],
+)
+def test_numbers_are_short(value: float, text: str) -> None:
+    """Four digits, separated thousands, and powers of ten where a number is huge."""
+    assert number(value) == text
+
+
+def test_a_sign_belongs_to_what_is_shown() -> None:
+    """A difference above zero bears a plus; one that is rounded to zero bears nothing."""
+    assert number(0.25, 2, signed=True) == "+0.25"
+    assert number(0.001, 2, signed=True) == "0.00"
+    assert number(-0.001, 2, signed=True) == "0.00"
+    assert number(2e11, signed=True) == "+2.000e11"
+
+
+def test_steps_are_whole() -> None:
+    """Half a step is nobody's business."""
+    assert count(12_345.4) == "12,345"
+
+
+@pytest.mark.parametrize(
+    ("low", "value", "high", "text"),
+    [
+        (0.22, 0.31, 0.40, "0.31 [0.22, 0.40]"),
+        (-0.1234, 0.01, 0.1434, "0.01 [-0.12, 0.14]"),
+        (859.1, 880.6, 902.2, "881 [859, 902]"),
+        (0.004, 0.5, 1.0, "0.500 [0.004, 1.000]"),
+        (1e-9, 0.5, 1.0, "0.500000 [0.000000, 1.000000]"),
+        (5.0, 5.0, 5.0, "5 [5, 5]"),
+        (-2e12, 1e12, 4e12, "1.000e12 [-2.000e12, 4.000e12]"),
+    ],
+)
+def test_intervals_bear_two_digits_of_their_width(
+    low: float, value: float, high: float, text: str
+) -> None:
+    """More would be noise; but an end that is not zero is not shown as zero."""
+    assert interval_text(value, low, high) == text
+
+
+def test_estimates_without_a_value_or_an_interval_say_so() -> None:
+    """A reader must not take them for zero."""
+    assert estimate_text(undefined("Why not.")) == "undefined"
+    assert estimate_text(Estimate(0.5), signed=True) == "+0.5000 (no interval)"
+    assert estimate_text(Estimate(0.3, 0.2, 0.4), signed=True) == "+0.30 [+0.20, +0.40]"
+
+
+def test_a_list_of_numbers_tells_them_apart() -> None:
+    """All with the same digits after the point."""
+    assert list_text([5.0, 7.5, 15.0]) == "5.0; 7.5; 15.0"
+    assert list_text([1000.0, 1000.0]) == "1,000; 1,000"
+
+
+def test_t_interval_by_hand() -> None:
+    """Seeds 1, 2, 3: mean 2, s = 1, t(0.975, 2) = 4.3027, half width 4.3027 / sqrt(3)."""
+    spread = t_interval(np.array([[1.0, 5.0], [2.0, 5.0], [3.0, 5.0]]))
+    np.testing.assert_allclose(spread.mean, [2.0, 5.0])
+    np.testing.assert_allclose(spread.high - spread.mean, [2.48414, 0.0], atol=1e-5)
+    np.testing.assert_allclose(spread.mean - spread.low, [2.48414, 0.0], atol=1e-5)
+    assert spread_text(np.array([1.0, 2.0, 3.0])) == "2.0 [-0.5, 4.5]"

@@ -1,0 +1,54 @@
+"""Small studies of real envs, for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.settings import LearnerSettings
+from shapechanger.transfer.study import make_plan
+
+SMALL = EnvRef("shapechanger/SmallInvertedPendulum-v1")
+BIG = EnvRef("shapechanger/BigInvertedPendulum-v1")
+
+# Two envs and updates of 32 steps: a run takes a second and learns nothing.
+TINY = LearnerSettings(
+    n_envs=2,
+    n_steps=16,
+    batch_size=16,
+    n_epochs=1,
+    learning_rate=1e-3,
+    net_arch=(8,),
+    steps=96,
+    eval_every=32,
+    eval_episodes=2,
+)
+TINY_NORMALISED = LearnerSettings(
+    n_envs=2,
+    n_steps=16,
+    batch_size=16,
+    n_epochs=1,
+    learning_rate=1e-3,
+    net_arch=(8,),
+    normalise=True,
+    steps=96,
+    eval_every=32,
+    eval_episodes=2,
+)
+
+
+def tiny_plan(settings: LearnerSettings = TINY, **arguments: Any) -> Plan:
+    """A plan of a study that takes seconds."""
+    task = arguments.pop("task", TransferTask(SMALL, BIG))
+    return make_plan(task, "tiny", settings, **{"seeds": 2, **arguments})
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """The content of every file in a folder."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }

@@ -1,0 +1,67 @@
+"""What a policy is worth, on an env whose worth is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.transfer.evaluation import evaluate, random_actions
+
+
+class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
+    """An episode of as many steps as its seed says; each is worth its action plus one."""
+
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Begin to count."""
+        assert seed is not None
+        self.left = seed
+        return np.array([float(self.left)]), {}
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        """Count down by one."""
+        self.left -= 1
+        terms = {"reward_action": float(action[0]), "reward_alive": 1.0}
+        return np.array([float(self.left)]), sum(terms.values()), self.left == 0, False, terms
+
+
+def test_returns_lengths_and_terms_are_means_over_episodes() -> None:
+    """Episodes of 3, 4 and 5 steps, each step worth 1.5."""
+    envs = [Countdown() for _ in range(3)]
+    result = evaluate(lambda observations: np.full((len(observations), 1), 0.5), envs, 3, 7)
+    assert result.steps == 7
+    assert result.mean_length == 4.0
+    assert result.mean_return == 6.0
+    np.testing.assert_allclose(result.terms["reward_action"], 2.0)
+    np.testing.assert_allclose(result.terms["reward_alive"], 4.0)
+
+
+def test_each_env_gets_the_action_for_its_own_observation() -> None:
+    """When some episodes have ended, the others keep their own actions."""
+    seen: list[list[float]] = []
+
+    def act(observations: NDArray[Any]) -> NDArray[Any]:
+        seen.append([float(x) for x in observations[:, 0]])
+        return np.zeros((len(observations), 1))
+
+    evaluate(act, [Countdown(), Countdown()], 1)
+    assert seen == [[1.0, 2.0], [1.0]]
+
+
+def test_random_actions_come_from_the_seed() -> None:
+    """The same seed draws the same actions, another one others; all within the space."""
+    observations = np.zeros((4, 1))
+    first = random_actions(Countdown().action_space, 1)(observations)
+    np.testing.assert_array_equal(first, random_actions(Countdown().action_space, 1)(observations))
+    assert not np.array_equal(first, random_actions(Countdown().action_space, 2)(observations))
+    assert first.shape == (4, 1)
+    assert np.abs(first).max() <= 1.0

@@ -1,0 +1,96 @@
+"""Jobs in processes: their order, their failures, their end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer.executor import Executor, Job, Processes, Serial
+from tests.transfer import jobs
+
+EXECUTORS = [Serial(), Processes(2)]
+
+
+def await_(condition: object, timeout_s: float = 60.0) -> None:
+    """Wait until `condition()` holds, or fail."""
+    assert callable(condition)
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        os.sched_yield()
+
+
+@pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
+def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> None:
+    """A job begins when all that it waits for have ended, in whatever order they are given."""
+    names = ("last", "middle", "first")
+    marks = {name: tmp_path / name for name in names}
+    waits = {"last": ("middle",), "middle": ("first",), "first": ()}
+    seen: list[str] = []
+    executor.run(
+        [Job(name, jobs.leave_a_mark, (str(marks[name]),), waits[name]) for name in names],
+        lambda name, steps, ended: seen.append(name) if ended else None,
+    )
+    ended = {name: int(mark.read_text()) for name, mark in marks.items()}
+    assert ended["first"] < ended["middle"] < ended["last"]
+    assert seen == ["first", "middle", "last"]
+
+
+@pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
+def test_a_user_error_comes_back_as_it_was(executor: Executor) -> None:
+    """What a job raises is raised here, with its sentence."""
+    with pytest.raises(UnknownName, match="No thing matches 'this'"):
+        executor.run([Job("refuse", jobs.refuse, ())], lambda *_: None)
+
+
+def test_a_bug_comes_back_with_its_traceback() -> None:
+    """A job that crashes names itself and shows where."""
+    with pytest.raises(StudyError, match=r"(?s)crash failed.*ZeroDivisionError: a bug"):
+        Processes(1).run([Job("crash", jobs.crash, ())], lambda *_: None)
+
+
+def test_a_process_that_is_killed_is_reported() -> None:
+    """A job whose process ends without a word is not waited for."""
+    with pytest.raises(StudyError, match="vanish ended by itself with exit code -9"):
+        Processes(1).run([Job("vanish", jobs.vanish, ())], lambda *_: None)
+
+
+def test_no_workers_are_refused() -> None:
+    """Nothing would ever run."""
+    with pytest.raises(StudyError, match="at least one worker, got 0"):
+        Processes(0)
+
+
+def test_processes_end_with_their_parent(tmp_path: Path) -> None:
+    """A parent that is killed outright leaves no process behind."""
+    pid_file = tmp_path / "pid"
+    code = f"from tests.transfer import jobs; jobs.run_for_ever({str(pid_file)!r})"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    main = f"if __name__ == '__main__':\n    {code}\n"
+    script = tmp_path / "parent.py"
+    script.write_text(main)
+    parent = subprocess.Popen([sys.executable, str(script)], env=environment)
+    try:
+        await_(lambda: pid_file.exists() and pid_file.read_text())
+    finally:
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    child = int(pid_file.read_text())
+    await_(lambda: not _alive(child))
+
+
+def _alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended and that nobody has waited for does not."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{pid}/stat")
+    return not (status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] == "Z")

@@ -1,0 +1,64 @@
+"""Files that are whole or not there, and errors that name the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import CorruptStudy, OutputError
+from shapechanger.transfer.files import (
+    append_line,
+    make_folder,
+    read_json,
+    write_json,
+    write_whole,
+)
+
+
+def test_json_goes_round(tmp_path: Path) -> None:
+    """What is written reads back."""
+    write_json(tmp_path / "a.json", {"x": [1, 2]})
+    assert read_json(tmp_path / "a.json", dict[str, list[int]]) == {"x": [1, 2]}
+
+
+def test_a_file_appears_whole_or_keeps_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A write that fails half-way leaves the old file, and nothing beside it."""
+    path = tmp_path / "a.json"
+    write_whole(path, b"old")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OutputError, match=r"Cannot write .*a\.json: No space left on device"):
+        write_whole(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [item.name for item in tmp_path.iterdir()] == ["a.json"]
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[1]", b'{"x": "1"}', b"\xff"])
+def test_a_file_that_is_not_what_it_should_be_is_named(tmp_path: Path, content: bytes) -> None:
+    """The message says which file, and what to do."""
+    path = tmp_path / "run.json"
+    path.write_bytes(content)
+    with pytest.raises(CorruptStudy, match=r"run\.json cannot be read"):
+        read_json(path, dict[str, int])
+
+
+def test_lines_are_added_and_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
+    """One line for each value."""
+    append_line(tmp_path / "curve", {"a": 1})
+    append_line(tmp_path / "curve", {"a": 2})
+    assert (tmp_path / "curve").read_text() == '{"a":1}\n{"a":2}\n'
+    with pytest.raises(OutputError, match="Cannot write"):
+        append_line(tmp_path, 1)
+
+
+def test_folders_are_made_with_their_parents(tmp_path: Path) -> None:
+    """Making a folder twice is no error, and leaves nothing in it."""
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    assert not list((tmp_path / "a" / "b").iterdir())

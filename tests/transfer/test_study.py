@@ -1,0 +1,289 @@
+"""A study from beginning to end, cut off, resumed, refused."""
+
+from __future__ import annotations
+
+import errno
+import json
+import shutil
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.errors import (
+    CorruptStudy,
+    EmptyShift,
+    ForeignStudy,
+    MapError,
+    OutputError,
+    SpaceMismatch,
+    StudyError,
+    UnknownName,
+)
+from shapechanger.transfer import files
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.files import read_json
+from shapechanger.transfer.plan import Run, TransferTask
+from shapechanger.transfer.policy_file import load_policy
+from shapechanger.transfer.runs import policy_path
+from shapechanger.transfer.study import STUDY_FILE, Study, run_study
+from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
+
+
+def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
+    """Every number that a study must give again."""
+    return {
+        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
+    }
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
+    """A study that was never interrupted, and its folder."""
+    out = tmp_path_factory.mktemp("finished") / "study"
+    return run_study(tiny_plan(), out, executor=Serial(), command="test"), out
+
+
+def test_every_arm_and_seed_is_there(finished: tuple[Study, Path]) -> None:
+    """Two seeds of each arm, evaluated at step 0 and after each update."""
+    study, _ = finished
+    assert [run.run.name for run in study.runs] == [
+        f"{kind}-{i}"
+        for kind in ("source", "random", "scratch", "zero-shot", "fine-tune")
+        for i in range(2)
+    ]
+    assert [e.steps for e in study.of("scratch")[0].curve] == [0, 32, 64, 96]
+    assert set(study.summaries) == {"zero-shot", "fine-tune"}
+    assert "pole: length" in study.shift
+
+
+def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> None:
+    """The source policy through the map, and the transplanted one, do the same in the target."""
+    study, _ = finished
+    for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
+        assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
+        assert unchanged.curve[0].mean_length == tuned.curve[0].mean_length
+
+
+def test_the_study_file_reads_back(finished: tuple[Study, Path]) -> None:
+    """study.json holds all that the study holds."""
+    study, out = finished
+    assert read_json(out / STUDY_FILE, Study) == study
+    assert json.loads((out / STUDY_FILE).read_text())["command"] == "test"
+
+
+def test_curves_are_written_as_they_grow(finished: tuple[Study, Path]) -> None:
+    """Each evaluation is a line of the run's own file."""
+    study, out = finished
+    lines = (out / "runs" / "scratch-0" / "curve.jsonl").read_text().splitlines()
+    assert [json.loads(line)["steps"] for line in lines] == [0, 32, 64, 96]
+    assert [json.loads(line)["mean_return"] for line in lines] == [
+        e.mean_return for e in study.of("scratch")[0].curve
+    ]
+
+
+def test_seeds_make_different_runs(finished: tuple[Study, Path]) -> None:
+    """No two runs of an arm share a seed, nor do two arms."""
+    study, _ = finished
+    seeds = [result.seed for result in study.runs]
+    assert len(set(seeds)) == len(seeds)
+
+
+def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """The plan decides every number."""
+    again = run_study(tiny_plan(), tmp_path / "again", executor=Serial())
+    assert curves(again) == curves(finished[0])
+    assert again.summaries == finished[0].summaries
+
+
+def test_runs_that_were_cut_off_start_again(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """What a kill leaves behind of a run does not count; the numbers are the same."""
+    study, out = finished
+    cut = tmp_path / "cut"
+    shutil.copytree(out, cut)
+    (cut / STUDY_FILE).unlink()
+    for name in ("scratch-1", "source-1", "fine-tune-1"):
+        (cut / "runs" / name / "run.json").unlink()
+    (cut / "runs" / "scratch-1" / "curve.jsonl").write_text("half a li")
+    kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
+    resumed = run_study(tiny_plan(), cut, executor=Serial())
+    assert curves(resumed) == curves(study)
+    assert resumed.summaries == study.summaries
+    assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
+
+
+def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """A study that is complete is only summed up again."""
+    study, out = finished[0], tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    before = (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
+    seen: list[str] = []
+    again = run_study(
+        tiny_plan(), out, executor=Serial(), on_progress=lambda n, s, e: seen.append(n)
+    )
+    assert curves(again) == curves(study)
+    assert not seen
+    assert (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == before
+
+
+def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
+    """With VecNormalize too the transplanted policy starts as the source policy ends."""
+    study = run_study(tiny_plan(TINY_NORMALISED), tmp_path / "study", executor=Serial())
+    for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
+        assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
+
+
+def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
+    """Ant to ExtendedAnt: more senses, more motors, one command."""
+    task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
+    plan = tiny_plan(
+        TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, steps=32
+    )
+    study = run_study(plan, tmp_path / "study", executor=Serial())
+    for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
+        np.testing.assert_allclose(
+            unchanged.curve[0].mean_return, tuned.curve[0].mean_return, rtol=0.05
+        )
+    assert "reward_forward" in study.of("scratch")[0].curve[-1].terms
+
+
+def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """With a source policy no source is trained, and every seed starts from that policy."""
+    policy = policy_path(finished[1], Run("source", 0))
+    plan = tiny_plan(source_policy=policy)
+    study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
+    assert not study.of("source")
+    assert study.source_return == ()
+    assert plan.source_steps == load_policy(policy).card.steps == 96
+    assert study.of("zero-shot")[0].curve[0].mean_return == (
+        finished[0].of("zero-shot")[0].curve[0].mean_return
+    )
+
+
+def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
+    """A pendulum's policy is no source for an ant."""
+    ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
+    policy = policy_path(finished[1], Run("source", 0))
+    with pytest.raises(SpaceMismatch, match="does not belong to the source env"):
+        tiny_plan(task=ants, source_policy=policy)
+
+
+def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
+    """A pendulum is not moved to itself, and nothing is trained for it."""
+    with pytest.raises(EmptyShift, match="nothing to transfer across"):
+        run_study(tiny_plan(task=TransferTask(BIG, BIG)), tmp_path / "s", executor=Serial())
+    assert not (tmp_path / "s" / "runs").exists()
+
+
+def test_spaces_that_cannot_be_mapped_are_refused() -> None:
+    """A pendulum and an ant have no number in common."""
+    with pytest.raises(MapError, match="cannot be mapped"):
+        tiny_plan(task=TransferTask(SMALL, EnvRef("shapechanger/Ant-v1")))
+
+
+@pytest.mark.parametrize("steps", [1, 31])
+def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
+    """The message says how much is needed."""
+    with pytest.raises(StudyError, match=f"{steps} steps is smaller than one evaluation.*32"):
+        tiny_plan(steps=steps)
+    with pytest.raises(StudyError, match="smaller than one evaluation"):
+        tiny_plan(source_steps=0)
+
+
+def test_one_seed_is_refused() -> None:
+    """One run says nothing about how sure it is."""
+    with pytest.raises(StudyError, match="at least 2 seeds"):
+        tiny_plan(seeds=1)
+
+
+def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
+    """Everything is measured against scratch."""
+    with pytest.raises(UnknownName, match="'fine-tune'"):
+        tiny_plan(arms=("scratch", "fine-tun"))
+    with pytest.raises(StudyError, match="compares scratch"):
+        tiny_plan(arms=("zero-shot", "fine-tune"))
+
+
+def test_unknown_envs_are_refused() -> None:
+    """The message lists what there is."""
+    with pytest.raises(UnknownName, match="shapechanger/BigAnt-v1"):
+        tiny_plan(task=TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG))
+
+
+def test_a_folder_of_another_study_is_left_alone(
+    finished: tuple[Study, Path], tmp_path: Path
+) -> None:
+    """The message says in what the two differ; nothing is overwritten."""
+    out = tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    with pytest.raises(ForeignStudy, match="differs in seed"):
+        run_study(tiny_plan(seed=1), out, executor=Serial())
+    assert read_json(out / STUDY_FILE, Study) == finished[0]
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    """A folder with other files is nobody's study."""
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(ForeignStudy, match="holds other files"):
+        run_study(tiny_plan(), tmp_path, executor=Serial())
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("name", ["plan.json", "runs/scratch-0/run.json"])
+def test_a_corrupt_file_is_named_and_nothing_is_lost(
+    finished: tuple[Study, Path], tmp_path: Path, name: str
+) -> None:
+    """A file that cannot be read stops the study before anything is written."""
+    out = tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    (out / name).write_text('{"not": "it"')
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(CorruptStudy, match=name.replace(".", r"\.")):
+        run_study(tiny_plan(), out, executor=Serial())
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    """A file where a folder should be: one sentence, and the file stays."""
+    (tmp_path / "file").write_text("here")
+    with pytest.raises(OutputError, match="Cannot write to"):
+        run_study(tiny_plan(), tmp_path / "file" / "study", executor=Serial())
+    assert (tmp_path / "file").read_text() == "here"
+
+
+def test_a_disk_that_runs_full_loses_nothing(
+    finished: tuple[Study, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs that had ended are kept, and the study goes on when there is room again."""
+    out = tmp_path / "study"
+    write_whole = files.write_whole
+
+    def full(path: Path, content: bytes) -> None:
+        if path.parent.name == "scratch-1":
+            raise OutputError(f"Cannot write {path}: {errno.errorcode[errno.ENOSPC]}.")
+        write_whole(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "write_whole", full)
+        with pytest.raises(OutputError, match="ENOSPC"):
+            run_study(tiny_plan(), out, executor=Serial())
+    assert (out / "runs" / "scratch-0" / "run.json").exists()
+    assert not (out / "runs" / "scratch-1" / "run.json").exists()
+    assert curves(run_study(tiny_plan(), out, executor=Serial())) == curves(finished[0])
+
+
+def test_a_study_of_an_untold_env_is_refused() -> None:
+    """An env that publishes no layout cannot be mapped."""
+    bare = EnvRef("CartPole-v1")
+    with pytest.raises(Exception, match="publishes no observation_layout"):
+        tiny_plan(task=TransferTask(bare, BIG))
+
+
+def test_settings_refuse_what_cannot_be(finished: tuple[Study, Path]) -> None:
+    """Evaluations cannot come more often than updates."""
+    with pytest.raises(StudyError, match="more often than an update"):
+        msgspec.structs.replace(TINY, eval_every=31)
+    with pytest.raises(StudyError, match="at least one env"):
+        msgspec.structs.replace(TINY, n_envs=0)
