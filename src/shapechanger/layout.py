@@ -72,7 +72,8 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise LayoutError("A feature needs a name.")
-        if not self.low <= self.high:  # Also refuses NaN.
+        # Also refuses NaN, and ranges that hold no finite number, which JSON could not tell apart.
+        if not self.low <= self.high or self.low == math.inf or self.high == -math.inf:
             raise LayoutError(f"{self.name}: the range {self.low} to {self.high} is empty.")
         if not (math.isfinite(self.gain) and self.gain > 0.0):
             raise LayoutError(f"{self.name}: the gain must be above zero, got {self.gain}.")

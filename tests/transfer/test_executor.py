@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -22,9 +23,10 @@ def await_(condition: object, timeout_s: float = 60.0) -> None:
     """Wait until `condition()` holds, or fail."""
     assert callable(condition)
     end = time.monotonic() + timeout_s
+    never = threading.Event()
     while not condition():
         assert time.monotonic() < end, "waited too long"
-        os.sched_yield()
+        never.wait(0.01)
 
 
 @pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -79,10 +80,11 @@ class Transfer:
 
     def run(self) -> None:
         """Do the study, print its table, and write its report."""
-        import shapechanger.transfer.report.curves  # noqa: F401  # Not there? Say so before the work.
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.study import run_study, unfinished
 
+        # The report comes last; if what draws it is missing, say so before the work.
+        import_module("shapechanger.transfer.report.curves")
         console = Console(highlight=False)
         executor = Processes(self.workers)
         plan = self._plan()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import Any, Final, cast
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -53,7 +53,7 @@ def draw(
     }
     renderer = Renderer(lit, data, camera, width, height, camera_id=-1)
     try:
-        picture, depth = cast("Any", renderer.render("rgbd_tuple"))
+        picture, depth = renderer.render("rgbd_tuple")
     finally:
         renderer.close()
     result = np.array(picture, dtype=np.uint8)

@@ -100,7 +100,7 @@ class Reshapable(MujocoEnv):
         return self._spec
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
         self._spec = copy.deepcopy(spec)
         self._record_body()
 

@@ -65,7 +65,8 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
         return from_json(value)
     if isinstance(value, Edit):
         return (value,)
-    edits: list[Any] = list(value) if isinstance(value, Iterable) else [value]
+    given: Any = value  # What a type checker knows, a notebook may not.
+    edits = list(cast("Iterable[Any]", given)) if isinstance(given, Iterable) else [given]
     for edit in edits:
         if not isinstance(edit, Edit):
             raise MorphologyError(

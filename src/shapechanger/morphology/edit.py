@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
@@ -99,7 +99,7 @@ def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
     Raises:
         MorphologyError: If so.
     """
-    given: object = value  # What a type checker knows, a notebook may not.
+    given: Any = value  # What a type checker knows, a notebook may not.
     if not isinstance(given, tuple) or len(value) != 3 or not all(map(math.isfinite, value)):
         raise MorphologyError(f"{name} must be a tuple of three finite numbers, got {value}.")
     if nonzero and not any(value):

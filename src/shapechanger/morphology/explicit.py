@@ -6,7 +6,7 @@ a frame has other axes than its body, and a total mass that the compiler restore
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -56,13 +56,15 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
     for element in (*spec.geoms, *spec.sites, *spec.cameras):
         _resolve(spec, element)
     for joint in spec.joints:
-        turn, shift = _pose_of_frames(spec, joint.frame)
-        joint.pos = shift + rotation(turn) @ joint.pos
-        joint.axis = rotation(turn) @ joint.axis
+        pose = _pose_of_frames(spec, joint.frame)
+        if pose:
+            joint.pos = _seen(joint.pos, pose)
+            joint.axis = rotation(pose.turn) @ joint.axis
     for light in spec.lights:
-        turn, shift = _pose_of_frames(spec, light.frame)
-        light.pos = shift + rotation(turn) @ light.pos
-        light.dir = rotation(turn) @ light.dir
+        pose = _pose_of_frames(spec, light.frame)
+        if pose:
+            light.pos = _seen(light.pos, pose)
+            light.dir = rotation(pose.turn) @ light.dir
     for frame in frames:
         frame.pos = np.zeros(3)
         frame.quat = _UPRIGHT
@@ -85,28 +87,41 @@ def _resolve(
     element: mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera,
 ) -> None:
     """Write an element's pose as seen from its body."""
-    if element.frame is None:
+    pose = _pose_of_frames(spec, element.frame)
+    if pose is None:
         return
-    turn, shift = _pose_of_frames(spec, element.frame)
     if isinstance(element, mujoco.MjsGeom | mujoco.MjsSite) and has_ends(element):
-        ends = element.fromto.reshape(2, 3)
-        element.fromto = (shift + ends @ rotation(turn).T).ravel()
+        element.fromto = np.concatenate([_seen(e, pose) for e in element.fromto.reshape(2, 3)])
         return
-    element.pos = shift + rotation(turn) @ element.pos
+    element.pos = _seen(element.pos, pose)
     turned = np.empty(4)
-    mujoco.mju_mulQuat(turned, turn, orientation(spec, element))
+    mujoco.mju_mulQuat(turned, pose.turn, orientation(spec, element))
     element.quat = turned
     element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
-def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> tuple[Array, Array]:
-    """Quaternion (w, x, y, z) and position, m, of a frame and those around it, in the body's."""
-    turn, shift = np.array(_UPRIGHT), np.zeros(3)
+class _Pose(NamedTuple):
+    """Where frames are in their body's frame: quaternion (w, x, y, z) and position, m."""
+
+    turn: Array
+    shift: Array
+
+
+def _seen(point: Array, pose: _Pose) -> Array:
+    """A point of a frame as seen from the body, m."""
+    return pose.shift + rotation(pose.turn) @ point
+
+
+def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
+    """The pose of a frame within those around it; None where there is no frame."""
+    pose = None
     while frame is not None:
-        around = orientation(spec, frame)
-        shift = frame.pos + rotation(around) @ shift
-        inner = turn
-        turn = np.empty(4)
-        mujoco.mju_mulQuat(turn, around, inner)
+        around = _Pose(orientation(spec, frame), np.array(frame.pos))
+        if pose is None:
+            pose = around
+        else:
+            turn = np.empty(4)
+            mujoco.mju_mulQuat(turn, around.turn, pose.turn)
+            pose = _Pose(turn, _seen(pose.shift, around))
         frame = frame.frame
-    return turn, shift
+    return pose

@@ -81,8 +81,10 @@ def place_of(element: mujoco.MjsGeom | mujoco.MjsSite) -> Array:
 
 def move_by(element: mujoco.MjsGeom | mujoco.MjsSite, shift: Array) -> None:
     """Move an element within its body by `shift`, m."""
-    element.pos = element.pos + shift
-    element.fromto = element.fromto + np.tile(shift, 2)  # NaN (unset) stays NaN.
+    if has_ends(element):
+        element.fromto = element.fromto + np.tile(shift, 2)
+    else:
+        element.pos = element.pos + shift
 
 
 def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:

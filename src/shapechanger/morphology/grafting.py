@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 
@@ -104,13 +104,13 @@ def _attach(
 ) -> mujoco.MjsBody:
     """Attach a copy of the limb to the frame, each of its names with the mark before it."""
     donor = spec.copy()
-    unwanted = [donor.sensors, donor.tendons, donor.equalities, donor.pairs, donor.excludes]
-    unwanted += [donor.keys, donor.numerics, donor.texts, donor.tuples, donor.skins, donor.flexes]
+    unwanted: list[Any] = [*donor.sensors, *donor.tendons, *donor.equalities, *donor.pairs]
+    unwanted += [*donor.excludes, *donor.keys, *donor.numerics, *donor.texts, *donor.tuples]
+    unwanted += [*donor.skins, *donor.flexes]
     if not with_motors:
-        unwanted.append(donor.actuators)
-    for elements in unwanted:
-        for element in list(elements):
-            donor.delete(element)
+        unwanted += donor.actuators
+    for element in unwanted:
+        donor.delete(element)
     # Assets would come along as copies; the limb is to share those that are there.
     shared: dict[tuple[type, str], dict[str, str]] = {}
     for element in (*donor.geoms, *donor.sites):

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Hashable
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import msgspec
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.codec import Body
-from shapechanger.morphology.edit import Edit
+from shapechanger.morphology.edit import Edit, Vector
 
 __all__ = ["interpolate"]
 
@@ -72,13 +72,15 @@ def _between(x: Edit, y: Edit, alpha: float) -> Edit:
     """The edit between two that differ in numbers only."""
     changes: dict[str, Any] = {}
     for field in x.__struct_fields__:
-        old, new = getattr(x, field), getattr(y, field)
+        old: Any = getattr(x, field)
+        new: Any = getattr(y, field)
         if old == new:
             continue
         if field in _ZERO_WHERE_NONE:
             old, new = old or 0.0, new or 0.0
         if isinstance(old, tuple):
-            changes[field] = tuple(p + alpha * (q - p) for p, q in zip(old, new, strict=True))
+            pairs = zip(cast("Vector", old), cast("Vector", new), strict=True)
+            changes[field] = tuple(p + alpha * (q - p) for p, q in pairs)
         else:
             changes[field] = old + alpha * (new - old)
     return msgspec.structs.replace(x, **changes)

@@ -71,7 +71,8 @@ def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     """How far the body's lowest point is above the floor, m; negative when it is inside.
 
     `data` must hold the geoms' places, as after `mj_kinematics`. The floor is every plane and
-    height field that is fixed to the world and that the body's geoms can touch; 1000 where there is none.
+    height field that is fixed to the world and can touch the body's geoms; 1000 where there is
+    none.
     """
     of_world = model.body_weldid[model.geom_bodyid] == 0
     gap = _FAR_M

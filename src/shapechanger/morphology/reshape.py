@@ -44,5 +44,6 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ShapechangerError):
             raise
-        reason = " ".join(str(error).split()).removesuffix(".")
+        lines = [" ".join(line.split()) for line in str(error).splitlines()]
+        reason = "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
         raise BrokenModel(f"MuJoCo does not compile the body {to_json(body)}: {reason}.") from error

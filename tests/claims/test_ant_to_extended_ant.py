@@ -1,0 +1,117 @@
+"""The case to show: a policy of the ant in the extended ant, and back, for PPO and SAC."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC
+
+from shapechanger.transfer.body_map import BodyMap, MappedEnv, body_map
+from shapechanger.transfer.transplant import transplant
+
+STEPS = 30
+
+
+@pytest.fixture(scope="module")
+def ants() -> tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap]:
+    """Both envs, and the map that moves each foot as its ankle."""
+    ant, extended = gym.make("shapechanger/Ant-v1"), gym.make("shapechanger/ExtendedAnt-v1")
+    return ant, extended, body_map(ant, extended, rules={"foot_*/motor": "copy ankle_*/motor"})
+
+
+def opinionated(kind: type[PPO] | type[SAC], env: gym.Env[Any, Any]) -> Any:
+    """An untrained model whose weights are large enough to matter."""
+    settings: dict[str, Any] = {"n_steps": 64, "batch_size": 64} if kind is PPO else {}
+    model = kind("MlpPolicy", env, device="cpu", seed=0, **settings)
+    generator = torch.Generator().manual_seed(1)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter += 0.05 * torch.randn(parameter.shape, generator=generator)
+    return model
+
+
+def walk(model: Any, env: gym.Env[Any, Any]) -> list[NDArray[np.float64]]:
+    """What the env shows while a policy acts in it."""
+    observation, _ = env.reset(seed=3)
+    seen = [observation]
+    for _ in range(STEPS):
+        action, _ = model.predict(observation, deterministic=True)
+        observation, _, terminated, truncated, _ = env.step(action)
+        seen.append(observation)
+        if terminated or truncated:
+            break
+    return seen
+
+
+@pytest.mark.parametrize("kind", [PPO, SAC])
+def test_the_transplanted_policy_does_what_the_mapped_one_does(
+    ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
+) -> None:
+    """On observations of real rollouts the actions of both agree to 1e-6, motor by motor."""
+    ant, extended, crossing = ants
+    source = opinionated(kind, ant)
+    target = transplant(source, crossing, extended)
+    seen = walk(target, extended)
+    assert len(seen) > 5
+    for observation in seen:
+        ours, _ = target.predict(observation, deterministic=True)
+        theirs, _ = source.predict(crossing.adapt_observation(observation), deterministic=True)
+        np.testing.assert_allclose(ours, crossing.adapt_action(theirs), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [PPO, SAC])
+def test_values_agree_on_real_observations(
+    ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
+) -> None:
+    """V and Q judge in the target as in the source, in double precision to 1e-6."""
+    ant, extended, crossing = ants
+    source = opinionated(kind, ant)
+    source.policy.double()
+    target = transplant(source, crossing, extended)
+    seen = torch.as_tensor(np.stack(walk(opinionated(kind, extended), extended)))
+    adapted = torch.as_tensor(crossing.adapt_observation(seen.numpy()))
+    with torch.no_grad():
+        if kind is PPO:
+            # `predict_values` would round the observations to single precision first.
+            ours, theirs = (
+                model.policy.value_net(model.policy.mlp_extractor.forward_critic(observations))
+                for model, observations in ((target, seen), (source, adapted))
+            )
+            torch.testing.assert_close(ours, theirs, atol=1e-6, rtol=0)
+            return
+        actions = torch.as_tensor(np.random.default_rng(0).uniform(-1, 1, (len(seen), 8)))
+        moved = torch.as_tensor(crossing.adapt_action(actions.numpy()))
+        pairs = zip(target.critic(seen, moved), source.critic(adapted, actions), strict=True)
+        for ours, theirs in pairs:
+            torch.testing.assert_close(ours, theirs, atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("kind", [PPO, SAC])
+def test_the_way_back_gives_the_ant_its_policy_again(
+    ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
+) -> None:
+    """Ant to ExtendedAnt to Ant acts as the ant's own policy did."""
+    ant, extended, crossing = ants
+    source = opinionated(kind, ant)
+    there = transplant(source, crossing, extended)
+    back = transplant(there, crossing.inverse(), ant)
+    for observation in walk(source, ant):
+        ours, _ = back.predict(observation, deterministic=True)
+        theirs, _ = source.predict(observation, deterministic=True)
+        np.testing.assert_allclose(ours, theirs, atol=1e-6)
+
+
+def test_an_ants_policy_runs_unchanged_on_the_wrapped_extended_ant(
+    ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap],
+) -> None:
+    """The wrapped target has the source's spaces, and the policy needs nothing else."""
+    ant, extended, crossing = ants
+    wrapped = MappedEnv(extended, crossing)
+    assert wrapped.action_space == ant.action_space
+    assert cast("Any", wrapped.observation_space).shape == (105,)
+    assert len(walk(opinionated(PPO, ant), wrapped)) > 5

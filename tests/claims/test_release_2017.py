@@ -1,0 +1,125 @@
+"""The bodies of the 2017 Shapechanger release, to the last bit.
+
+The release wrote each body as a model file of its own. Here the same files are made from
+Gymnasium's by replacing the numbers in their text, and compiled by MuJoCo without any edit.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.ant import ANT
+from shapechanger.embodiments.pendulum import PENDULUM
+from shapechanger.morphology import compile_body
+from tests.morphology.models import differing
+from tests.morphology.scenes import ASSETS
+
+_ANT = (Path(ASSETS) / "ant.xml").read_text()
+_PENDULUM = (Path(ASSETS) / "inverted_pendulum.xml").read_text()
+
+# The sides that the legs point to: signs of x and y.
+_SIDES = {1: ("", ""), 2: ("-", ""), 3: ("-", "-"), 4: ("", "-")}
+
+
+def _replaced(text: str, old: str, new: str, times: int) -> str:
+    """The text with a pattern replaced, which must be there as often as expected."""
+    result, count = re.subn(old, new, text)
+    assert count == times
+    return result
+
+
+def _extended_ant(*, motors: bool) -> str:
+    """The release's extended_ant.xml, with motors for the third segments or without."""
+    text = _replaced(_ANT, 'name="torso" pos="0 0 0.75"', 'name="torso" pos="0 0 1.25"', 1)
+    text = _replaced(text, 'range="30 70"', 'range="30 50"', 2)
+    text = _replaced(text, 'range="-70 -30"', 'range="-50 -30"', 2)
+    for leg, (x, y) in _SIDES.items():
+        axis = "-1 1 0" if leg in (1, 3) else "1 1 0"
+        limits = "30 70" if leg in (1, 4) else "-70 -30"
+        foot = f"""
+            <body name="foot_{leg}" pos="{x}0.4 {y}0.4 0">
+              <joint axis="{axis}" name="foot_{leg}" pos="0 0 0" range="{limits}" type="hinge"/>
+              <geom fromto="0 0 0 {x}0.6 {y}0.6 0" size="0.08" type="capsule"/>
+            </body>"""
+        shank = rf'(<geom fromto="0.0 0.0 0.0 {x}0.4 {y}0.4 0.0"[^>]*/>)'
+        text = _replaced(text, shank, rf"\1{foot}", 1)
+    if motors:
+        motor = '<motor ctrllimited="true" ctrlrange="-1.0 1.0" joint="foot_{}" gear="150"/>'
+        more = "".join(motor.format(leg) for leg in (4, 1, 2, 3))
+        text = _replaced(text, "</actuator>", f"{more}</actuator>", 1)
+    return text
+
+
+_SHANK = r'fromto="0.0 0.0 0.0 (-?)0\.4 (-?)0\.4 0\.0"'
+_POLE = r"0\.001 0 0\.6"
+
+_RELEASED = {
+    "BigAnt": _replaced(_ANT, _SHANK, r'fromto="0 0 0 \g<1>0.8 \g<2>0.8 0"', 4),
+    "AmputatedAnt": _replaced(
+        _ANT,
+        r'fromto="0.0 0.0 0.0 0.4 -0.4 0.0" name="fourth_ankle_geom"',
+        'fromto="0 0 0 0.1 -0.1 0" name="fourth_ankle_geom"',
+        1,
+    ),
+    "ExtendedAnt": _extended_ant(motors=True),
+    "ExtendedAntPassive": _extended_ant(motors=False),
+    "BigInvertedPendulum": _replaced(_PENDULUM, _POLE, "0.001 0 1.2", 1),
+    "SmallInvertedPendulum": _replaced(_PENDULUM, _POLE, "0.001 0 0.3", 1),
+    "Ant": _ANT,
+    "InvertedPendulum": _PENDULUM,
+}
+
+
+def _edited(name: str) -> mujoco.MjModel:
+    """The body of this name as the edits make it."""
+    family = PENDULUM if "Pendulum" in name else ANT
+    source = "inverted_pendulum.xml" if "Pendulum" in name else "ant.xml"
+    return compile_body(family.load(Path(ASSETS) / source), family.bodies[name])
+
+
+@pytest.mark.parametrize("name", _RELEASED)
+def test_edits_make_the_bodies_of_the_release(name: str) -> None:
+    """Every array of the compiled models is the same, bit for bit."""
+    assert differing(mujoco.MjModel.from_xml_string(_RELEASED[name]), _edited(name)) == []
+
+
+def test_every_named_body_is_compared() -> None:
+    """A body that is added to a family needs its model here."""
+    assert {*ANT.bodies, *PENDULUM.bodies} == {*_RELEASED}
+
+
+@pytest.mark.parametrize(
+    ("name", "kilograms"),
+    [
+        *(("Ant", 0.911), ("AmputatedAnt", 0.868), ("BigAnt", 1.138), ("ExtendedAnt", 1.295)),
+        ("ExtendedAntPassive", 1.295),
+    ],
+)
+def test_masses_of_the_ants(name: str, kilograms: float) -> None:
+    """The total masses that the documents give."""
+    assert _edited(name).body_mass.sum() == pytest.approx(kilograms, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "kilograms", "inertia"),
+    [
+        ("InvertedPendulum", 5.019, 0.640),
+        ("BigInvertedPendulum", 9.544, 4.716),
+        ("SmallInvertedPendulum", 2.756, 0.095),
+    ],
+)
+def test_mass_and_inertia_of_the_poles(name: str, kilograms: float, inertia: float) -> None:
+    """The pole's mass and its moment of inertia about the hinge, kg·m²."""
+    model = _edited(name)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mass_matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass_matrix)
+    assert model.body("pole").mass[0] == pytest.approx(kilograms, abs=5e-4)
+    hinge = model.joint("hinge").dofadr[0]
+    assert mass_matrix[hinge, hinge] == pytest.approx(inertia, abs=5e-4)

@@ -1,0 +1,394 @@
+"""The argument `body=`, and changing the body at a reset."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import gymnasium.envs.mujoco
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+
+from shapechanger.embodiments.family import BodyLike
+from shapechanger.envs import CATALOGUE
+from shapechanger.errors import BrokenModel, MorphologyError, SpaceMismatch, UnknownName
+from shapechanger.morphology import (
+    AddSegment,
+    Cut,
+    Gear,
+    JointRange,
+    Lock,
+    Mass,
+    Remove,
+    Split,
+    Stretch,
+    from_json,
+    to_json,
+)
+from shapechanger.morphology.fingerprint import fingerprint
+
+_BIG = (Stretch("shank_*", 2.0),)
+_OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))
+
+
+def _compiled(model: mujoco.MjModel) -> bytes:
+    """Everything that a compiled model holds."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def _model(env_id: str, **arguments: Any) -> mujoco.MjModel:
+    with gym.make(env_id, **arguments) as env:
+        return env.unwrapped.model
+
+
+def _everything(env: Any) -> dict[str, Any]:
+    """All that follows from a body, and the state that it is in."""
+    return {
+        "body": env.body,
+        "model": _compiled(env.model),
+        "layouts": (env.observation_layout, env.action_layout),
+        "spaces": (env.observation_space, env.action_space),
+        "pose": env.init_qpos.tolist(),
+        "velocity": env.init_qvel.tolist(),
+        "standing": env.standing_height,
+        "healthy": getattr(env, "healthy_z_range", None),
+        "spec": env.spec.to_json(),
+        "state": env.state_vector().tolist(),
+        "rng": env.np_random.bit_generator.state,
+    }
+
+
+def _episode(env: Any, seed: int) -> list[np.ndarray]:
+    """What is seen in twenty steps."""
+    observation, _ = env.reset(seed=seed)
+    rng = np.random.default_rng(seed)
+    seen = [observation]
+    for _ in range(20):
+        seen.append(env.step(rng.uniform(-1.0, 1.0, env.action_space.shape))[0])
+    return seen
+
+
+@pytest.fixture
+def ant() -> Iterator[Any]:
+    """An ant that has begun."""
+    with gym.make("shapechanger/Ant-v1") as env:
+        env.reset(seed=5)
+        yield env
+
+
+# Making an env.
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "BigAnt",
+        _BIG[0],
+        _BIG,
+        list(_BIG),
+        '[{"edit": "stretch", "body": "shank_*", "factor": 2.0}]',
+        ' {"edit": "stretch", "body": "shank_*", "factor": 2}',
+        iter(_BIG),
+    ],
+    ids=["name", "edit", "tuple", "list", "JSON list", "JSON object", "iterator"],
+)
+def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
+    """Its name, an edit, several, or their JSON make the same model."""
+    with gym.make("shapechanger/Ant-v1", body=body) as env:
+        assert env.unwrapped.body == _BIG
+        model = env.unwrapped.model
+    assert fingerprint(model) == fingerprint(_model("shapechanger/BigAnt-v1"))
+
+
+def test_no_edits_are_the_body_as_it_is() -> None:
+    """An empty list is a body too."""
+    body = _compiled(_model("shapechanger/BigAnt-v1", body="[]"))
+    assert body == _compiled(_model("shapechanger/Ant-v1"))
+
+
+@pytest.mark.parametrize(
+    ("body", "error", "sentence"),
+    [
+        ("BigAnd", UnknownName, "body of the family Ant matches 'BigAnd'. Did you mean 'BigAnt'"),
+        ("BigInvertedPendulum", UnknownName, "There are: Ant, AmputatedAnt, BigAnt, ExtendedAnt"),
+        ("", UnknownName, "body of the family Ant matches ''"),
+        (Stretch("shank_5", 2.0), UnknownName, "No body matches 'shank_5'. Did you mean 'shank_"),
+        ('{"edit": "strech", "body": "a"}', UnknownName, "'strech'. Did you mean 'stretch'"),
+        (
+            '{"edit": "stretch", "body": "a", "faktor": 2}',
+            UnknownName,
+            "'faktor'. Did you mean 'factor'",
+        ),
+        ("[1, 2]", MorphologyError, "An edit is an object"),
+        ("[", MorphologyError, "JSON list of edits"),
+        (7, MorphologyError, "made of edits such as Stretch"),
+        (None, MorphologyError, "made of edits such as Stretch"),
+        (Cut("torso", 0.5), MorphologyError, "'torso' is the trunk"),
+        (Mass("shank_1", to=1e-18), BrokenModel, "MuJoCo does not compile the body .*mass"),
+    ],
+)
+def test_a_body_that_cannot_be_is_refused(
+    ant: Any, body: Any, error: type[Exception], sentence: str
+) -> None:
+    """With the nearest name that exists; when it is made and when it is changed."""
+    with pytest.raises(error, match=sentence):
+        gym.make("shapechanger/Ant-v1", body=body)
+    before = _everything(ant.unwrapped)
+    with pytest.raises(error, match=sentence):
+        ant.reset(seed=99, options={"body": body})
+    assert _everything(ant.unwrapped) == before
+
+
+# Rebuilding an env.
+
+
+@pytest.mark.parametrize("env_id", CATALOGUE)
+def test_the_spec_and_a_pickle_make_the_same_model(env_id: str) -> None:
+    """To the last bit, whichever body it was made with."""
+    with gym.make(env_id) as env:
+        same = _compiled(env.unwrapped.model)
+        rebuilt = [
+            gym.make(EnvSpec.from_json(env.spec.to_json())),
+            pickle.loads(pickle.dumps(env)),
+            pickle.loads(pickle.dumps(env.unwrapped)),
+            copy.deepcopy(env),
+        ]
+    for again in rebuilt:
+        assert _compiled(again.unwrapped.model) == same
+        again.close()
+
+
+def test_the_spec_holds_the_body_as_json() -> None:
+    """Others can read it, and edits can be given as values."""
+    with gym.make("shapechanger/Ant-v1", body=_OTHER, reset_noise_scale=0.0) as env:
+        assert env.spec.kwargs == {"body": to_json(_OTHER), "reset_noise_scale": 0.0}
+        model = env.unwrapped.model
+        again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.body == from_json(again.spec.kwargs["body"]) == _OTHER
+    assert _compiled(again.unwrapped.model) == _compiled(model)
+    again.close()
+
+
+def test_specs_of_two_envs_are_apart() -> None:
+    """The registered spec stays as it was registered."""
+    with gym.make("shapechanger/BigAnt-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
+        one.reset(seed=0, options={"body": "Ant"})
+        assert other.unwrapped.spec.kwargs["body"] == to_json(_BIG)
+    assert gym.spec("shapechanger/BigAnt-v1").kwargs == {"body": "BigAnt"}
+
+
+def test_all_arguments_are_rebuilt() -> None:
+    """A copy has the rewards, spaces and heights of the original."""
+    arguments = {
+        "healthy_z_range": (0.1, 3.0),
+        "ctrl_cost_weight": 0.125,
+        "exclude_current_positions_from_observation": False,
+        "contact_force_range": (-2.0, 3.0),
+    }
+    with gym.make("shapechanger/ExtendedAnt-v1", actuated_extension=False, **arguments) as env:
+        copies = [
+            pickle.loads(pickle.dumps(env)),
+            gym.make(EnvSpec.from_json(env.spec.to_json())),
+        ]
+        for again in copies:
+            assert tuple(again.unwrapped.healthy_z_range) == (0.1, 3.0)
+            assert again.unwrapped.observation_layout == env.unwrapped.observation_layout
+            assert again.unwrapped.action_layout == env.unwrapped.action_layout
+            for x, y in zip(_episode(env, 1), _episode(again, 1), strict=True):
+                np.testing.assert_array_equal(x, y)
+            again.close()
+
+
+# Changing the body at a reset.
+
+
+@pytest.mark.parametrize("body", ["BigAnt", "AmputatedAnt", _OTHER], ids=["big", "cut", "other"])
+def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
+    """An env that changed its body is the env that was made with it."""
+    observation, _ = ant.reset(seed=6, options={"body": body})
+    with gym.make("shapechanger/Ant-v1", body=body) as made:
+        expected, _ = made.reset(seed=6)
+        np.testing.assert_array_equal(observation, expected)
+        mine, theirs = _everything(ant.unwrapped), _everything(made.unwrapped)
+        assert mine == theirs
+        for x, y in zip(_episode(ant, 7), _episode(made, 7), strict=True):
+            np.testing.assert_array_equal(x, y)
+
+
+def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
+    """What is derived from a body is derived again."""
+    env = ant.unwrapped
+    small, data, model = env.standing_height, env.data, env.model
+    ant.reset(seed=0, options={"body": (*_BIG, JointRange("hip_1", -0.1, 0.2))})
+    assert env.standing_height > 1.5 * small
+    assert env.healthy_z_range == (-math.inf, 1.9 * env.standing_height)
+    hip = env.observation_layout["hip_1/angle"]
+    assert (hip.low, hip.high) == (-0.1, 0.2)
+    assert env.data is not data
+    assert env.model is not model
+    ant.reset(options={"body": Gear("hip_4", 0.5)})
+    assert env.action_layout["hip_4/motor"].gain == 75.0
+    assert env.standing_height == small
+
+
+def test_a_pole_changes_its_length_too() -> None:
+    """Families without a trunk follow as well."""
+    with gym.make("shapechanger/InvertedPendulum-v1") as env:
+        env.reset(seed=0, options={"body": "BigInvertedPendulum"})
+        big = _compiled(_model("shapechanger/BigInvertedPendulum-v1"))
+        assert _compiled(env.unwrapped.model) == big
+
+
+def test_a_new_body_starts_from_rest(ant: Any) -> None:
+    """Nothing of the old body's episode is left in the new one's."""
+    for _ in range(10):
+        ant.step(np.ones(8, np.float32))
+    first, _ = ant.reset(seed=3, options={"body": "BigAnt"})
+    assert ant.unwrapped.data.time == 0.0
+    for _ in range(10):
+        ant.step(np.ones(8, np.float32))
+    second, _ = ant.reset(seed=3)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
+    """Resets without options, or with others, keep it; the same body again costs nothing."""
+    ant.reset(options={"body": "BigAnt"})
+    model = ant.unwrapped.model
+    for options in (None, {}, {"height": 3}, {"body": "BigAnt"}, {"body": _BIG[0]}):
+        ant.reset(options=options)
+        assert ant.unwrapped.body == _BIG
+        assert ant.unwrapped.model is model
+    ant.reset(options={"body": "Ant"})
+    assert _compiled(ant.unwrapped.model) == _compiled(_model("shapechanger/Ant-v1"))
+
+
+def test_a_pickle_after_a_reset_has_the_new_body(ant: Any) -> None:
+    """And so has the spec."""
+    ant.reset(options={"body": "AmputatedAnt"})
+    model = _compiled(ant.unwrapped.model)
+    spec = ant.unwrapped.spec
+    rebuilt = [
+        pickle.loads(pickle.dumps(ant)),
+        pickle.loads(pickle.dumps(ant.unwrapped)),
+        gym.make(EnvSpec.from_json(spec.to_json())),
+    ]
+    for again in rebuilt:
+        assert _compiled(again.unwrapped.model) == model
+        assert again.unwrapped.body == (Cut("shank_4", 0.25),)
+        again.close()
+
+
+def _pendulum_with_a_motor_on_its_hinge(folder: Path) -> str:
+    """A pendulum whose motor, and the hinge that it drives, bear the same name."""
+    assets = Path(gymnasium.envs.mujoco.__file__).parent / "assets"
+    text = (assets / "inverted_pendulum.xml").read_text()
+    changed = text.replace('joint="slider"', 'joint="hinge"').replace(
+        'name="slide"', 'name="hinge"'
+    )
+    path = folder / "driven.xml"
+    path.write_text(changed)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        (
+            "ExtendedAnt",
+            "the observation space from 105 to 137 numbers .it gains foot_1/angle, foot_2/angle, "
+            "foot_3/angle and more",
+        ),
+        (Remove("aux_2"), "the observation space from 105 to 89 numbers .it loses hip_2/angle"),
+        (Lock("ankle_1"), "space from 105 to 103 numbers .it loses ankle_1/angle, ankle_1/velo"),
+        (
+            Split("shank_3", "shin", gear=50.0),
+            "space from 105 to 113 numbers .it gains shin/angle, shin/velocity, shin/contact/tx an",
+        ),
+    ],
+    ids=["more segments", "a leg less", "a joint less", "a joint more"],
+)
+def test_a_body_of_other_spaces_is_refused(ant: Any, body: BodyLike, sentence: str) -> None:
+    """The sentence names what is lost and gained; the env goes on as if nothing had been asked."""
+    before = _everything(ant.unwrapped)
+    with pytest.raises(SpaceMismatch, match=sentence) as caught:
+        ant.reset(seed=99, options={"body": body})
+    assert "make another env with this body" in str(caught.value)
+    assert _everything(ant.unwrapped) == before
+    with gym.make("shapechanger/Ant-v1") as fresh:
+        fresh.reset(seed=5)
+        action = np.full(8, 0.3, np.float32)
+        np.testing.assert_array_equal(ant.step(action)[0], fresh.step(action)[0])
+        for x, y in zip(_episode(ant, 2), _episode(fresh, 2), strict=True):
+            np.testing.assert_array_equal(x, y)
+
+
+def test_motors_that_come_or_go_are_refused() -> None:
+    """The observations are the same: only the action space would change."""
+    with gym.make("shapechanger/ExtendedAnt-v1") as env:
+        env.reset(seed=0)
+        with pytest.raises(
+            SpaceMismatch, match=r"action space from 12 to 8 numbers \(it loses foot_4"
+        ):
+            env.reset(options={"body": "ExtendedAntPassive"})
+        assert env.unwrapped.model.nu == 12
+        env.step(env.action_space.sample())
+
+
+def test_motors_in_another_order_are_refused() -> None:
+    """The names are the same, but a policy would pull the wrong joints."""
+    feet = [AddSegment(f"shank_{leg}", f"foot_{leg}", (0.1, 0.1, 0.0), gear=9.0) for leg in (1, 4)]
+    with gym.make("shapechanger/Ant-v1", body=feet) as env:
+        env.reset(seed=0)
+        with pytest.raises(
+            SpaceMismatch, match=r"action space from 10 to 10 .*\(its order changes"
+        ):
+            env.reset(options={"body": feet[::-1]})
+        assert env.unwrapped.action_layout.names[-2:] == ("foot_1/motor", "foot_4/motor")
+
+
+def test_motors_with_other_bounds_are_refused(tmp_path: Path) -> None:
+    """The same names in the same order, but controls of 3 would be clipped to 1."""
+    driven = _pendulum_with_a_motor_on_its_hinge(tmp_path)
+    weaker = (
+        Lock("hinge"),
+        Split("pole", "hinge", lower=-1.0, upper=1.0, gear=9.0, axis=(0, 1, 0)),
+    )
+    with gym.make("shapechanger/InvertedPendulum-v1", xml_file=driven) as env:
+        env.reset(seed=0)
+        assert env.action_space.high == [3.0]
+        with pytest.raises(SpaceMismatch, match=r"action space from 1 to 1 .*\(its bounds move\)"):
+            env.reset(options={"body": weaker})
+        assert env.unwrapped.action_layout["hinge/motor"].high == 3.0
+
+
+def test_a_model_of_ones_own_is_edited_like_ours(tmp_path: Path) -> None:
+    """`xml_file` names another model; bodies are edits of that one, also in a copy."""
+    driven = _pendulum_with_a_motor_on_its_hinge(tmp_path)
+    with gym.make("shapechanger/BigInvertedPendulum-v1", xml_file=driven) as env:
+        assert env.unwrapped.action_layout.names == ("hinge/motor",)
+        model = _compiled(env.unwrapped.model)
+        again = pickle.loads(pickle.dumps(env))
+    assert _compiled(again.unwrapped.model) == model
+    again.close()
+
+
+def test_body_towards_is_a_path_between_two_envs() -> None:
+    """At its ends are the bodies of the two."""
+    with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
+        ends = [one.unwrapped.body_towards(other.unwrapped, alpha) for alpha in (0.0, 1.0)]
+        middle = one.unwrapped.body_towards(other.unwrapped, 0.5)
+    prints = [fingerprint(_model("shapechanger/Ant-v1", body=body)) for body in ends]
+    assert prints == [fingerprint(_model(f"shapechanger/{name}-v1")) for name in ("Ant", "BigAnt")]
+    model = _model("shapechanger/Ant-v1", body=middle)
+    shank = model.geom_size[model.body("shank_1").geomadr[0], 1]
+    assert shank == pytest.approx(1.5 * 0.2 * math.sqrt(2.0))

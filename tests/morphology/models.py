@@ -1,0 +1,166 @@
+"""Small models, and ways to look at them, that the tests of edits share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.ant import ANT
+from shapechanger.embodiments.pendulum import PENDULUM
+from shapechanger.morphology import Edit, compile_body
+from tests.morphology.scenes import ASSETS
+
+Array = NDArray[np.float64]
+
+# A leg of two segments on a trunk that floats above a floor, written in degrees as most models are.
+LEG = """
+<mujoco model="leg">
+  <default><geom density="500"/><joint armature=".1"/></default>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1"/>
+    <body name="trunk" pos="0 0 1">
+      <freejoint name="root"/>
+      <geom name="trunk" type="box" size=".2 .1 .05"/>
+      <body name="thigh" pos="0 .2 0">
+        <joint name="hip" axis="1 0 0" range="-60 30" damping="2" stiffness="3" frictionloss=".5"/>
+        <geom name="thigh" type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
+        <site name="scar" pos="0 0 -.06"/>
+        <site name="knee_cap" pos="0 .03 -.3"/>
+        <body name="shin" pos="0 0 -.25">
+          <joint name="knee" pos="0 0 -.05" axis="1 0 0" range="-90 0" damping="1"/>
+          <geom name="shin" type="capsule" fromto="0 0 -.05 0 0 -.25" size=".02"/>
+          <geom name="sole" size=".04" pos="0 0 -.25"/>
+          <site name="toe" pos="0 0 -.29"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="hip" joint="hip" gear="20" ctrlrange="-1 1" ctrllimited="true"/>
+    <motor name="knee" joint="knee" gear="10" ctrlrange="-1 1" ctrllimited="true"/>
+  </actuator>
+</mujoco>
+"""
+
+# A body that moves by several joints at once, in radians, none of them where the body's origin is.
+GANTRY = """
+<mujoco model="gantry">
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="rig" pos=".1 -.2 .3" euler=".3 -.2 .5">
+      <joint name="x" type="slide" axis="1 .2 0" pos="0 0 -3" range="-1 2" ref=".4"/>
+      <joint name="yaw" axis="0 .1 1" pos=".3 .1 0" range="-1 .5" ref=".2"/>
+      <joint name="y" type="slide" axis="0 1 .5"/>
+      <joint name="pitch" axis="0 -2 1" pos="0 .2 .1"/>
+      <geom name="rig" type="box" size=".1 .2 .3" pos="0 .1 .2"/>
+      <body name="boom" pos=".4 .1 0" axisangle="1 1 0 .7">
+        <joint name="swing" axis="1 0 1" pos="-.1 0 .2" range="-2 2"/>
+        <geom name="boom" type="capsule" size=".05 .3" euler=".2 .3 .4" pos=".1 .2 .3"/>
+        <site name="hook" pos=".1 .2 .6"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><position name="yaw" joint="yaw" kp="3"/></actuator>
+  <sensor>
+    <jointpos name="yaw_angle" joint="yaw"/>
+    <actuatorfrc name="yaw_torque" actuator="yaw"/>
+    <jointpos name="swing_angle" joint="swing"/>
+    <framepos name="hook" objtype="site" objname="hook"/>
+  </sensor>
+  <equality><joint joint1="yaw" joint2="pitch"/><joint joint1="y" joint2="swing"/></equality>
+  <keyframe><key name="home" qpos=".4 .2 0 0 .1"/></keyframe>
+</mujoco>
+"""
+
+
+def spec_of(text: str) -> mujoco.MjSpec:
+    """A model from its MJCF."""
+    return mujoco.MjSpec.from_string(text)
+
+
+def leg() -> mujoco.MjSpec:
+    """A fresh leg on a trunk."""
+    return spec_of(LEG)
+
+
+def gantry() -> mujoco.MjSpec:
+    """A fresh body of several joints."""
+    return spec_of(GANTRY)
+
+
+def ant() -> mujoco.MjSpec:
+    """Gymnasium's ant, with a name for everything."""
+    return ANT.load(os.path.join(ASSETS, "ant.xml"))
+
+
+def pendulum() -> mujoco.MjSpec:
+    """Gymnasium's inverted pendulum, with a name for everything."""
+    return PENDULUM.load(os.path.join(ASSETS, "inverted_pendulum.xml"))
+
+
+def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
+    """A trunk with one limb, `link`, on a hinge, made of `content`."""
+    return spec_of(
+        f"""<mujoco><compiler {compiler}/><worldbody><body name="trunk"><geom name="trunk"
+        type="box" size=".1 .1 .1"/><body name="link" pos="0 0 1"><joint name="link" axis="0 1 0"/>
+        {content}</body></body></worldbody></mujoco>"""
+    )
+
+
+def built(spec: mujoco.MjSpec, *edits: Edit) -> mujoco.MjModel:
+    """The compiled model with some edits."""
+    return compile_body(spec, edits)
+
+
+def differing(
+    a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()
+) -> list[str]:
+    """The arrays of two models that differ in shape or in any bit, but for names and paths."""
+    fields = [name for name in dir(a) if isinstance(getattr(a, name), np.ndarray)]
+    names = [n for n in fields if n in ("names", "names_map", "paths") or n.startswith("name_")]
+    unlike = [
+        n for n in fields if not np.array_equal(getattr(a, n), getattr(b, n), equal_nan=True)
+    ]
+    return sorted({*unlike} - {*names} - {*ignoring})
+
+
+def mass(model: mujoco.MjModel, *bodies: str) -> float:
+    """The mass of some bodies, or of all, kg."""
+    if not bodies:
+        return float(model.body_mass.sum())
+    return float(sum(model.body(name).mass[0] for name in bodies))
+
+
+def posed(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> mujoco.MjData:
+    """Where everything is with some hinges and slides at given positions, rad or m."""
+    data = mujoco.MjData(model)
+    for joint, position in (angles or {}).items():
+        data.joint(joint).qpos[:] = position
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def tip(model: mujoco.MjModel, site: str, angles: dict[str, float] | None = None) -> Array:
+    """Where a site is in the world, m."""
+    return np.array(posed(model, angles).site(site).xpos)
+
+
+def capsule_mass(radius: float, length: float, density: float) -> float:
+    """Mass of a capsule whose axis is `length` long, kg."""
+    return density * np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+
+
+def capsule_inertia(radius: float, length: float, density: float) -> tuple[float, float]:
+    """Moments of inertia of a capsule about its centre: across its axis and along it, kg·m²."""
+    cylinder = density * np.pi * radius**2 * length
+    caps = density * np.pi * radius**3 * 4.0 / 3.0
+    along = 0.5 * cylinder * radius**2 + 0.4 * caps * radius**2
+    # A half ball's centre of mass is 3/8 of its radius from its flat side.
+    across = cylinder * (radius**2 / 4.0 + length**2 / 12.0) + caps * (
+        0.4 * radius**2 + length**2 / 4.0 + 3.0 / 8.0 * length * radius
+    )
+    return across, along
