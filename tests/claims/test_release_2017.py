@@ -56,7 +56,7 @@ def _extended_ant(*, motors: bool) -> str:
 
 
 _SHANK = r'fromto="0.0 0.0 0.0 (-?)0\.4 (-?)0\.4 0\.0"'
-_POLE = r"0\.001 0 0\.6"
+_POLE = r'(?<=0 0 0 )0\.001 0 0\.6(?=" name="cpole")'
 
 _RELEASED = {
     "BigAnt": _replaced(_ANT, _SHANK, r'fromto="0 0 0 \g<1>0.8 \g<2>0.8 0"', 4),

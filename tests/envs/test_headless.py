@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import pytest
+
 from tests.envs.drawing import run_python
 
 pytestmark = pytest.mark.skipif(

@@ -116,16 +116,17 @@ def built(spec: mujoco.MjSpec, *edits: Edit) -> mujoco.MjModel:
     return compile_body(spec, edits)
 
 
-def differing(
-    a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()
-) -> list[str]:
+def differing(a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()) -> list[str]:
     """The arrays of two models that differ in shape or in any bit, but for names and paths."""
     fields = [name for name in dir(a) if isinstance(getattr(a, name), np.ndarray)]
-    names = [n for n in fields if n in ("names", "names_map", "paths") or n.startswith("name_")]
+    skipped = ("_", "name_", "names_", "paths")
     unlike = [
-        n for n in fields if not np.array_equal(getattr(a, n), getattr(b, n), equal_nan=True)
+        name
+        for name in fields
+        if not name.startswith(skipped)
+        and not np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
     ]
-    return sorted({*unlike} - {*names} - {*ignoring})
+    return sorted({*unlike} - {*ignoring})
 
 
 def mass(model: mujoco.MjModel, *bodies: str) -> float:

@@ -15,20 +15,29 @@ class Renderer(MujocoRenderer):
 
     OpenGL draws into, and deletes from, whichever context is current. Gymnasium makes a context
     current only when it is new: with two of them one draws black frames, and closing one deletes
-    the textures of the other. It also shuts GLFW down, and all windows with it.
+    the textures of the other. It also shuts GLFW down, and all windows with it. And its free camera
+    stays where it is while the robot runs out of the picture.
+
+    Args:
+        *arguments: As Gymnasium's renderer.
+        follow: Number of the body that a free camera follows; None for a camera that stays.
+        **more: As Gymnasium's renderer.
     """
 
     _viewers: dict[str, OffScreenViewer | WindowViewer]
 
-    def __init__(self, *arguments: Any, **more: Any) -> None:
+    def __init__(self, *arguments: Any, follow: int | None = None, **more: Any) -> None:
         super().__init__(*arguments, **more)  # pyright: ignore[reportUnknownMemberType]
+        self._follow = follow
         # An env that is dropped without being closed must not take the pictures of another along.
         weakref.finalize(self, _free, self._viewers).atexit = False
 
     def render(self, render_mode: str | None) -> Any:
         """A frame of `render_mode`, as Gymnasium's renderer draws it."""
-        if self.viewer is not None:
-            self.viewer.make_context_current()
+        viewer = cast("Any", self._get_viewer(render_mode))
+        viewer.make_context_current()
+        if self._follow is not None and self.camera_id == -1:
+            viewer.cam.lookat[:] = self.data.xpos[self._follow]
         return cast("Any", super().render(render_mode))
 
     def close(self) -> None:

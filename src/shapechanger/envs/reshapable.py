@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
 __all__ = ["Reshapable"]
+
+# How far the camera is from a body that it follows; 4 m for the ant, as in Gymnasium.
+_VIEW_DISTANCE_PER_REACH: Final = 3.0
 
 
 class Reshapable(MujocoEnv):
@@ -77,6 +80,7 @@ class Reshapable(MujocoEnv):
             require_screen()
         elif mode is not None:
             choose_gl()
+        self._given_camera: dict[str, Any] | None = arguments.get("default_camera_config")
         self._renderer_arguments = {
             "max_geom": arguments.get("max_geom", 1000),
             "camera_id": arguments.get("camera_id"),
@@ -189,12 +193,17 @@ class Reshapable(MujocoEnv):
         """Draw the present body from here on."""
         renderer = self.mujoco_renderer
         renderer.close()
+        trunk = trunk_joint(self.model)
+        camera = self._given_camera or renderer.default_cam_config
+        if trunk is not None and self._given_camera is None:
+            camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
         self.mujoco_renderer = Renderer(
             self.model,
             self.data,
-            renderer.default_cam_config,
+            camera,
             self.width,
             self.height,
+            follow=None if trunk is None else int(self.model.jnt_bodyid[trunk]),
             **self._renderer_arguments,
         )
 

@@ -68,8 +68,9 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
 
-# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 32,768 steps, and
-# `ppo-run` on the ant, which it takes to some 2 m/s within a million.
+# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 32,768 steps.
+# `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
+# return of 2,215, after 1,048,576 steps.
 LEARNERS: Final[dict[str, LearnerSettings]] = {
     "ppo-balance": LearnerSettings(
         n_envs=16,

@@ -1,0 +1,86 @@
+"""What can go wrong: the tree of exceptions, and messages that say what exists instead."""
+
+from __future__ import annotations
+
+import builtins
+import pickle
+import re
+
+import pytest
+
+import shapechanger.errors as errors
+from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName
+
+
+def _printed_tree() -> dict[str, tuple[str, str | None]]:
+    """For each class in the module's docstring its parent and the builtin in brackets."""
+    lines = re.findall(
+        r"^((?:[│ ]   |[├└]── )*)(\w+)(?: \((\w+)\))?(?:  .*)?$", errors.__doc__ or "", re.M
+    )
+    tree: dict[str, tuple[str, str | None]] = {}
+    above: list[str] = []
+    for indent, name, builtin in lines:
+        if not name.endswith(("Error", *errors.__all__)):
+            continue
+        depth = len(indent) // 4
+        above = [*above[:depth], name]
+        tree[name] = (above[depth - 1] if depth else "Exception", builtin or None)
+    return tree
+
+
+def test_the_tree_in_the_docstring_is_the_tree() -> None:
+    """Each class has the parent and the builtin that the module says it has."""
+    tree = _printed_tree()
+    assert sorted(tree) == sorted(errors.__all__)
+    for name, (parent, builtin) in tree.items():
+        bases = [base.__name__ for base in getattr(errors, name).__bases__]
+        assert bases == [parent, *([builtin] if builtin else [])]
+        assert builtin is None or hasattr(builtins, builtin)
+
+
+def test_one_except_catches_all() -> None:
+    """Whoever catches the base catches everything that the package refuses to do."""
+    assert all(issubclass(getattr(errors, name), ShapechangerError) for name in errors.__all__)
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "message"),
+    [
+        (
+            "thgih",
+            ["torso", "thigh"],
+            "No body matches 'thgih'. Did you mean 'thigh'? There are: torso, thigh.",
+        ),
+        ("wheel", ["torso", "thigh"], "No body matches 'wheel'. There are: torso, thigh."),
+        ("wheel", [], "No body matches 'wheel'. There are: none."),
+    ],
+)
+def test_unknown_names_come_with_the_nearest(name: str, known: list[str], message: str) -> None:
+    """The message names what exists, and what was probably meant."""
+    error = UnknownName("body", name, iter(known))
+    assert str(error) == message
+    assert (error.kind, error.name, error.known) == ("body", name, tuple(known))
+
+
+def test_long_lists_of_names_are_cut() -> None:
+    """A list that hides the sentence helps nobody; the error itself keeps it."""
+    error = UnknownName("joint", "x", [f"j{i}" for i in range(43)])
+    assert str(error).endswith("j38, j39 and 3 more.")
+    assert len(error.known) == 43
+    assert "more" not in str(UnknownName("joint", "x", [f"j{i}" for i in range(40)]))
+
+
+def test_missing_extras_name_the_command() -> None:
+    """The message is the line to type."""
+    error = MissingExtra("mujoco", "sim")
+    assert "run `pip install 'shapechanger[sim]'`" in str(error)
+    assert (error.package, error.extra) == ("mujoco", "sim")
+
+
+@pytest.mark.parametrize(
+    "error", [UnknownName("body", "thgih", ["thigh"]), MissingExtra("mujoco", "sim")]
+)
+def test_errors_cross_between_processes(error: ShapechangerError) -> None:
+    """A worker's error arrives with its message and its fields."""
+    copy = pickle.loads(pickle.dumps(error))
+    assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))

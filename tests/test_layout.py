@@ -1,0 +1,129 @@
+"""What each number of an observation or an action means."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import LayoutError, UnknownName
+from shapechanger.layout import Element, Feature, Layout
+
+HINGE = Feature("hinge/angle", "rad", -1.5, 1.0, Element("joint", "hinge"))
+EYE = Feature("eye/image", "1", 0.0, 255.0, Element("camera", "eye"), shape=(2, 3))
+SPEED = Feature("hinge/velocity", "rad/s", element=Element("joint", "hinge"))
+MOTOR = Feature("hinge/motor", "1", -1.0, 1.0, gain=150.0, gain_unit="N·m")
+LAYOUT = Layout((HINGE, EYE, SPEED, MOTOR))
+
+
+def test_a_block_takes_as_many_places_as_it_has_numbers() -> None:
+    """Sizes and slices count numbers, the length counts features."""
+    assert [feature.size for feature in LAYOUT] == [1, 6, 1, 1]
+    assert (len(LAYOUT), LAYOUT.size) == (4, 9)
+    assert LAYOUT.slices == {
+        "hinge/angle": slice(0, 1),
+        "eye/image": slice(1, 7),
+        "hinge/velocity": slice(7, 8),
+        "hinge/motor": slice(8, 9),
+    }
+
+
+def test_bounds_are_given_per_number() -> None:
+    """A block's bound stands at each of its places."""
+    np.testing.assert_array_equal(LAYOUT.low, [-1.5, *[0.0] * 6, -np.inf, -1.0])
+    np.testing.assert_array_equal(LAYOUT.high, [1.0, *[255.0] * 6, np.inf, 1.0])
+    assert LAYOUT.low.dtype == LAYOUT.high.dtype == np.float64
+
+
+def test_features_are_found_by_name() -> None:
+    """A layout is read like a dictionary."""
+    assert LAYOUT["eye/image"] is EYE
+    assert "eye/image" in LAYOUT
+    assert "nose" not in LAYOUT
+    assert LAYOUT.names == ("hinge/angle", "eye/image", "hinge/velocity", "hinge/motor")
+    with pytest.raises(UnknownName, match=r"No feature matches 'hinge/angel'. Did you mean"):
+        LAYOUT["hinge/angel"]
+
+
+def test_features_are_found_by_glob() -> None:
+    """A glob finds some or complains, a name finds one or complains."""
+    assert LAYOUT.matching("hinge/*") == (HINGE, SPEED, MOTOR)
+    assert LAYOUT.matching("hinge/angle") == (HINGE,)
+    for pattern in ("knee/*", "knee/angle"):
+        with pytest.raises(UnknownName, match="No feature matches 'knee"):
+            LAYOUT.matching(pattern)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "middle"),
+    [
+        (-1.5, 1.0, -0.25),
+        (-math.inf, math.inf, 0.0),
+        (0.5, math.inf, 0.5),
+        (-math.inf, -2.0, -2.0),
+        (-1.0, math.inf, 0.0),
+        (3.0, 3.0, 3.0),
+    ],
+)
+def test_the_middle_lies_in_the_range(low: float, high: float, middle: float) -> None:
+    """Where a range has no middle it is what is nearest to zero."""
+    assert Feature("x", "m", low, high).middle == middle
+
+
+def test_features_print_with_their_unit() -> None:
+    """As a table's heading would have it."""
+    assert str(HINGE) == "hinge/angle [rad]"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"name": ""}, "needs a name"),
+        ({"low": 1.0, "high": 0.0}, "x: the range 1.0 to 0.0 is empty"),
+        ({"low": math.nan}, "range nan to inf is empty"),
+        ({"high": math.nan}, "range -inf to nan is empty"),
+        ({"low": math.inf}, "range inf to inf is empty"),
+        ({"high": -math.inf}, "range -inf to -inf is empty"),
+        ({"gain": 0.0}, "gain must be above zero, got 0.0"),
+        ({"gain": -1.0}, "gain must be above zero"),
+        ({"gain": math.nan}, "gain must be above zero"),
+        ({"gain": math.inf}, "gain must be above zero"),
+        ({"shape": (2, 0)}, r"shape \(2, 0\) holds a number below one"),
+    ],
+)
+def test_impossible_features_are_refused(wrong: dict[str, Any], message: str) -> None:
+    """What no number could be is refused when it is written down."""
+    with pytest.raises(LayoutError, match=message):
+        Feature(**{"name": "x", "unit": "m", **wrong})
+
+
+def test_names_are_unique() -> None:
+    """A name that stands for two numbers stands for none."""
+    with pytest.raises(LayoutError, match="Two features are called 'eye/image'"):
+        Layout((HINGE, EYE, SPEED, EYE))
+
+
+def test_json_gives_back_the_layout() -> None:
+    """Also with blocks, elements, gains and bounds that JSON cannot write."""
+    text = LAYOUT.to_json()
+    assert Layout.from_json(text) == Layout.from_json(text.encode()) == LAYOUT
+    assert "Infinity" not in text
+    assert Layout.from_json('{"features":[]}').size == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "null", '{"features":1}', '{"features":[{"name":"x"}]}', b"\xff{}"),
+        '{"features":[{"name":"","unit":"m"}]}',
+        '{"features":[{"name":"x","unit":"m","low":"deep"}]}',
+        '{"features":[{"name":"x","unit":"m","element":{"kind":"leg","name":"y"}}]}',
+        '{"features":[{"name":"x","unit":"m"},{"name":"x","unit":"m"}]}',
+    ],
+)
+def test_other_json_is_no_layout(text: str | bytes) -> None:
+    """Whatever is wrong with the text, the error is one of ours."""
+    with pytest.raises(LayoutError, match="This is not a layout: "):
+        Layout.from_json(text)
