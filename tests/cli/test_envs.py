@@ -95,6 +95,11 @@ def test_render_refuses_a_place_that_cannot_be_written(
         ),
         (("show", "Ant", "--body", '[{"edit":"remove","body":"torso"}]'), "is the trunk"),
         (("compare", "Ant", "Cart"), "No environment matches 'Cart'"),
+        (("compare", "CartPole-v1", "Ant"), "CartPole-v1 offers no certify_shift"),
+        (("compare", "Ant", "CartPole-v1"), "CartPole-v1 offers no certify_shift"),
+        (("render", "CartPole-v1", "--out", "x.png"), "CartPole-v1 offers no picture"),
+        (("show", "CartPole-v1"), "publishes no observation_layout"),
+        (("show", "CartPole-v1", "--body", "Ant"), "CartPole-v1 takes no body"),
     ],
 )
 def test_nonsense_gets_one_sentence(

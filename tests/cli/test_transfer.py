@@ -139,7 +139,7 @@ def test_a_policy_is_trained_played_and_brought_along(
             "train",
             "InvertedPendulum",
             "--steps",
-            "2048",
+            "3072",
             "--out",
             policy,
             "--tensorboard",
@@ -149,7 +149,7 @@ def test_a_policy_is_trained_played_and_brought_along(
     assert "wrote" in capsys.readouterr().out
     assert list(logs.rglob("events.out.tfevents.*"))
     out = str(tmp_path / "study")
-    arguments = ["--source-policy", policy, "--steps", "2048", "--seeds", "2", "--out", out]
+    arguments = ["--source-policy", policy, "--steps", "3072", "--seeds", "2", "--out", out]
     done = run("transfer", "InvertedPendulum", "BigInvertedPendulum", *arguments)
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "study" / "runs" / "source-0").exists()

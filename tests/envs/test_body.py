@@ -186,6 +186,19 @@ def test_specs_of_two_envs_are_apart() -> None:
     assert gym.spec("shapechanger/BigAnt-v1").kwargs == {"body": "BigAnt"}
 
 
+def test_a_spec_that_is_handed_over_stays_as_it_was() -> None:
+    """Wrappers and other programs set the spec of an env; theirs is not ours to change."""
+    spec = gym.spec("shapechanger/BigAnt-v1")
+    with gym.make("shapechanger/Ant-v1") as env:
+        env.unwrapped.spec = spec
+        env.reset(seed=0, options={"body": "AmputatedAnt"})
+        assert env.unwrapped.spec.kwargs == {"body": to_json((Cut("shank_4", 0.25),))}
+        env.unwrapped.spec = None
+        env.reset(seed=0, options={"body": "Ant"})
+        assert env.unwrapped.spec is None
+    assert spec.kwargs == {"body": "BigAnt"}
+
+
 def test_all_arguments_are_rebuilt() -> None:
     """A copy has the rewards, spaces and heights of the original."""
     arguments = {

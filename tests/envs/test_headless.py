@@ -21,23 +21,51 @@ print(os.environ.get("MUJOCO_GL"))
 # What is installed is what can be found.
 _INSTALLED = """
 import ctypes.util
-found = ctypes.util.find_library
 ctypes.util.find_library = lambda name: {libraries!r}.get(name, None)
 """
-# A library without a driver: it opens, and knows no device.
-_NO_DEVICE = """
+# A library of EGL that knows so many devices, of which each has a driver or not.
+_EGL = """
 import ctypes
 
+pointer, count = ctypes.c_void_p, ctypes.POINTER(ctypes.c_int)
+
+@ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.POINTER(pointer), count)
+def devices(most, found, number):
+    for i in range({devices}):
+        found[i] = 1 + i
+    number[0] = {devices}
+    return 1
+
+@ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)
+def display(platform, device, nothing):
+    return 10 + device
+
+extensions = {{b"eglQueryDevicesEXT": devices, b"eglGetPlatformDisplayEXT": display}}
+
 class Function:
+    def __init__(self, call):
+        self.call = call
+
     def __call__(self, *arguments):
-        return 0
+        return self.call(*arguments)
 
 class Library:
-    eglGetProcAddress = Function()
-    eglInitialize = Function()
+    eglGetProcAddress = Function(
+        lambda name: ctypes.cast(extensions[name], pointer).value if {extensions} else None
+    )
+    eglInitialize = Function(lambda display, major, minor: display in {drivers})
 
 ctypes.CDLL = lambda name, *arguments, **more: Library()
 """
+
+
+def _egl(*, devices: int = 0, drivers: tuple[int, ...] = (), extensions: bool = True) -> str:
+    """EGL with so many devices, of which those of these numbers, from 1, have a driver."""
+    displays = tuple(10 + driver for driver in drivers)
+    return _EGL.format(devices=devices, drivers=displays, extensions=extensions)
+
+
+_NO_DRIVER = _egl(devices=2)
 
 
 def _installed(**libraries: str) -> str:
@@ -62,13 +90,23 @@ def test_osmesa_is_chosen_where_egl_is_missing() -> None:
     assert _says(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE) == "osmesa"
 
 
-def test_osmesa_is_chosen_where_egl_has_no_driver() -> None:
-    """As in a container that has the library but no device."""
+@pytest.mark.parametrize(
+    ("egl", "chosen"),
+    [
+        (_egl(extensions=False), "osmesa"),
+        (_egl(), "osmesa"),
+        (_NO_DRIVER, "osmesa"),
+        (_egl(devices=2, drivers=(2,)), "egl"),
+    ],
+    ids=["no extensions", "no device", "no driver", "a driver for the second device"],
+)
+def test_egl_is_chosen_where_a_device_opens(egl: str, chosen: str) -> None:
+    """A container may have the library but no device, and a machine a device without driver."""
     installed = _installed(EGL="libEGL.so.1", OSMesa="libOSMesa.so.8")
-    assert _says(installed + _NO_DEVICE + _CHOOSE) == "osmesa"
+    assert _says(installed + egl + _CHOOSE) == chosen
 
 
-@pytest.mark.parametrize("broken", ["", _NO_DEVICE], ids=["nothing", "EGL without a driver"])
+@pytest.mark.parametrize("broken", ["", _NO_DRIVER], ids=["nothing", "EGL without a driver"])
 def test_a_sentence_says_what_to_install(broken: str) -> None:
     """Where neither works, one command helps."""
     libraries = {"EGL": "libEGL.so.1"} if broken else {}

@@ -123,6 +123,52 @@ def test_a_closed_env_can_draw_again(ant: Any) -> None:
     np.testing.assert_array_equal(ant.render(), frame)
 
 
+# The camera.
+
+
+def _seen(env: Any) -> np.ndarray:
+    """The pixels of a frame that show the body; it is gone afterwards."""
+    _without_shadows(env)
+    frame = env.render()
+    _hide(env)
+    return _differs(env.render(), frame)
+
+
+@pytest.mark.parametrize("body", ["Ant", "BigAnt", "ExtendedAnt"])
+def test_the_camera_follows_a_body_that_runs(body: str) -> None:
+    """It is as large, and in the same place, thirty metres on; and no part is cut off."""
+    seen = []
+    for x, y in ((0.0, 0.0), (30.0, -20.0)):
+        with gym.make("shapechanger/Ant-v1", body=body, render_mode="rgb_array", **_SIZE) as env:
+            env.reset(seed=0)
+            inner = env.unwrapped
+            pose = inner.init_qpos.copy()
+            pose[:2] = x, y
+            inner.set_state(pose, inner.init_qvel)
+            seen.append(_seen(env))
+    here, there = seen
+    assert here.mean() > 0.02
+    assert (here != there).mean() < 0.2 * here.mean()
+    border = np.concatenate((here[0], here[-1], here[:, 0], here[:, -1]))
+    assert not border.any()
+
+
+def test_a_camera_that_is_told_where_to_look_stays() -> None:
+    """The world is looked at, and the body runs out of it."""
+    camera = {"lookat": np.array([0.0, 0.0, 0.5]), "distance": 6.0, "elevation": -30.0}
+    with gym.make(
+        "shapechanger/Ant-v1", render_mode="rgb_array", default_camera_config=camera, **_SIZE
+    ) as env:
+        env.reset(seed=0)
+        inner = env.unwrapped
+        env.render()
+        pose = inner.init_qpos.copy()
+        pose[:2] = 30.0, -20.0
+        inner.set_state(pose, inner.init_qvel)
+        assert not _seen(env).any()
+        np.testing.assert_array_equal(inner.mujoco_renderer.viewer.cam.lookat, camera["lookat"])
+
+
 # Another body.
 
 
@@ -200,6 +246,7 @@ def test_a_picture_holds_the_whole_body(env_id: str) -> None:
         seen = _differs(env.picture(**_SIZE, reach=reach), picture)
     border = np.concatenate((seen[0], seen[-1], seen[:, 0], seen[:, -1]))
     assert not border.any()
+    assert picture[seen].mean() > 80.0
     rows = np.flatnonzero(seen.any(axis=1))
     columns = np.flatnonzero(seen.any(axis=0))
     assert max(np.ptp(rows) / 90, np.ptp(columns) / 120) > 0.25

@@ -9,10 +9,10 @@ from typing import Any
 import gymnasium as gym
 
 from shapechanger.envs.catalogue import CATALOGUE, find
-from shapechanger.errors import UnknownName
+from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["default_learner", "env_ref", "opened"]
+__all__ = ["asked", "default_learner", "env_ref", "opened"]
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
@@ -24,6 +24,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
 
     Raises:
         UnknownName: If no env has this id.
+        MorphologyError: If a body is given to an env that takes none.
     """
     try:
         full = find(env_id).id
@@ -32,6 +33,10 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
         if ":" not in env_id and env_id not in gym.registry:
             raise
         full = env_id
+        if body:
+            raise MorphologyError(
+                f"{env_id} takes no body; these do: {', '.join(CATALOGUE)}."
+            ) from None
     return EnvRef(full, {"body": body} if body else {})
 
 
@@ -39,6 +44,19 @@ def default_learner(env: EnvRef) -> str:
     """The learner whose settings were tuned on the env's family; that of the ant for any other."""
     entry = CATALOGUE.get(env.id)
     return entry.learner if entry else "ppo-run"
+
+
+def asked(env: gym.Env[Any, Any], ability: str) -> Any:
+    """What an env offers beyond Gymnasium's own, such as "picture".
+
+    Raises:
+        MorphologyError: If it does not.
+    """
+    offered = getattr(env.unwrapped, ability, None)
+    if offered is None:
+        name = env.spec.id if env.spec else type(env.unwrapped).__name__
+        raise MorphologyError(f"{name} offers no {ability}; these envs do: {', '.join(CATALOGUE)}.")
+    return offered
 
 
 @contextmanager

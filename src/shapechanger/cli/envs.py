@@ -10,7 +10,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.cli.env_arguments import asked, env_ref, opened
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
@@ -73,7 +73,8 @@ class Compare:
             opened(env_ref(self.source, self.source_body)) as source,
             opened(env_ref(self.target, self.target_body)) as target,
         ):
-            certificate = cast("Any", source.unwrapped).certify_shift(source, target)
+            asked(target, "certify_shift")
+            certificate = asked(source, "certify_shift")(source, target)
             Console(soft_wrap=True, highlight=False).print(str(certificate), markup=False)
 
 
@@ -115,7 +116,7 @@ class Render:
         from shapechanger.cli.pictures import write_picture
 
         with opened(env_ref(self.env, self.body)) as env:
-            picture = cast("Any", env.unwrapped).picture(self.width, self.height)
+            picture = asked(env, "picture")(self.width, self.height)
             write_picture(picture, self.out)
         Console().print(f"wrote {self.out}", highlight=False)
 

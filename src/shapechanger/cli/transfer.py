@@ -29,6 +29,7 @@ __all__ = ["Transfer"]
 # What --quick divides the budget by, and the seeds it does with: enough to see that all works.
 _QUICK_DIVISOR: Final = 8
 _QUICK_SEEDS: Final = 2
+_FILE_WIDTH: Final = 120
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,8 @@ class Transfer:
 
         # The report comes last; if what draws it is missing, say so before the work.
         import_module("shapechanger.transfer.report.curves")
-        console = Console(highlight=False)
+        # A file has no width of its own; a table in it should not be folded.
+        console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
         plan = self._plan()
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")

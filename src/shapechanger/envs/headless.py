@@ -61,7 +61,10 @@ def _egl_works() -> bool:
     name = ctypes.util.find_library("EGL")
     if name is None:
         return False
-    egl = ctypes.CDLL(name)
+    try:
+        egl = ctypes.CDLL(name)
+    except OSError:  # Found, and built for another machine.
+        return False
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
     get_display = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")

@@ -194,7 +194,7 @@ class Reshapable(MujocoEnv):
         renderer = self.mujoco_renderer
         renderer.close()
         trunk = trunk_joint(self.model)
-        camera = self._given_camera or renderer.default_cam_config
+        camera = self._given_camera or cast("dict[str, Any]", renderer.default_cam_config)
         if trunk is not None and self._given_camera is None:
             camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
         self.mujoco_renderer = Renderer(
@@ -203,7 +203,10 @@ class Reshapable(MujocoEnv):
             camera,
             self.width,
             self.height,
-            follow=None if trunk is None else int(self.model.jnt_bodyid[trunk]),
+            # Whoever says where to look is not turned away from it.
+            follow=None
+            if trunk is None or "lookat" in camera
+            else int(self.model.jnt_bodyid[trunk]),
             **self._renderer_arguments,
         )
 

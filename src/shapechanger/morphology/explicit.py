@@ -91,13 +91,27 @@ def _resolve(
     if pose is None:
         return
     if isinstance(element, mujoco.MjsGeom | mujoco.MjsSite) and has_ends(element):
-        element.fromto = np.concatenate([_seen(e, pose) for e in element.fromto.reshape(2, 3)])
-        return
+        if element.type != mujoco.mjtGeom.mjGEOM_BOX:
+            element.fromto = np.concatenate([_seen(e, pose) for e in element.fromto.reshape(2, 3)])
+            return
+        _write_pose(element)  # How a box is turned about its axis follows from the frame.
     element.pos = _seen(element.pos, pose)
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, pose.turn, orientation(spec, element))
     element.quat = turned
     element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _write_pose(element: mujoco.MjsGeom | mujoco.MjsSite) -> None:
+    """Give an element that has ends a place and an orientation instead, as MuJoCo does."""
+    first, last = element.fromto.reshape(2, 3)
+    axis = first - last
+    length = float(np.linalg.norm(axis))
+    quaternion = np.empty(4)
+    mujoco.mju_quatZ2Vec(quaternion, axis / length)
+    element.pos, element.quat = 0.5 * (first + last), quaternion
+    element.size = [element.size[0], element.size[0], 0.5 * length]
+    element.fromto = np.full(6, np.nan)
 
 
 class _Pose(NamedTuple):

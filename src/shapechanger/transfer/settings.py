@@ -79,7 +79,7 @@ LEARNERS: Final[dict[str, LearnerSettings]] = {
         n_epochs=10,
         learning_rate=1e-3,
         steps=32_768,
-        eval_every=2048,
+        eval_every=3072,
         eval_episodes=5,
     ),
     "ppo-run": LearnerSettings(

@@ -1,0 +1,189 @@
+"""The range of joints, and locking them."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import Edit, JointRange, Lock
+from tests.morphology.models import ant, built, gantry, leg, limb, posed, tip
+from tests.morphology.scenes import asset_spec
+
+
+def _range(model: mujoco.MjModel, joint: str) -> list[float]:
+    """The compiled limits of a joint, rad or m."""
+    return model.joint(joint).range.tolist()
+
+
+def test_limits_are_given_in_radians() -> None:
+    """Whatever the model is written in; the limit that is not given stays."""
+    assert _range(built(leg(), JointRange("knee", -1.0, 0.5)), "knee") == pytest.approx([-1.0, 0.5])
+    assert _range(built(leg(), JointRange("knee", lower=-1.0)), "knee") == pytest.approx([-1.0, 0])
+    model = built(gantry(), JointRange("swing", upper=0.25))
+    assert _range(model, "swing") == [-2.0, 0.25]
+
+
+@pytest.mark.parametrize("degrees", range(-180, 181, 6))
+def test_degrees_are_exact(degrees: int) -> None:
+    """A limit of 30° is that of a model file that says 30, to the last bit."""
+    written = built(limb('<geom size=".1"/>').copy())
+    assert not written.joint("link").limited
+    spec = limb('<geom size=".1"/>')
+    spec.joint("link").range = [degrees, 200.0]
+    edited = built(limb('<geom size=".1"/>'), JointRange("link", math.radians(degrees), 3.5))
+    assert edited.joint("link").range[0] == built(spec).joint("link").range[0]
+
+
+def test_angles_that_no_degrees_give_are_the_nearest() -> None:
+    """Then the last bit may differ."""
+    limits = np.random.default_rng(0).uniform(-3.0, 3.0, 100)
+    for limit in limits.tolist():
+        edited = _range(built(limb('<geom size=".1"/>'), JointRange("link", upper=3.2)), "link")
+        assert edited[1] == pytest.approx(3.2, rel=1e-15)
+        model = built(limb('<geom size=".1"/>'), JointRange("link", limit, 3.2))
+        assert _range(model, "link")[0] == pytest.approx(limit, rel=3e-16)
+
+
+def test_a_joint_without_limits_becomes_limited() -> None:
+    """A hinge from a full turn; a limit that is not given stays where the turn ends."""
+    model = built(limb('<geom size=".1"/>'), JointRange("link", lower=-1.0))
+    assert model.joint("link").limited
+    assert _range(model, "link") == pytest.approx([-1.0, math.pi])
+
+
+def test_a_slide_without_limits_needs_both() -> None:
+    """It has no full turn to begin with; on the way there the limits come from far away."""
+    for edit in (JointRange("y", lower=-1.0), JointRange("y", upper=1.0)):
+        with pytest.raises(MorphologyError, match="'y' slides without limits: give both of them"):
+            built(gantry(), edit)
+    edit = JointRange("y", -1.0, 2.0)
+    assert _range(built(gantry(), edit), "y") == [-1.0, 2.0]
+    assert _range(built(gantry(), edit.partly(0.5)), "y") == [-4.0, 5.0]
+    lower, upper = _range(built(gantry(), edit.partly(1e-6)), "y")
+    assert lower < -1e5
+    assert upper > 1e5
+
+
+def test_limits_of_many_joints() -> None:
+    """A glob changes every joint that fits."""
+    model = built(ant(), JointRange("hip_*", -0.1, 0.1))
+    for leg_number in range(1, 5):
+        assert _range(model, f"hip_{leg_number}") == pytest.approx([-0.1, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "message"),
+    [
+        (None, None, "needs a finite lower or upper limit"),
+        (math.nan, 1.0, "needs a finite lower or upper limit"),
+        (0.0, math.inf, "needs a finite lower or upper limit"),
+        (1.0, 1.0, "lower limit must be below the upper one"),
+        (2.0, 1.0, "lower limit must be below the upper one"),
+    ],
+)
+def test_empty_ranges_are_refused(lower: float | None, upper: float | None, message: str) -> None:
+    """A joint that cannot move is a lock's business."""
+    with pytest.raises(MorphologyError, match=message):
+        JointRange("hip", lower, upper)
+
+
+def test_ranges_that_the_model_makes_empty_are_refused() -> None:
+    """The other limit is the model's, so only the model shows it."""
+    with pytest.raises(MorphologyError, match=r"The range of 'knee' would be 1 to 0\."):
+        built(leg(), JointRange("knee", lower=1.0))
+
+
+@pytest.mark.parametrize("edit", [JointRange("*", -1.0, 1.0), Lock("root")])
+def test_free_joints_have_no_range(edit: Edit) -> None:
+    """And are not locked either."""
+    with pytest.raises(
+        MorphologyError, match="'root' is no hinge and no slide, so it has no range"
+    ):
+        built(ant(), edit)
+
+
+@pytest.mark.parametrize("edit", [JointRange("kneee", -1.0, 1.0), Lock("kneee")])
+def test_a_joint_that_is_not_there_is_named(edit: Edit) -> None:
+    """With the nearest that is."""
+    with pytest.raises(UnknownName, match=r"No joint matches 'kneee'\. Did you mean 'knee'\?"):
+        built(leg(), edit)
+
+
+@pytest.mark.parametrize("position", [math.nan, math.inf])
+def test_a_joint_is_locked_somewhere(position: float) -> None:
+    """At a number."""
+    with pytest.raises(MorphologyError, match="A joint cannot be locked at"):
+        Lock("hip", position)
+
+
+def test_a_locked_joint_is_gone() -> None:
+    """With its motor, and the limb stays."""
+    model = built(leg(), Lock("knee"))
+    assert (model.nq, model.nu, model.njnt) == (8, 1, 2)
+    assert model.body("shin").dofnum == 0
+    assert model.actuator(0).name == "hip"
+
+
+def test_joints_are_locked_in_the_middle() -> None:
+    """Unless a position is given: the middle of the range, or of the full turn."""
+    free = built(leg())
+    for edit, angle in (
+        (Lock("knee"), math.radians(-45.0)),
+        (Lock("knee", 0.0), 0.0),
+        (Lock("knee", -1.2), -1.2),
+    ):
+        locked = built(leg(), edit)
+        np.testing.assert_allclose(tip(locked, "toe"), tip(free, "toe", {"knee": angle}))
+    model = built(limb('<geom size=".1"/>'), Lock("link"))
+    np.testing.assert_allclose(model.body("link").quat, [1.0, 0.0, 0.0, 0.0])
+
+
+def test_a_slide_without_limits_has_no_middle() -> None:
+    """So it is locked at a position or not at all."""
+    with pytest.raises(MorphologyError, match="'y' slides without limits, so it has no middle"):
+        built(gantry(), Lock("y"))
+    assert built(gantry(), Lock("y", 0.3)).njnt == 4
+    half = built(gantry(), Lock("y", 0.3).partly(0.5))
+    assert _range(half, "y") == pytest.approx([0.3 - 1.0, 0.3 + 1.0])
+
+
+def test_on_the_way_to_a_lock_the_range_narrows() -> None:
+    """Around the position, never to less than a thousandth."""
+    for amount, width in ((0.25, 1.5), (0.5, 1.0), (1.0 - 1e-9, 1e-3 / 1.5707963)):
+        model = built(leg(), Lock("knee", -0.5).partly(amount))
+        lower, upper = _range(model, "knee")
+        assert (model.nu, model.njnt) == (2, 3)
+        assert lower < -0.5 < upper
+        if amount > 0.9:
+            assert upper - lower == pytest.approx(1e-3)
+        else:
+            assert upper - lower == pytest.approx((1.0 - amount) * math.pi / 2.0)
+        assert width > 0.0
+
+
+def test_several_joints_of_a_body_are_locked_together() -> None:
+    """In whatever order they are found; what is left is a body that does not move."""
+    positions = {"x": 0.7, "yaw": -0.3, "y": 0.2, "pitch": 1.1}
+    free = posed(built(gantry()), {**positions, "swing": 0.4})
+    for order in (list(positions), list(reversed(positions))):
+        locked = posed(built(gantry(), *(Lock(j, positions[j]) for j in order)), {"swing": 0.4})
+        np.testing.assert_allclose(locked.geom_xpos, free.geom_xpos, atol=1e-12)
+        np.testing.assert_allclose(locked.site_xpos, free.site_xpos, atol=1e-12)
+    all_hinges = built(asset_spec("humanoid"), Lock("abdomen_*"))
+    assert all_hinges.body("lwaist").jntnum == 0
+
+
+def test_a_joint_before_the_locked_one_keeps_its_motion() -> None:
+    """It turns about the same line in the world as it did."""
+    locked = built(gantry(), Lock("pitch", 1.0))
+    free = built(gantry())
+    for yaw in (-0.5, 0.0, 0.4):
+        a = posed(free, {"pitch": 1.0, "yaw": yaw, "x": 0.1})
+        b = posed(locked, {"yaw": yaw, "x": 0.1})
+        np.testing.assert_allclose(b.geom_xpos, a.geom_xpos, atol=1e-12)
+        np.testing.assert_allclose(b.joint("yaw").xaxis, a.joint("yaw").xaxis, atol=1e-12)
+        np.testing.assert_allclose(b.joint("yaw").xanchor, a.joint("yaw").xanchor, atol=1e-12)

@@ -1,0 +1,512 @@
+"""Cutting, removing, splitting and adding."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import (
+    AddLimb,
+    AddSegment,
+    Cut,
+    Edit,
+    Lock,
+    Mass,
+    Remove,
+    Split,
+    Stretch,
+)
+from tests.morphology.models import ant, built, capsule_mass, leg, limb, mass, posed, spec_of, tip
+from tests.morphology.scenes import asset_spec
+
+_MESH_LIMB = """
+<mujoco>
+  <asset><mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/></asset>
+  <worldbody>
+    <body name="trunk"><geom name="trunk" size=".1"/>
+      <body name="claw" pos=".2 0 0"><joint name="claw"/>
+        <geom name="claw" type="mesh" mesh="wedge"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _bodies(model: mujoco.MjModel) -> list[str]:
+    """The names of the bodies, but for the world."""
+    return [model.body(i).name for i in range(1, model.nbody)]
+
+
+# --- Cut ---------------------------------------------------------------------------------------
+
+
+def test_a_cut_keeps_the_near_part() -> None:
+    """A quarter of the shank, held where it was."""
+    model = built(ant(), Cut("shank_4", 0.25))
+    assert model.geom("fourth_ankle_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
+    np.testing.assert_array_equal(model.body("shank_4").pos, built(ant()).body("shank_4").pos)
+
+
+def test_what_hung_beyond_a_cut_is_lost() -> None:
+    """With its joints and motors; what is held exactly at the cut stays."""
+    cut = built(leg(), Cut("thigh", 0.99))
+    assert (_bodies(cut), cut.nu, cut.nq) == (["trunk", "thigh"], 1, 8)
+    # The knee is at the thigh's end, though the shin's origin is not.
+    assert _bodies(built(leg(), Cut("thigh", 1.0))) == ["trunk", "thigh", "shin"]
+    for body in ("thigh", "leg"):
+        assert built(asset_spec("hopper"), Cut(body, 1.0)).nbody == 5
+
+
+def test_a_cut_that_reaches_a_body_before_itself_skips_it() -> None:
+    """A glob may fit a limb and what hangs on it; the limb is cut, and the rest is gone."""
+    model = built(ant(), Cut("*_4", 0.5))
+    assert "shank_4" not in _bodies(model)
+    assert model.geom("rightback_leg_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
+
+
+@pytest.mark.parametrize("keep", [0.0, -0.5, math.nan, math.inf, 1e-3, 1.001, 1e3])
+def test_a_cut_keeps_a_part(keep: float) -> None:
+    """Not nothing, and not more than there was."""
+    with pytest.raises(MorphologyError, match="cut"):
+        Cut("thigh", keep)
+
+
+def test_on_the_way_to_a_cut_the_rest_shrinks() -> None:
+    """The near part shortens, and what hangs beyond becomes small and weak."""
+    before = built(leg())
+    half = built(leg(), Cut("thigh", 0.5).partly(0.5))
+    assert half.geom("thigh").size[1] == pytest.approx(0.15 * 0.75)
+    assert mass(half, "shin") == pytest.approx(0.125 * mass(before, "shin"))
+    assert half.actuator("knee").gear[0] == 5.0
+    last = built(leg(), Cut("thigh", 0.5).partly(1.0 - 1e-12))
+    assert mass(last, "shin") == pytest.approx(1e-6 * mass(before, "shin"))
+
+
+# --- Remove ------------------------------------------------------------------------------------
+
+
+def test_a_limb_is_removed_with_all_that_hangs_on_it() -> None:
+    """Its joints and motors too; the order of the others stays."""
+    model = built(ant(), Remove("aux_1"))
+    assert not {"aux_1", "shank_1"} & {*_bodies(model)}
+    assert [model.actuator(i).name for i in range(model.nu)] == [
+        *("hip_4", "ankle_4", "hip_2", "ankle_2", "hip_3", "ankle_3")
+    ]
+    assert model.nq == 13
+
+
+def test_a_glob_removes_parents_and_children_once() -> None:
+    """What hung on a limb that is gone is gone."""
+    assert _bodies(built(leg(), Remove("*h*n"), amount_of_nothing())) == ["trunk", "thigh"]
+    assert _bodies(built(leg(), Remove("[ts]hi*"))) == ["trunk"]
+
+
+def amount_of_nothing() -> Edit:
+    """An edit that is made to no part."""
+    return Stretch("no such body", 2.0, amount=0.0)
+
+
+@pytest.mark.parametrize(
+    ("edit", "what"),
+    [
+        (Cut("trunk", 0.5), "cut"),
+        (Remove("trunk"), "removed"),
+        (Remove("*"), "removed"),
+        (Split("trunk", "toe"), "split"),
+        (AddLimb("trunk", "_2", 1.0), "copied"),
+    ],
+)
+def test_a_trunk_is_not_a_limb(edit: Edit, what: str) -> None:
+    """Without it there would be no robot."""
+    with pytest.raises(MorphologyError, match=f"'trunk' is the trunk .* so it cannot be {what}"):
+        built(leg(), edit)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        *(Cut("shim", 0.5), Remove("shim"), Split("shim", "toe"), AddLimb("shim", "_2", 1.0)),
+        AddSegment("shim", "toe", (0.0, 0.0, 0.1)),
+    ],
+)
+def test_a_limb_that_is_not_there_is_named(edit: Edit) -> None:
+    """With the nearest that is."""
+    with pytest.raises(UnknownName, match=r"No body matches 'shim'\. Did you mean 'shin'\?"):
+        built(leg(), edit)
+
+
+# --- Split -------------------------------------------------------------------------------------
+
+
+def test_a_split_segment_is_two() -> None:
+    """The parts lie where the whole did, and a hinge like its own is between them."""
+    before, after = built(leg()), built(leg(), Split("thigh", "shank", at=1.0 / 3.0, gear=5.0))
+    assert _bodies(after) == ["trunk", "thigh", "shank", "shin"]
+    np.testing.assert_allclose(after.body("shank").pos, [0.0, 0.0, -0.1])
+    np.testing.assert_allclose(after.geom("thigh").size, [0.03, 0.05, 0.0])
+    np.testing.assert_allclose(after.geom("thigh_of_shank").size, [0.03, 0.1, 0.0])
+    hinge, own = after.joint("shank"), after.joint("hip")
+    for field in ("axis", "armature", "damping", "stiffness", "frictionloss"):
+        np.testing.assert_array_equal(getattr(hinge, field), getattr(own, field))
+    np.testing.assert_allclose(hinge.range, [-0.5, 0.5])
+    assert after.actuator("shank").gear[0] == 5.0
+    np.testing.assert_array_equal(after.actuator("shank").ctrlrange, [-1.0, 1.0])
+    for site in ("scar", "knee_cap", "toe"):
+        np.testing.assert_allclose(tip(after, site), tip(before, site), atol=1e-12)
+
+
+def test_what_has_no_length_goes_with_one_part() -> None:
+    """Sites and spheres stay where they are; what refers to them finds them."""
+    spec = leg()
+    spec.add_sensor(
+        name="touch",
+        type=mujoco.mjtSensor.mjSENS_TOUCH,
+        objname="toe",
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+    )
+    model = built(spec, Split("shin", "foot", at=0.5))
+    assert model.site("toe").bodyid == model.geom("sole").bodyid == model.body("foot").id
+    np.testing.assert_allclose(
+        posed(model).geom("sole").xpos, posed(built(leg())).geom("sole").xpos
+    )
+    assert model.sensor("touch").objid[0] == model.site("toe").id
+    near = built(leg(), Split("thigh", "shank", at=0.9))
+    assert near.site("scar").bodyid == near.body("thigh").id
+    np.testing.assert_array_equal(near.site("scar").pos, [0.0, 0.0, -0.06])
+    high = spec_of(
+        """<mujoco><worldbody><body name="t"><geom size=".1"/><body name="link"><joint name="link"
+        axis="0 1 0" pos=".1 0 0"/><geom name="bone" type="capsule" fromto=".1 0 0 .1 0 1"
+        size=".01"/><geom name="low" size=".05" pos=".1 0 .2"/></body></body></worldbody></mujoco>"""
+    )
+    parts = built(high, Split("link", "far", at=0.5))
+    np.testing.assert_allclose(parts.geom("low").pos, [0.1, 0.0, 0.2])
+    np.testing.assert_allclose(posed(parts).geom("bone_of_far").xpos, [0.1, 0.0, 0.75])
+
+
+def test_the_farther_part_may_be_passive() -> None:
+    """No motor, another axis, a hinge that is not in the middle of its range."""
+    model = built(leg(), Split("thigh", "shank", lower=0.1, upper=0.4, axis=(0.0, 1.0, 0.0)))
+    assert model.nu == 2
+    np.testing.assert_array_equal(model.joint("shank").axis, [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(model.joint("shank").range, [0.1, 0.4])
+
+
+def test_rounded_ends_at_a_split_come_with_its_amount() -> None:
+    """At first the halves weigh what the whole did; in the end each is a capsule by itself."""
+    whole = mass(built(leg()), "thigh")
+    first = built(leg(), Split("thigh", "shank").partly(1e-9))
+    assert mass(first, "thigh", "shank") == pytest.approx(whole)
+    assert mass(built(leg(), Split("thigh", "shank")), "shank") == pytest.approx(
+        capsule_mass(0.03, 0.15, 500.0)
+    )
+
+
+def test_a_split_shares_out_a_mass_that_is_written_out() -> None:
+    """As it does a density."""
+    for content in ('mass="3"', 'density="3"'):
+        geom = f'<geom name="g" type="capsule" size=".1 .5" {content}/>'
+        first = built(limb(geom), Split("link", "far", at=0.3).partly(1e-9))
+        assert mass(first, "link", "far") == pytest.approx(mass(built(limb(geom)), "link"))
+        assert mass(first, "far") > mass(first, "link")
+
+
+def test_parts_can_be_split_again() -> None:
+    """And each part of each."""
+    model = built(leg(), Split("thigh", "a"), Split("a", "b"), Split("thigh", "c"))
+    assert _bodies(model) == ["trunk", "thigh", "c", "a", "b", "shin"]
+    np.testing.assert_allclose(tip(model, "toe"), tip(built(leg()), "toe"), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("body", "name"), [("bthigh", "geom in axis-angle"), ("right_shin", "anchor off its origin")]
+)
+def test_splits_of_gymnasiums_limbs(body: str, name: str) -> None:
+    """However their geoms are written: what hangs on them stays where it is."""
+    spec = asset_spec("humanoid" if body == "right_shin" else "half_cheetah")
+    child = {"right_shin": "right_foot", "bthigh": "bshin"}[body]
+    before = built(spec, Stretch(body, 1.0))
+    after = built(spec, Split(body, "half", at=0.4, axis=(0.0, 1.0, 0.0)))
+    np.testing.assert_allclose(
+        posed(after).body(child).xpos, posed(before).body(child).xpos, atol=1e-12
+    )
+    geom = before.geom(int(before.body(body).geomadr[0])).name
+    whole, near, far = (_ends(before, geom), _ends(after, geom), _ends(after, f"{geom}_of_half"))
+    points = np.stack([*whole, *near, *far])
+    along = whole[1] - whole[0]
+    assert np.linalg.norm(np.cross(points - whole[0], along), axis=1) == pytest.approx(0, abs=1e-9)
+    lengths = [np.linalg.norm(ends[1] - ends[0]) for ends in (near, far)]
+    assert sum(lengths) == pytest.approx(np.linalg.norm(along)), name
+
+
+def _ends(model: mujoco.MjModel, geom: str) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends of a capsule's axis in the world."""
+    data = posed(model).geom(geom)
+    half = data.xmat.reshape(3, 3)[:, 2] * model.geom(geom).size[1]
+    return data.xpos - half, data.xpos + half
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0, -0.5, 1.5, math.nan, math.inf])
+def test_a_segment_is_split_between_its_ends(at: float) -> None:
+    """Both parts need a length."""
+    with pytest.raises(MorphologyError, match="A segment is split between 0 and 1, got"):
+        Split("thigh", "toe", at=at)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"lower": 1.0, "upper": 1.0}, "A hinge needs a lower limit below its upper one, got 1.0"),
+        ({"lower": math.nan}, "A hinge needs a lower limit below its upper one"),
+        ({"upper": math.inf}, "A hinge needs a lower limit below its upper one"),
+        ({"gear": 0.0}, "A motor needs a gear that is not zero, got 0.0"),
+        ({"gear": math.nan}, "A motor needs a gear that is not zero, got nan"),
+        ({"axis": (0.0, 0.0, 0.0)}, "The axis of a hinge must not be zero"),
+        ({"axis": (1.0, 0.0)}, "The axis of a hinge must be a tuple of three finite numbers"),
+    ],
+)
+def test_impossible_hinges_are_refused(wrong: dict[str, Any], message: str) -> None:
+    """Whether they come with a split or with a new segment."""
+    with pytest.raises(MorphologyError, match=message):
+        Split("thigh", "toe", **wrong)
+    with pytest.raises(MorphologyError, match=message):
+        AddSegment("thigh", "toe", (0.0, 0.0, 1.0), **wrong)
+
+
+@pytest.mark.parametrize("name", ["shin", "hip", "knee", "", "shin_1"])
+def test_names_that_are_taken_are_refused(name: str) -> None:
+    """By a body, a joint, a motor or a geom; the message says which."""
+    spec = leg()
+    spec.geom("sole").name = "thigh_of_shin_1"
+    with pytest.raises(MorphologyError, match=r"A new \w+ needs a name that is free; '\w*' is not"):
+        built(spec, Split("thigh", name))
+    spec.geom("thigh_of_shin_1").name = "shin_1_geom"
+    with pytest.raises(MorphologyError, match=r"A new \w+ needs a name that is free; '\w*' is not"):
+        built(spec, AddSegment("thigh", name, (0.0, 0.0, 1.0)))
+
+
+# --- AddSegment --------------------------------------------------------------------------------
+
+
+def test_a_segment_grows_at_the_far_end() -> None:
+    """Like the segment that it grows from: thickness, density, friction; and a hinge like its."""
+    spec = leg()
+    spec.geom("shin").friction = [0.7, 0.01, 0.001]
+    model = built(spec, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=4.0))
+    np.testing.assert_allclose(model.body("foot").pos, [0.0, 0.0, -0.25])
+    np.testing.assert_allclose(model.geom("foot_geom").size, [0.02, 0.05, 0.0])
+    np.testing.assert_array_equal(model.geom("foot_geom").friction, model.geom("shin").friction)
+    assert mass(model, "foot") == pytest.approx(capsule_mass(0.02, 0.1, 500.0))
+    assert model.joint("foot").damping[0] == model.joint("knee").damping[0] == 1.0
+    np.testing.assert_array_equal(model.joint("foot").axis, model.joint("knee").axis)
+    assert model.actuator("foot").gear[0] == 4.0
+
+
+def test_a_new_segment_can_differ() -> None:
+    """In its radius, its axis, its range, and in having no motor."""
+    edit = AddSegment("shin", "foot", (0.1, 0.0, 0.0), -0.2, 0.7, axis=(0.0, 1.0, 0.0), radius=0.05)
+    model = built(leg(), edit)
+    assert (model.nu, model.geom("foot_geom").size[0]) == (2, 0.05)
+    np.testing.assert_allclose(model.joint("foot").range, [-0.2, 0.7])
+    np.testing.assert_array_equal(model.joint("foot").axis, [0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    "geom",
+    [
+        'type="capsule" size=".1 .2" pos="0 0 .2"',
+        'type="cylinder" size=".1 .2" pos="0 0 .2" euler="0 180 0"',
+        'type="capsule" size=".1" fromto="0 0 0 0 0 .4"',
+    ],
+)
+@pytest.mark.parametrize("given", ["", 'density="50"', 'mass="2"'])
+def test_a_segment_grows_however_the_other_is_written(geom: str, given: str) -> None:
+    """At the same end, and as dense as it, also where only its mass is written."""
+    spec = limb(f'<geom name="g" {geom} {given}/>')
+    before = built(spec)
+    model = built(spec, AddSegment("link", "tip", (0.0, 0.0, 0.3)))
+    np.testing.assert_allclose(posed(model).geom("tip_geom").xpos, [0.0, 0.0, 1.55], atol=1e-9)
+    volume = mass(built(limb(f'<geom {geom} density="1"/>')), "link")
+    density = mass(before, "link") / volume
+    assert mass(model, "tip") == pytest.approx(capsule_mass(0.1, 0.3, density))
+
+
+def test_the_first_long_geom_is_the_model() -> None:
+    """A segment may hold spheres and boxes too."""
+    content = '<geom size=".3"/><geom type="capsule" size=".1" fromto="0 0 0 0 0 .4"/>'
+    model = built(limb(content), AddSegment("link", "tip", (0.0, 0.0, 0.3)))
+    assert model.geom("tip_geom").size[0] == 0.1
+
+
+def test_a_body_without_length_has_nothing_to_grow_from() -> None:
+    """Neither end nor thickness."""
+    with pytest.raises(
+        MorphologyError, match="'trunk' has no capsule or cylinder, so it has no far"
+    ):
+        built(leg(), AddSegment("trunk", "tail", (1.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)))
+
+
+def test_a_body_without_hinge_needs_an_axis() -> None:
+    """There is none to take over."""
+    spec = spec_of(
+        """<mujoco><worldbody><body name="b"><freejoint/><geom name="g" type="capsule"
+        size=".1 .2"/></body></worldbody></mujoco>"""
+    )
+    with pytest.raises(MorphologyError, match="'b' has no hinge to take the axis from: give one"):
+        built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0)))
+    model = built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0), axis=(1.0, 0.0, 0.0)))
+    assert model.joint("tail").type == mujoco.mjtJoint.mjJNT_HINGE
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (0.0, 1.0)])
+def test_a_segment_needs_a_length(end: Any) -> None:
+    """In three finite numbers."""
+    with pytest.raises(MorphologyError, match="The end of a segment must"):
+        AddSegment("shin", "foot", end)
+
+
+@pytest.mark.parametrize("radius", [0.0, -0.1, math.nan, math.inf])
+def test_a_segment_needs_a_thickness(radius: float) -> None:
+    """A finite one, above zero."""
+    with pytest.raises(MorphologyError, match="A radius must be above zero, got"):
+        AddSegment("shin", "foot", (0.0, 0.0, 1.0), radius=radius)
+
+
+def test_a_segment_that_appears_is_small_and_weak() -> None:
+    """Length and thickness, gear and armature grow with the amount, from a hundredth."""
+    edit = AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=4.0)
+    full = built(leg(), edit)
+    for amount, size in ((1e-9, 0.01), (0.25, 0.25)):
+        part = built(leg(), edit.partly(amount))
+        np.testing.assert_allclose(part.geom("foot_geom").size, size * full.geom("foot_geom").size)
+        assert part.actuator("foot").gear[0] == pytest.approx(4.0 * size)
+        assert part.joint("foot").armature[0] == pytest.approx(0.1 * size)
+        np.testing.assert_allclose(part.joint("foot").range, full.joint("foot").range)
+
+
+# --- AddLimb -----------------------------------------------------------------------------------
+
+
+def test_a_copy_has_all_that_the_limb_has() -> None:
+    """Bodies, joints, geoms, sites and motors, each with the suffix, the motors at the end."""
+    model = built(leg(), AddLimb("thigh", "_2", math.pi))
+    assert _bodies(model) == ["trunk", "thigh", "shin", "thigh_2", "shin_2"]
+    assert [model.actuator(i).name for i in range(model.nu)] == ["hip", "knee", "hip_2", "knee_2"]
+    for name in ("hip", "knee"):
+        old, new = model.joint(name), model.joint(f"{name}_2")
+        for field in ("range", "armature", "damping", "stiffness", "axis", "pos"):
+            np.testing.assert_array_equal(getattr(new, field), getattr(old, field))
+        assert model.actuator(f"{name}_2").trnid[0] == new.id
+    for site in ("scar", "knee_cap", "toe"):
+        x, y, z = tip(model, site)
+        np.testing.assert_allclose(tip(model, f"{site}_2"), [-x, -y, z], atol=1e-12)
+
+
+def test_a_copy_may_be_larger() -> None:
+    """Lengths by the size, masses by its cube, gears by the size."""
+    model = built(leg(), AddLimb("thigh", "_2", math.pi, size=2.0))
+    np.testing.assert_allclose(model.geom("shin_2").size, 2.0 * model.geom("shin").size)
+    assert mass(model, "thigh_2") == pytest.approx(8.0 * mass(model, "thigh"))
+    assert model.actuator("knee_2").gear[0] == 20.0
+
+
+def test_copies_of_copies() -> None:
+    """As many limbs as one likes, of meshes too."""
+    model = built(ant(), *(AddLimb("aux_1", f"_{n}", n * 0.4) for n in range(2, 8)))
+    assert (model.nu, model.nq) == (8 + 12, 15 + 12)
+    twice = built(leg(), AddLimb("thigh", "_2", 1.0), AddLimb("thigh_2", "_3", 1.0))
+    x, y, z = tip(twice, "toe")
+    np.testing.assert_allclose(
+        tip(twice, "toe_2_3"),
+        [x * math.cos(2) - y * math.sin(2), x * math.sin(2) + y * math.cos(2), z],
+        atol=1e-12,
+    )
+    claws = spec_of(_MESH_LIMB)
+    model = built(claws, AddLimb("claw", "_2", 1.0), AddLimb("claw", "_3", 2.0))
+    assert (model.ngeom, model.nmesh) == (4, 1)
+    assert mass(model, "claw_3") == mass(model, "claw")
+
+
+def test_a_mesh_cannot_grow_or_fade() -> None:
+    """It is there or not; the message says why."""
+    for edit in (AddLimb("claw", "_2", 1.0, size=2.0), Remove("claw").partly(0.5)):
+        with pytest.raises(MorphologyError, match=r"'claw(_2)?' holds 'claw(_2)?', a mesh"):
+            built(spec_of(_MESH_LIMB), edit)
+    assert built(spec_of(_MESH_LIMB), Remove("claw")).nbody == 2
+
+
+@pytest.mark.parametrize(("suffix", "angle"), [("", 1.0), ("_2", math.nan), ("_2", math.inf)])
+def test_a_copy_needs_a_suffix_and_an_angle(suffix: str, angle: float) -> None:
+    """Otherwise it would be the limb itself, or nowhere."""
+    with pytest.raises(MorphologyError, match="A copied limb needs a suffix and a finite angle"):
+        AddLimb("thigh", suffix, angle)
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, math.nan, 1e-3, 1e3])
+def test_a_copy_has_a_size(size: float) -> None:
+    """Between a hundredth and a hundred times."""
+    with pytest.raises(MorphologyError, match="The size of a limb must be a ratio"):
+        AddLimb("thigh", "_2", 1.0, size)
+
+
+@pytest.mark.parametrize("kind", ["body", "joint", "geom"])
+def test_a_copy_whose_names_are_taken_is_refused(kind: str) -> None:
+    """Also where the name is that of something deep in the limb."""
+    spec = leg()
+    trunk = spec.body("trunk")
+    if kind == "body":
+        trunk.add_body(name="shin_2", mass=1.0, inertia=[1.0, 1.0, 1.0], explicitinertial=True)
+    elif kind == "geom":
+        spec.geom("trunk").name = "sole_2"
+    else:
+        spec.joint("root").name = "knee_2"
+    with pytest.raises(MorphologyError, match=f"A new {kind} needs a name that is free; '"):
+        built(spec, AddLimb("thigh", "_2", 1.0))
+
+
+def test_a_limb_that_appears_is_small_and_weak() -> None:
+    """From a hundredth of its size on."""
+    edit = AddLimb("thigh", "_2", math.pi, size=2.0)
+    for amount, size in ((1e-9, 0.02), (0.5, 1.0)):
+        part = built(leg(), edit.partly(amount))
+        np.testing.assert_allclose(part.geom("thigh_2").size, size * part.geom("thigh").size)
+        assert part.actuator("hip_2").gear[0] == pytest.approx(20.0 * size)
+
+
+# --- Together ----------------------------------------------------------------------------------
+
+
+def test_order_matters_where_it_should() -> None:
+    """Who splits first stretches a half; who cuts first has no child left to stretch."""
+    split_first = built(leg(), Split("thigh", "half"), Stretch("thigh", 2.0))
+    stretched_first = built(leg(), Stretch("thigh", 2.0), Split("thigh", "half"))
+    assert tip(split_first, "toe")[2] == pytest.approx(1.0 - 0.45 - 0.24)
+    assert tip(stretched_first, "toe")[2] == pytest.approx(1.0 - 0.6 - 0.24)
+    built(leg(), Stretch("shin", 2.0), Cut("thigh", 0.5))
+    with pytest.raises(UnknownName, match="No body matches 'shin'"):
+        built(leg(), Cut("thigh", 0.5), Stretch("shin", 2.0))
+
+
+def test_new_parts_are_parts_like_any_other() -> None:
+    """They can be stretched, weighed, locked, cut and copied."""
+    model = built(
+        leg(),
+        Split("shin", "ankle", gear=1.0),
+        AddSegment("ankle", "foot", (0.1, 0.0, 0.0), gear=2.0),
+        AddLimb("thigh", "_2", math.pi),
+        Stretch("foot*", 2.0),
+        Mass("foot_2", to=0.5),
+        Lock("ankle_2", 0.1),
+        Cut("ankle", 0.5),
+    )
+    assert _bodies(model) == [
+        *("trunk", "thigh", "shin", "ankle", "thigh_2", "shin_2", "ankle_2", "foot_2")
+    ]
+    assert [model.actuator(i).name for i in range(model.nu)] == [
+        *("hip", "knee", "ankle", "hip_2", "knee_2", "foot_2")
+    ]
+    assert mass(model, "foot_2") == pytest.approx(0.5)

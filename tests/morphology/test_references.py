@@ -1,0 +1,72 @@
+"""What goes with a joint that is taken away."""
+
+from __future__ import annotations
+
+import pytest
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import Lock
+from tests.morphology.models import built, gantry, spec_of
+from tests.morphology.scenes import asset_spec
+
+_TIED = """
+<mujoco>
+  <worldbody>
+    <body name="a"><joint name="a"/><geom size=".1" pos=".2 0 0"/>
+      <body name="b" pos=".4 0 0"><joint name="b"/><geom size=".1" pos=".2 0 0"/>
+        <site name="s"/></body>
+    </body>
+    <site name="w"/>
+  </worldbody>
+  <tendon>
+    <fixed {tendon}><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed>
+    <spatial name="rope"><site site="s"/><site site="w"/></spatial>
+  </tendon>
+  {rest}
+</mujoco>
+"""
+
+
+def test_what_refers_to_the_joint_goes_with_it() -> None:
+    """Its motor and the sensors of both, its coupling, and keyframes that list every joint."""
+    model = built(gantry(), Lock("yaw"))
+    assert (model.nu, model.nkey) == (0, 0)
+    assert [model.sensor(i).name for i in range(model.nsensor)] == ["swing_angle", "hook"]
+    assert model.neq == 1
+    assert {int(model.eq_obj1id[0]), int(model.eq_obj2id[0])} == {
+        model.joint("y").id,
+        model.joint("swing").id,
+    }
+
+
+def test_a_tendon_that_does_nothing_goes_too() -> None:
+    """The humanoid's tendons tie hip and knee but neither pull nor are read."""
+    assert built(asset_spec("humanoid")).ntendon == 2
+    model = built(asset_spec("humanoid"), Lock("right_knee"))
+    assert model.ntendon == 1
+    assert model.tendon(0).name == "left_hipknee"
+    assert built(spec_of(_TIED.format(tendon="", rest="")), Lock("b", 0.1)).ntendon == 1
+
+
+@pytest.mark.parametrize(
+    ("tendon", "rest"),
+    [
+        *(('stiffness="1"', ""), ('damping="1"', ""), ('frictionloss="1"', "")),
+        *(('armature="1"', ""), ('range="0 1"', ""), ('limited="true" range="-1 0"', "")),
+        ("", '<actuator><motor tendon="tie"/></actuator>'),
+        ("", '<sensor><tendonpos tendon="tie"/></sensor>'),
+        ("", '<equality><tendon tendon1="tie"/></equality>'),
+    ],
+)
+def test_a_tendon_that_ties_joints_holds_them(tendon: str, rest: str) -> None:
+    """Without one of them it would pull otherwise at the other."""
+    spec = spec_of(_TIED.format(tendon=f'name="tie" {tendon}', rest=rest))
+    with pytest.raises(MorphologyError, match="'b' is tied to other joints by the tendon 'tie'"):
+        built(spec, Lock("b", 0.1))
+
+
+def test_tendons_over_sites_do_not_tie_joints() -> None:
+    """They are where their sites are."""
+    rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
+    model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
+    assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)
