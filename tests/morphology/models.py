@@ -165,3 +165,41 @@ def capsule_inertia(radius: float, length: float, density: float) -> tuple[float
         0.4 * radius**2 + length**2 / 4.0 + 3.0 / 8.0 * length * radius
     )
     return across, along
+
+
+def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> dict[str, Array]:
+    """What a body is made of and how it is driven, by name, with some joints at given positions.
+
+    The mass, its centre and its inertia are those of all bodies together, so that they can be
+    compared between bodies that have different parts.
+    """
+    data = posed(model, {j: p for j, p in (angles or {}).items() if _has_joint(model, j)})
+    weights = model.body_mass[1:] / model.body_mass.sum()
+    centre = weights @ data.xipos[1:]
+    inertia = np.zeros((3, 3))
+    for body in range(1, model.nbody):
+        turn, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - centre
+        inertia += turn @ np.diag(model.body_inertia[body]) @ turn.T
+        inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    found = {
+        "mass": model.body_mass.sum(keepdims=True),
+        "centre of mass": centre,
+        "inertia": inertia,
+        "gravity": np.array(model.opt.gravity),
+        "start": np.array(model.qpos0[:3]),
+    }
+    for i in range(model.nsite):
+        found[f"site {model.site(i).name}"] = np.array(data.site_xpos[i])
+    for i in range(model.ngeom):
+        found[f"friction {model.geom(i).name}"] = np.array(model.geom_friction[i])
+    for i in range(model.nu):
+        found[f"gear {model.actuator(i).name}"] = np.array(model.actuator_gear[i])
+    for i in range(model.njnt):
+        joint = model.joint(i)
+        for field in ("range", "damping", "armature", "stiffness"):
+            found[f"{field} {joint.name}"] = np.array(getattr(joint, field))
+    return found
+
+
+def _has_joint(model: mujoco.MjModel, name: str) -> bool:
+    return mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0

@@ -156,7 +156,7 @@ def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: P
     study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
     assert not study.of("source")
     assert study.source_return == ()
-    assert plan.source_steps == load_policy(policy).card.steps == 96
+    assert plan.source_steps == load_policy(policy).card.steps == 64
     assert study.of("zero-shot")[0].curve[0].mean_return == (
         finished[0].of("zero-shot")[0].curve[0].mean_return
     )

@@ -22,8 +22,8 @@ from shapechanger.layout import Feature
 
 __all__ = ["AntEnv", "ExtendedAntEnv"]
 
-# An ant this many times higher than it stands has been thrown up. The ceiling of Ant is then 0.98 m,
-# where Gymnasium has 1.0, and that of BigAnt 1.80 m, where the 2017 release had 2.0.
+# An ant this many times higher than it stands has been thrown up. The ceiling of Ant is then 0.98
+# m, where Gymnasium has 1.0, and that of BigAnt 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9
 
 

@@ -158,8 +158,10 @@ class Split(Edit, frozen=True):
             stretch_geom(spec, copy, np.zeros(3), 1.0 - self.at)
             stretch_geom(spec, geom, held, self.at)
             # The rounded ends at the split overlap. Their mass comes with the amount of the split.
-            without = whole / (volume(spec, geom) + volume(spec, copy))
-            for half in (geom, copy):
+            volumes = [volume(spec, half) for half in (geom, copy)]
+            rounded_end = 0.5 * (sum(volumes) - whole)
+            for half, own in zip((geom, copy), volumes, strict=True):
+                without = 1.0 - rounded_end / own
                 scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
 
 

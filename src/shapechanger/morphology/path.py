@@ -27,8 +27,9 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
     """The body at the part `alpha` of the way from `a` to `b`.
 
     Both ends are exact: 0 gives `a` itself, 1 gives `b` itself. Physical quantities are continuous
-    in `alpha`. Dimensions cannot be: a limb that only `b` has is there, small and weak, from the
-    first step on, and a limb that `b` lacks stays, ever smaller, until the last.
+    in `alpha`, but for the inertia of a segment that is split, which jumps by what the rounded ends
+    of its parts make up. Dimensions cannot be: a limb or motor that only `b` has is there, small
+    and weak, from the first step on, and one that `b` lacks stays, ever smaller, until the last.
 
     Args:
         a: Where the path begins.

@@ -140,6 +140,9 @@ def train(
             model = _fresh_model(envs, settings, seed, tensorboard)
         else:
             model = _moved_model(envs, settings, seed, tensorboard, source, body_map)
+        # Before `learn`: it begins with a reset, which already moves the running statistics.
+        act = actor(model, _statistics(envs))
+        on_evaluation(evaluate(act, evaluation_envs, EVALUATION_SEED))
         watcher = _Evaluations(settings, evaluation_envs, on_evaluation, on_steps)
         cast("Any", model).learn(settings.whole_updates(steps), callback=watcher)
         watcher.evaluate_now()
@@ -204,7 +207,7 @@ class _Evaluations(BaseCallback):
         self._envs = envs
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
-        self._next = 0
+        self._next = settings.eval_every
 
     def _on_step(self) -> bool:
         self._on_steps(self.num_timesteps)

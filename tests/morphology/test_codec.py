@@ -1,0 +1,145 @@
+"""A body as JSON, and back."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import (
+    EDITS,
+    AddSegment,
+    Cut,
+    Gravity,
+    JointRange,
+    Lock,
+    Mass,
+    Remove,
+    Stretch,
+    as_body,
+    from_json,
+    to_json,
+)
+
+BODY = (
+    Stretch("shank_*", 2.0),
+    Mass("torso", to=2.0),
+    AddSegment("shin", "foot", (0.1, 0.0, -0.2), gear=3.0),
+    Gravity((0.0, 0.0, -1.62), amount=0.5),
+    Remove("tail"),
+)
+
+
+def test_a_body_is_a_list_of_tagged_objects() -> None:
+    """What is left at its default is left out."""
+    assert json.loads(to_json(BODY)) == [
+        {"edit": "stretch", "body": "shank_*", "factor": 2.0},
+        {"edit": "mass", "element": "torso", "to": 2.0},
+        {"edit": "add_segment", "body": "shin", "name": "foot", "end": [0.1, 0, -0.2], "gear": 3.0},
+        {"edit": "gravity", "amount": 0.5, "to": [0, 0, -1.62]},
+        {"edit": "remove", "body": "tail"},
+    ]
+
+
+def test_json_gives_back_the_body() -> None:
+    """As text, as bytes, as one object, and with whole numbers for any."""
+    assert from_json(to_json(BODY)) == from_json(to_json(BODY).encode()) == BODY
+    assert from_json('{"edit":"cut","body":"shin","keep":0.5}') == (Cut("shin", 0.5),)
+    assert from_json('[{"edit":"stretch","body":"shin","factor":2}]') == (Stretch("shin", 2.0),)
+    assert from_json("[]") == ()
+    assert to_json(()) == "[]"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "stretch", "[1,", b"\xff\xfe\x00", b"[\xc3\x28]", "[" * 100_000],
+)
+def test_what_is_no_json_is_refused(text: str | bytes) -> None:
+    """Also what is no text at all, or nested without end."""
+    with pytest.raises(MorphologyError, match="A body must be a JSON list of edits: "):
+        from_json(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["1", "null", '"stretch"', "[1]", "[[]]", "{}", '[{"kind":"stretch"}]', "[null]"]
+)
+def test_json_that_is_no_edit_is_refused(text: str) -> None:
+    """An edit is an object that says what kind it is."""
+    with pytest.raises(MorphologyError, match='An edit is an object with the key "edit", got '):
+        from_json(text)
+
+
+@pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])
+def test_unknown_kinds_are_named(kind: object) -> None:
+    """With the nearest, and all that there are."""
+    with pytest.raises(UnknownName, match=r"No edit matches .* There are: stretch, radius, cut"):
+        from_json(json.dumps([{"edit": kind, "body": "shin"}]))
+    with pytest.raises(UnknownName, match=r"Did you mean 'stretch'\?"):
+        from_json('[{"edit":"strech"}]')
+
+
+def test_unknown_fields_are_named() -> None:
+    """A misspelt option must not be ignored."""
+    with pytest.raises(
+        UnknownName, match=r"No field of 'stretch' matches 'facter'\. Did you mean "
+    ):
+        from_json('[{"edit":"stretch","body":"shin","facter":2}]')
+    with pytest.raises(UnknownName, match="No field of 'remove' matches 'keep'"):
+        from_json('[{"edit":"remove","body":"shin","keep":1}]')
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"edit": "stretch", "body": "shin"}, "stretch: .*factor"),
+        ({"edit": "stretch", "body": 3, "factor": 2}, "stretch: Expected `str`, got `int`"),
+        ({"edit": "stretch", "body": "shin", "factor": "2"}, "stretch: Expected `float`"),
+        ({"edit": "stretch", "body": "shin", "factor": None}, "stretch: Expected `float`"),
+        ({"edit": "stretch", "body": "shin", "factor": 2, "axis": "w"}, "stretch: .*'w'"),
+        ({"edit": "stretch", "body": "shin", "factor": -2}, "stretch: The factor of a stretch"),
+        ({"edit": "stretch", "body": "shin", "factor": 2, "amount": 2}, "stretch: amount must be"),
+        ({"edit": "gravity", "to": [0, -9.81]}, "gravity: Expected `array` of length 3"),
+        ({"edit": "gravity", "to": [0, 0, -300]}, "gravity: Gravity is at most 250"),
+        ({"edit": "mass", "element": "*"}, "mass: Mass takes either scale or to"),
+        ({"edit": "mass", "element": "*", "scale": 2, "to": 3}, "mass: Mass takes either scale"),
+        ({"edit": "split", "body": "a", "name": "b", "at": 1}, "split: A segment is split between"),
+    ],
+)
+def test_wrong_fields_are_refused(fields: dict[str, Any], message: str) -> None:
+    """The message begins with the kind of edit."""
+    with pytest.raises(MorphologyError, match=message):
+        from_json(json.dumps(fields))
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_numbers_that_json_does_not_have_are_refused(number: str) -> None:
+    """Python's reader takes them, no edit does."""
+    with pytest.raises(MorphologyError, match="stretch: The factor of a stretch must be a ratio"):
+        from_json(f'[{{"edit":"stretch","body":"shin","factor":{number}}}]')
+    with pytest.raises(MorphologyError, match="lock: A joint cannot be locked at"):
+        from_json(f'[{{"edit":"lock","joint":"hip","position":{number}}}]')
+
+
+def test_a_body_may_be_written_in_many_ways() -> None:
+    """One edit, several, any iterable of them, or their JSON."""
+    edits = (Lock("hip"), JointRange("knee", lower=-1.0))
+    assert as_body(edits) == as_body(list(edits)) == as_body(iter(edits)) == edits
+    assert as_body(to_json(edits)) == edits
+    assert as_body(edits[0]) == edits[:1]
+    assert as_body(()) == ()
+
+
+@pytest.mark.parametrize("value", [3, None, [3], ["stretch"], Stretch, [Stretch], [b"[]"]])
+def test_other_things_are_no_body(value: Any) -> None:
+    """The message shows what would be."""
+    with pytest.raises(
+        MorphologyError, match=r"made of edits such as Stretch\('shank_\*', 1\.5\), "
+    ):
+        as_body(value)
+
+
+def test_every_kind_can_be_read() -> None:
+    """Each has a tag of its own."""
+    assert len({kind.__struct_config__.tag for kind in EDITS}) == len(EDITS) == 17

@@ -1,0 +1,205 @@
+"""The continuous path between two bodies."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.ant import ANT
+from shapechanger.embodiments.pendulum import PENDULUM
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import (
+    EDITS,
+    AddLimb,
+    AddSegment,
+    Body,
+    Cut,
+    Damping,
+    Density,
+    Edit,
+    Friction,
+    Gear,
+    Gravity,
+    JointRange,
+    Lock,
+    Mass,
+    Radius,
+    Remove,
+    Split,
+    StartHeight,
+    Stiffness,
+    Stretch,
+    interpolate,
+)
+from tests.morphology.models import ant, built, differing, leg, mass, pendulum, physics
+
+# One of each kind, for the leg.
+ONE_OF_EACH: tuple[Edit, ...] = (
+    Stretch("thigh", 2.0),
+    Radius("thigh", 1.5),
+    Cut("thigh", 0.4),
+    Remove("thigh"),
+    Split("thigh", "half", gear=3.0),
+    AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=2.0),
+    AddLimb("thigh", "_2", 2.0, size=1.5),
+    Mass("shin", to=1.0),
+    Density("thigh", scale=2.0),
+    Gear("*", to=30.0),
+    Damping("hip", scale=3.0),
+    Stiffness("knee", to=2.0),
+    Friction("*", scale=0.2),
+    JointRange("knee", -0.5, 0.2),
+    Lock("knee", -0.5),
+    Gravity((1.0, 0.0, -3.0)),
+    StartHeight("trunk", 2.0),
+)
+_STEP = 1e-5
+
+
+def test_one_of_each_kind() -> None:
+    """A new kind of edit needs a path, too."""
+    assert tuple(type(edit) for edit in ONE_OF_EACH) == EDITS
+
+
+def test_the_ends_are_the_bodies_themselves() -> None:
+    """Not copies, and not edits with an amount."""
+    a, b = ANT.body("BigAnt"), ANT.body("ExtendedAnt")
+    assert interpolate(a, b, 0.0) is a
+    assert interpolate(a, b, 1.0) is b
+    assert interpolate(a, b, 0) is a
+
+
+@pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, np.inf])
+def test_the_path_ends_at_its_ends(alpha: float) -> None:
+    """Beyond them there is nothing."""
+    with pytest.raises(MorphologyError, match="alpha must be between 0 and 1, got"):
+        interpolate((), (), alpha)
+
+
+@pytest.mark.parametrize("body", [*ANT.bodies.values(), *PENDULUM.bodies.values(), ONE_OF_EACH])
+def test_from_a_body_to_itself_nothing_changes(body: Body) -> None:
+    """At any point of the way."""
+    for alpha in (0.0, 0.1, 1.0 / 3.0, 1.0):
+        assert interpolate(body, body, alpha) == body
+
+
+def test_an_edit_that_both_have_moves_between_its_strengths() -> None:
+    """Numbers, pairs of numbers, and vectors; words stay."""
+    a = (Stretch("thigh", 1.0, "z"), Gravity((0.0, 0.0, -10.0)), JointRange("hip", -1.0, 1.0))
+    b = (Stretch("thigh", 3.0, "z"), Gravity((4.0, 0.0, -2.0)), JointRange("hip", -2.0, 1.0))
+    assert interpolate(a, b, 0.25) == (
+        Stretch("thigh", 1.5, "z"),
+        Gravity((1.0, 0.0, -8.0)),
+        JointRange("hip", -1.25, 1.0),
+    )
+
+
+def test_edits_of_one_body_only_fade() -> None:
+    """Those of the first out, those of the second in; what both have in common stays."""
+    a = (Mass("*", scale=2.0), Stretch("thigh", 2.0))
+    b = (Mass("*", scale=2.0), Stretch("shin", 2.0), Gear("*", scale=3.0))
+    assert interpolate(a, b, 0.25) == (
+        Mass("*", scale=2.0),
+        Stretch("thigh", 2.0, amount=0.75),
+        Stretch("shin", 2.0, amount=0.25),
+        Gear("*", scale=3.0, amount=0.25),
+    )
+
+
+def test_a_ratio_is_no_value() -> None:
+    """What one scales and the other sets are two edits."""
+    path = interpolate((Mass("*", scale=2.0),), (Mass("*", to=2.0),), 0.5)
+    assert path == (Mass("*", scale=2.0, amount=0.5), Mass("*", to=2.0, amount=0.5))
+
+
+def test_a_motor_that_one_body_lacks_is_weak() -> None:
+    """A segment is not there twice because only one of two bodies moves it by a motor."""
+    passive, active = ANT.body("ExtendedAntPassive"), ANT.body("ExtendedAnt")
+    for alpha in (0.01, 0.5, 0.99):
+        for path in (interpolate(passive, active, alpha), interpolate(active, passive, 1 - alpha)):
+            model = built(ant(), *path)
+            assert (model.nq, model.nu) == (19, 12)
+            assert model.actuator("foot_1").gear[0] == pytest.approx(150.0 * alpha)
+    np.testing.assert_array_equal(
+        built(ant(), *interpolate(passive, active, 0.5)).body_mass, built(ant(), *active).body_mass
+    )
+
+
+def test_paths_of_paths() -> None:
+    """A body on the way is a body, and a way may begin there."""
+    half = interpolate((), ANT.body("BigAnt"), 0.5)
+    assert interpolate(half, ANT.body("BigAnt"), 0.5) == interpolate((), ANT.body("BigAnt"), 0.75)
+
+
+def _assert_continuous(
+    load: Callable[[], mujoco.MjSpec], a: Body, b: Body, tolerance: float = 1e-3
+) -> None:
+    """A small step changes everything that two neighbours have in common by little."""
+    for alpha in (0.0, _STEP, 0.3, 0.5, 0.99, 1.0 - _STEP):
+        near = [built(load(), *interpolate(a, b, min(x, 1.0))) for x in (alpha, alpha + _STEP)]
+        before, after = (physics(model, {"knee": -0.5}) for model in near)
+        ranges = {"range knee"} if Lock in map(type, (*a, *b)) else set()
+        for name in before.keys() & after.keys() - ranges:
+            np.testing.assert_allclose(
+                after[name], before[name], rtol=tolerance, atol=tolerance, err_msg=f"{name} {alpha}"
+            )
+
+
+@pytest.mark.parametrize("pair", itertools.permutations(ANT.bodies, 2), ids="-".join)
+def test_the_ants_change_continuously(pair: tuple[str, str]) -> None:
+    """Between any two of the named bodies, in both directions."""
+    _assert_continuous(ant, ANT.body(pair[0]), ANT.body(pair[1]))
+
+
+@pytest.mark.parametrize("pair", itertools.permutations(PENDULUM.bodies, 2), ids="-".join)
+def test_the_pendulums_change_continuously(pair: tuple[str, str]) -> None:
+    """Between any two of the named bodies, in both directions."""
+    _assert_continuous(pendulum, PENDULUM.body(pair[0]), PENDULUM.body(pair[1]))
+
+
+@pytest.mark.parametrize("edit", ONE_OF_EACH, ids=lambda edit: type(edit).__name__)
+def test_every_kind_of_edit_is_continuous(edit: Edit) -> None:
+    """From nothing to all of it, and back."""
+    # The rounded ends where a segment is split are in other places than they were.
+    tolerance = 5e-3 if isinstance(edit, Split) else 1e-3
+    _assert_continuous(leg, (), (edit,), tolerance)
+    _assert_continuous(leg, (edit,), (), tolerance)
+
+
+@pytest.mark.parametrize("pair", itertools.pairwise(ONE_OF_EACH), ids=lambda x: type(x).__name__)
+def test_every_kind_of_edit_gives_way_to_the_next(pair: tuple[Edit, Edit]) -> None:
+    """Two different edits, the one fading out and the other in."""
+    if isinstance(pair[0], Cut | Remove) or isinstance(pair[1], Cut | Remove):
+        # What grows from a limb that goes is there only on the way.
+        pair = (pair[0], Radius("trunk", 2.0))
+    _assert_continuous(leg, pair[:1], pair[1:], 5e-3)
+
+
+def test_the_ant_grows_heavier_on_its_way_to_the_big_one() -> None:
+    """At every step."""
+    path = [interpolate((), ANT.body("BigAnt"), x) for x in np.linspace(0.0, 1.0, 21).tolist()]
+    masses = [mass(built(ant(), *body)) for body in path]
+    assert np.all(np.diff(masses) > 0.0)
+    assert masses[0] == mass(built(ant()))
+    assert masses[-1] == mass(built(ant(), *ANT.body("BigAnt")))
+
+
+def test_the_way_to_the_extended_ant_has_its_dimensions() -> None:
+    """From the first step on, so that one policy can walk all of it."""
+    target = built(ant(), *ANT.body("ExtendedAnt"))
+    for alpha in (1e-12, 1e-3, 0.5, 1.0 - 1e-12, 1.0):
+        model = built(ant(), *interpolate((), ANT.body("ExtendedAnt"), alpha))
+        assert (model.nq, model.nv, model.nu, model.nbody) == (
+            *(target.nq, target.nv, target.nu, target.nbody),
+        )
+    assert built(ant(), *interpolate((), ANT.body("ExtendedAnt"), 0.0)).nq == 15
+
+
+def test_the_ends_are_exact_for_every_pair() -> None:
+    """The models at both ends are those of the bodies, bit for bit."""
+    for a, b in itertools.permutations(ANT.bodies.values(), 2):
+        assert differing(built(ant(), *interpolate(a, b, 1.0)), built(ant(), *b)) == []

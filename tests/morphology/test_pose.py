@@ -1,0 +1,171 @@
+"""Poses that follow from a body."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.ant import ANT
+from shapechanger.morphology import JointRange, StartHeight, Stretch
+from shapechanger.morphology.pose import (
+    floor_gap,
+    keep_within_limits,
+    standing_height,
+    start_pose,
+    trunk_joint,
+)
+from tests.morphology.models import ant, built, gantry, leg, pendulum, posed, spec_of
+
+_BALL = """
+<mujoco>
+  <asset><hfield name="hill" nrow="2" ncol="2" size="9 9 .1 .1" elevation="0 0 0 0"/></asset>
+  <worldbody>
+    {floor}
+    <body name="ball" pos="0 0 1"><freejoint/><geom name="ball" size=".2" {ball}/></body>
+  </worldbody>
+</mujoco>
+"""
+_PLANE = '<geom type="plane" size="1 1 1" pos="0 0 .3"/>'
+
+
+def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
+    """A ball of 20 cm whose middle is 1 m up."""
+    return built(spec_of(_BALL.format(floor=floor, ball=ball)))
+
+
+@pytest.mark.parametrize(
+    ("floor", "gap"),
+    [
+        (_PLANE, 0.5),
+        ('<geom type="hfield" hfield="hill"/>', 0.8),
+        (f'{_PLANE}<geom type="plane" size="1 1 1" pos="0 0 .5"/>', 0.3),
+        (f'<body name="stage" pos="0 0 .1">{_PLANE}</body>', 0.4),
+        # A table is no floor, and no part of the body that stands on it.
+        (f'{_PLANE}<body><geom type="box" size="1 1 .1" pos="5 0 .2"/></body>', 0.5),
+        (f'{_PLANE}<geom type="box" size="1 1 .1" pos="0 0 .6"/>', 0.5),
+        ('<geom type="plane" size="1 1 1" pos="0 0 1.1"/>', -0.3),
+    ],
+)
+def test_the_floor_is_what_lies_below(floor: str, gap: float) -> None:
+    """Every plane and height field that is fixed to the world; the highest counts."""
+    model = _ball(floor)
+    assert floor_gap(model, posed(model)) == pytest.approx(gap)
+    assert standing_height(model) == pytest.approx(1.0 - gap)
+
+
+@pytest.mark.parametrize(
+    ("floor", "ball"),
+    [
+        ("", ""),
+        ('<geom type="plane" size="1 1 1" contype="0" conaffinity="0"/>', ""),
+        (_PLANE, 'contype="0" conaffinity="0"'),
+        (_PLANE, 'contype="2" conaffinity="2"'),
+    ],
+)
+def test_what_does_not_touch_is_no_floor(floor: str, ball: str) -> None:
+    """Then there is nothing to stand on, and no height to stand at."""
+    model = _ball(floor, ball)
+    assert floor_gap(model, posed(model)) == 1000.0
+    assert standing_height(model) is None
+    np.testing.assert_array_equal(start_pose(model), model.qpos0)
+
+
+def test_either_side_may_allow_the_contact() -> None:
+    """MuJoCo lets two geoms touch if one of them is willing."""
+    for ball in ('contype="1" conaffinity="0"', 'contype="0" conaffinity="1"'):
+        assert standing_height(_ball(_PLANE, ball)) == pytest.approx(0.5)
+
+
+def test_what_is_fixed_to_the_world_does_not_stand() -> None:
+    """It has no trunk that is free, and starts where its joints are."""
+    for spec in (pendulum(), gantry()):
+        model = built(spec)
+        assert trunk_joint(model) is None
+        assert standing_height(model) is None
+    assert trunk_joint(built(leg())) == 0
+
+
+def test_the_trunk_is_the_first_free_joint() -> None:
+    """Also where other joints come before it."""
+    model = built(
+        spec_of(
+            """<mujoco><worldbody><body><joint name="door"/><geom size=".1"/></body>
+            <body><freejoint name="root"/><geom size=".1"/></body>
+            <body><freejoint name="ball"/><geom size=".1"/></body></worldbody></mujoco>"""
+        )
+    )
+    assert trunk_joint(model) == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "height"),
+    [("Ant", 0.513), ("BigAnt", 0.947), ("ExtendedAnt", 1.292), ("ExtendedAntPassive", 1.292)],
+)
+def test_standing_heights_of_the_ants(body: str, height: float) -> None:
+    """Each joint in the middle of its range, the lowest point on the floor, in metres."""
+    model = built(ant(), *ANT.bodies[body])
+    assert standing_height(model) == pytest.approx(height, abs=1e-3)
+
+
+def test_the_standing_height_does_not_depend_on_the_start() -> None:
+    """It is a property of the body, not of where the model begins."""
+    heights = [standing_height(built(ant(), StartHeight("torso", z))) for z in (-3.0, 0.75, 40.0)]
+    assert heights == pytest.approx([heights[0]] * 3)
+
+
+def test_a_body_starts_inside_its_limits() -> None:
+    """By a tenth of the range, and no farther from the model's pose than that takes."""
+    model = built(ant())
+    pose = start_pose(model)
+    for joint in range(1, model.njnt):
+        lower, upper = model.jnt_range[joint]
+        angle, written = pose[model.jnt_qposadr[joint]], model.qpos0[model.jnt_qposadr[joint]]
+        inside = 0.1 * (upper - lower)
+        assert lower + inside - 1e-12 <= angle <= upper - inside + 1e-12
+        if lower + inside <= written <= upper - inside:
+            assert angle == written
+        else:
+            assert min(abs(angle - lower), abs(angle - upper)) == pytest.approx(inside)
+    np.testing.assert_array_equal(model.qpos0, built(ant()).qpos0)
+
+
+@pytest.mark.parametrize("body", ANT.bodies)
+@pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
+def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
+    """The trunk is raised as far as the feet need and not lowered."""
+    model = built(ant(), *ANT.bodies[body], Stretch("shank_*", factor))
+    pose = start_pose(model)
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(model, data)
+    gap = floor_gap(model, data)
+    assert gap >= -1e-6
+    assert pose[2] == model.qpos0[2] or gap == pytest.approx(0.0, abs=1e-6)
+    assert pose[2] >= model.qpos0[2]
+
+
+def test_a_body_that_starts_high_starts_there() -> None:
+    """It falls, as its model says."""
+    model = built(leg(), StartHeight("trunk", 5.0))
+    assert start_pose(model)[2] == 5.0
+
+
+def test_a_pose_is_moved_inside_the_limits() -> None:
+    """Hinges and slides to the nearest limit; what has none, and the pose given, stay."""
+    model = built(leg(), JointRange("hip", -0.5, 0.5))
+    pose = model.qpos0 + 7.0
+    inside = keep_within_limits(model, pose)
+    np.testing.assert_array_equal(inside[:7], pose[:7])
+    np.testing.assert_allclose(inside[7:], [0.5, 0.0])
+    np.testing.assert_array_equal(pose, model.qpos0 + 7.0)
+    free = built(gantry())
+    far = np.array([5.0, -5.0, 9.0, 9.0, 5.0])
+    np.testing.assert_allclose(keep_within_limits(free, far), [2.0, -1.0, 9.0, 9.0, 2.0])
+
+
+def test_a_body_without_joints_has_a_pose() -> None:
+    """An empty one."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    assert start_pose(model).shape == keep_within_limits(model, np.zeros(0)).shape == (0,)
+    assert standing_height(model) is None

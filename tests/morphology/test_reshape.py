@@ -1,0 +1,124 @@
+"""Applying edits to a copy, and compiling the result."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+
+import mujoco
+import pytest
+
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
+from shapechanger.morphology import (
+    AddLimb,
+    AddSegment,
+    Cut,
+    Density,
+    Edit,
+    Gear,
+    JointRange,
+    Lock,
+    Mass,
+    Radius,
+    Remove,
+    Split,
+    StartHeight,
+    Stretch,
+    compile_body,
+    reshape,
+)
+from tests.morphology.models import ant, built, differing, gantry, leg
+
+_CHANGES: list[tuple[Callable[[], mujoco.MjSpec], Edit]] = [
+    (leg, Stretch("*", 2.0)),
+    (leg, Radius("*", 2.0)),
+    (leg, Cut("thigh", 0.5)),
+    (leg, Remove("thigh")),
+    (leg, Split("thigh", "half", gear=2.0)),
+    (leg, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=2.0)),
+    (leg, AddLimb("thigh", "_2", 1.0)),
+    (leg, Mass("*", to=2.0)),
+    (gantry, Lock("yaw")),
+    (gantry, JointRange("swing", -1.0, 1.0)),
+    (ant, StartHeight("torso", 2.0)),
+]
+
+_MISTAKES: list[tuple[Callable[[], mujoco.MjSpec], tuple[Edit, ...]]] = [
+    (leg, (Stretch("thigh", 2.0), Stretch("thgih", 2.0))),
+    (leg, (Stretch("thigh", 2.0), Remove("trunk"))),
+    (leg, (Stretch("thigh", 2.0), Split("shin", "thigh"))),
+    (leg, (Cut("thigh", 0.5), Gear("knee", scale=2.0))),
+    (leg, (JointRange("knee", lower=1.0),)),
+    (leg, (Density("thigh", to=0.0),)),
+    (gantry, (Lock("yaw"), Lock("yaw"))),
+    (gantry, (AddLimb("boom", "_2", 1.0), AddLimb("boom", "_2", 1.0))),
+]
+
+
+@pytest.mark.parametrize(("load", "edit"), _CHANGES, ids=lambda x: type(x).__name__)
+def test_the_model_given_is_untouched(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
+    """Edits are made to a copy; the model compiles to the same afterwards."""
+    spec = load()
+    text, before = spec.to_xml(), built(load())
+    assert differing(before, built(spec, edit)) != []
+    assert spec.to_xml() == text
+    assert differing(before, built(spec)) == []
+
+
+@pytest.mark.parametrize(("load", "edits"), _MISTAKES)
+def test_the_model_given_is_untouched_after_a_mistake(
+    load: Callable[[], mujoco.MjSpec], edits: tuple[Edit, ...]
+) -> None:
+    """Also when half of the edits have been made."""
+    spec = load()
+    text = spec.to_xml()
+    with pytest.raises(ShapechangerError):
+        compile_body(spec, edits)
+    assert spec.to_xml() == text
+    assert differing(built(load()), built(spec)) == []
+
+
+def test_edits_are_made_in_order() -> None:
+    """The second sees what the first has made."""
+    spec = reshape(leg(), [Split("thigh", "half"), Stretch("half", 2.0)])
+    assert spec.geom("thigh_of_half") is not None
+    with pytest.raises(UnknownName, match="No body matches 'half'"):
+        reshape(leg(), [Stretch("half", 2.0), Split("thigh", "half")])
+
+
+def test_an_edit_made_to_no_part_is_not_made() -> None:
+    """Not even looked at: the body it names need not be there."""
+    edits = [Stretch("no such body", 2.0, amount=0.0), Remove("trunk", amount=0.0)]
+    assert differing(built(leg()), compile_body(leg(), iter(edits))) == []
+
+
+@pytest.mark.parametrize(
+    ("edit", "reason"),
+    [
+        (
+            Density("thigh", to=0.0),
+            "mass and inertia of moving bodies must be larger than mjMINVAL",
+        ),
+        (Mass("shin", to=1e-18), "mass and inertia of moving bodies must be larger than mjMINVAL"),
+    ],
+)
+def test_a_body_that_does_not_compile_is_named(edit: Edit, reason: str) -> None:
+    """In one sentence: the body as JSON, and what MuJoCo has against it."""
+    with pytest.raises(BrokenModel) as caught:
+        built(leg(), edit)
+    message = str(caught.value)
+    found = re.fullmatch(r"MuJoCo does not compile the body (\[.*\]): ([^\n]*[^.\n])\.", message)
+    assert found
+    assert json.loads(found[1])[0]["edit"] == type(edit).__name__.lower()
+    assert found[2].startswith(reason)
+    assert isinstance(caught.value, MorphologyError)
+    assert isinstance(caught.value.__cause__, ValueError | mujoco.FatalError)
+
+
+def test_mistakes_of_ours_are_not_mujocos() -> None:
+    """An edit that does not fit is reported as such, not as a model that does not compile."""
+    with pytest.raises(MorphologyError) as caught:
+        built(leg(), Remove("trunk"))
+    assert type(caught.value) is MorphologyError
+    assert caught.value.__cause__ is None
