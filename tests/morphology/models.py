@@ -191,9 +191,13 @@ def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> di
     for i in range(model.nsite):
         found[f"site {model.site(i).name}"] = np.array(data.site_xpos[i])
     for i in range(model.ngeom):
-        found[f"friction {model.geom(i).name}"] = np.array(model.geom_friction[i])
+        name = model.geom(i).name
+        found[f"friction {name}"] = np.array(model.geom_friction[i])
+        found[f"place {name}"] = np.array(data.geom_xpos[i])
+        found[f"size {name}"] = np.array(model.geom_size[i])
     for i in range(model.nu):
-        found[f"gear {model.actuator(i).name}"] = np.array(model.actuator_gear[i])
+        # In hundreds, so that all numbers are of the order of one.
+        found[f"gear {model.actuator(i).name}"] = 0.01 * model.actuator_gear[i]
     for i in range(model.njnt):
         joint = model.joint(i)
         for field in ("range", "damping", "armature", "stiffness"):

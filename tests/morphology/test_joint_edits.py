@@ -30,8 +30,6 @@ def test_limits_are_given_in_radians() -> None:
 @pytest.mark.parametrize("degrees", range(-180, 181, 6))
 def test_degrees_are_exact(degrees: int) -> None:
     """A limit of 30° is that of a model file that says 30, to the last bit."""
-    written = built(limb('<geom size=".1"/>').copy())
-    assert not written.joint("link").limited
     spec = limb('<geom size=".1"/>')
     spec.joint("link").range = [degrees, 200.0]
     edited = built(limb('<geom size=".1"/>'), JointRange("link", math.radians(degrees), 3.5))
@@ -40,10 +38,7 @@ def test_degrees_are_exact(degrees: int) -> None:
 
 def test_angles_that_no_degrees_give_are_the_nearest() -> None:
     """Then the last bit may differ."""
-    limits = np.random.default_rng(0).uniform(-3.0, 3.0, 100)
-    for limit in limits.tolist():
-        edited = _range(built(limb('<geom size=".1"/>'), JointRange("link", upper=3.2)), "link")
-        assert edited[1] == pytest.approx(3.2, rel=1e-15)
+    for limit in np.random.default_rng(0).uniform(-3.0, 3.0, 100).tolist():
         model = built(limb('<geom size=".1"/>'), JointRange("link", limit, 3.2))
         assert _range(model, "link")[0] == pytest.approx(limit, rel=3e-16)
 
@@ -153,16 +148,12 @@ def test_a_slide_without_limits_has_no_middle() -> None:
 
 def test_on_the_way_to_a_lock_the_range_narrows() -> None:
     """Around the position, never to less than a thousandth."""
-    for amount, width in ((0.25, 1.5), (0.5, 1.0), (1.0 - 1e-9, 1e-3 / 1.5707963)):
+    for amount in (0.25, 0.5, 1.0 - 1e-9):
         model = built(leg(), Lock("knee", -0.5).partly(amount))
         lower, upper = _range(model, "knee")
         assert (model.nu, model.njnt) == (2, 3)
         assert lower < -0.5 < upper
-        if amount > 0.9:
-            assert upper - lower == pytest.approx(1e-3)
-        else:
-            assert upper - lower == pytest.approx((1.0 - amount) * math.pi / 2.0)
-        assert width > 0.0
+        assert upper - lower == pytest.approx(max((1.0 - amount) * math.pi / 2.0, 1e-3))
 
 
 def test_several_joints_of_a_body_are_locked_together() -> None:

@@ -45,7 +45,9 @@ def test_a_tendon_that_does_nothing_goes_too() -> None:
     model = built(asset_spec("humanoid"), Lock("right_knee"))
     assert model.ntendon == 1
     assert model.tendon(0).name == "left_hipknee"
-    assert built(spec_of(_TIED.format(tendon="", rest="")), Lock("b", 0.1)).ntendon == 1
+    coupled = _TIED.format(tendon="", rest='<equality><joint joint1="a"/></equality>')
+    model = built(spec_of(coupled), Lock("b", 0.1))
+    assert (model.ntendon, model.neq) == (1, 1)
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,8 @@ _SPHERE: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 # MuJoCo refuses bodies of almost no mass, so a limb that appears or goes is never smaller than this
 # part of its full size: a millionth of its mass.
 _SMALLEST_PART: Final = 0.01
+# In kg and in kg·m²: ten times what MuJoCo refuses.
+_LEAST: Final = 1e-14
 
 
 class Cut(Edit, frozen=True):
@@ -216,7 +218,7 @@ class AddSegment(Edit, frozen=True):
             geom.size = [self.radius, 0.0, 0.0]
         _add_hinge(spec, body, part, self, 1.0)
         if self.amount != 1.0:
-            resize_limb(spec, part, max(self.amount, _SMALLEST_PART))
+            _shrink(spec, part, self.amount)
 
 
 class AddLimb(Edit, frozen=True):
@@ -251,9 +253,10 @@ class AddLimb(Edit, frozen=True):
                 for element in elements:
                     require_free_name(spec, kind, element.name + self.suffix)
         copy = graft_copy(spec, limb, self.suffix, self.angle)
-        size = self.size * max(self.amount, _SMALLEST_PART)
-        if size != 1.0:
-            resize_limb(spec, copy, size)
+        if self.size != 1.0:
+            resize_limb(spec, copy, self.size)
+        if self.amount != 1.0:
+            _shrink(spec, copy, self.amount)
 
 
 def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | None) -> None:
@@ -290,7 +293,15 @@ def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None
     if amount == 1.0:
         spec.delete(limb)
     else:
-        resize_limb(spec, limb, max(1.0 - amount, _SMALLEST_PART))
+        _shrink(spec, limb, 1.0 - amount)
+
+
+def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
+    """Make a limb that fades as small and weak as the part of it that is there."""
+    resize_limb(spec, limb, max(part, _SMALLEST_PART))
+    # A limb that fades for two reasons at once is smaller still.
+    spec.compiler.boundmass = max(spec.compiler.boundmass, _LEAST)
+    spec.compiler.boundinertia = max(spec.compiler.boundinertia, _LEAST)
 
 
 def _new_segment(

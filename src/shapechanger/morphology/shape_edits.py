@@ -18,7 +18,8 @@ class Stretch(Edit, frozen=True):
     """Make segments longer or shorter at the same thickness, held at their joints.
 
     What hangs on a segment is carried outwards. Mass and inertia follow from the new geometry at
-    the same density.
+    the same density. Of a box or ellipsoid the longest half-size is its length; along an axis it is
+    the one that lies along it.
 
     Attributes:
         body: Name or glob of the bodies.

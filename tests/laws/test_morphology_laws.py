@@ -1,0 +1,380 @@
+"""What holds for every change of body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import hypothesis.strategies as st
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from shapechanger.morphology import (
+    EDITS,
+    AddLimb,
+    AddSegment,
+    Cut,
+    Damping,
+    Density,
+    Edit,
+    Friction,
+    Gear,
+    Gravity,
+    JointRange,
+    Lock,
+    Mass,
+    Radius,
+    Remove,
+    Split,
+    StartHeight,
+    Stiffness,
+    Stretch,
+    as_body,
+    from_json,
+    interpolate,
+    to_json,
+)
+from tests.morphology.models import (
+    ant,
+    built,
+    capsule_inertia,
+    capsule_mass,
+    differing,
+    gantry,
+    leg,
+    limb,
+    mass,
+    pendulum,
+    posed,
+    tip,
+)
+
+# The same examples every time, so that a failure can be looked at twice.
+law = settings(derandomize=True, deadline=None, max_examples=30)
+
+FACTORS = st.floats(0.1, 10.0)
+RATIOS = st.floats(0.01, 100.0)
+PARTS = st.floats(0.01, 0.99)
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+SMALL = st.floats(-3.0, 3.0)
+ANGLES = st.floats(-math.pi, math.pi)
+BODIES = st.sampled_from(["trunk", "thigh", "shin", "*"])
+LIMBS = st.sampled_from(["thigh", "shin", "[ts]hi*"])
+MODELS: list[Callable[[], mujoco.MjSpec]] = [leg, gantry, ant, pendulum]
+
+
+# --- Stretching and thickening -----------------------------------------------------------------
+
+
+@law
+@given(body=LIMBS, a=FACTORS, b=FACTORS)
+@pytest.mark.parametrize("kind", [Stretch, Radius])
+def test_twice_is_once_by_the_product(
+    kind: type[Stretch | Radius], body: str, a: float, b: float
+) -> None:
+    """Edits of size compose as their factors do."""
+    once, twice = built(leg(), kind(body, a * b)), built(leg(), kind(body, a), kind(body, b))
+    for field in ("body_pos", "geom_pos", "geom_size", "site_pos", "jnt_pos"):
+        np.testing.assert_allclose(
+            getattr(twice, field), getattr(once, field), rtol=1e-6, atol=1e-12, err_msg=field
+        )
+    for field in ("body_mass", "body_inertia"):
+        np.testing.assert_allclose(getattr(twice, field), getattr(once, field), rtol=1e-6)
+
+
+@pytest.mark.parametrize("load", MODELS)
+@pytest.mark.parametrize(
+    "edit",
+    [
+        *(Stretch("*", 1.0), Radius("*", 1.0), Mass("*", scale=1.0), Density("*", scale=1.0)),
+        *(Friction("*", scale=1.0), Damping("*", scale=1.0), Stiffness("*", scale=1.0)),
+        *(Gear("*", scale=1.0), Stretch("*", 7.0, amount=0.0), Stretch("*", 1.0, "z")),
+    ],
+)
+def test_by_one_is_the_identity(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
+    """Bit for bit, whatever the model."""
+    assert differing(built(load()), built(load(), edit)) == []
+
+
+@law
+@given(factor=FACTORS, thickness=FACTORS, density=st.floats(1.0, 5000.0))
+def test_masses_and_inertias_follow_from_geometry(
+    factor: float, thickness: float, density: float
+) -> None:
+    """A capsule's mass and moments are those of the formulas, after any edit of its size."""
+    content = f'<geom type="capsule" size=".1" fromto="0 0 0 .3 0 .4" density="{density!r}"/>'
+    model = built(limb(content), Stretch("link", factor), Radius("link", thickness))
+    radius, length = 0.1 * thickness, 0.5 * factor
+    across, along = capsule_inertia(radius, length, density)
+    assert mass(model, "link") == pytest.approx(capsule_mass(radius, length, density))
+    np.testing.assert_allclose(
+        sorted(model.body("link").inertia), sorted([across, across, along]), rtol=1e-9
+    )
+    np.testing.assert_allclose(model.body("link").ipos, [0.15 * factor, 0.0, 0.2 * factor])
+
+
+@law
+@given(body=BODIES, factor=RATIOS)
+def test_mass_scales_as_density(body: str, factor: float) -> None:
+    """A denser material is a heavier body of the same shape, with the same axes of inertia."""
+    before = built(leg())
+    by_mass, by_density = (built(leg(), kind(body, scale=factor)) for kind in (Mass, Density))
+    assert differing(by_mass, by_density) == []
+    changed = before.body_mass != by_mass.body_mass
+    for field in ("body_mass", "body_inertia"):
+        old, new = getattr(before, field), getattr(by_mass, field)
+        np.testing.assert_allclose(new[changed], factor * old[changed], rtol=1e-9)
+        np.testing.assert_array_equal(new[~changed], old[~changed])
+    np.testing.assert_allclose(by_mass.body_ipos, before.body_ipos, atol=1e-12)
+
+
+@law
+@given(factor=st.floats(0.1, 10.0))
+def test_a_uniform_body_scales_as_a_whole(factor: float) -> None:
+    """Longer and thicker by the same factor: mass by its cube, inertia by its fifth power."""
+    geom = '<geom type="capsule" size=".1" fromto="0 0 0 0 0 .4"/>'
+    before = built(limb(geom))
+    after = built(limb(geom), Stretch("link", factor), Radius("link", factor))
+    assert mass(after, "link") == pytest.approx(factor**3 * mass(before, "link"))
+    np.testing.assert_allclose(
+        after.body("link").inertia, factor**5 * before.body("link").inertia, rtol=1e-9
+    )
+
+
+# --- Order -------------------------------------------------------------------------------------
+
+
+@law
+@given(
+    edits=st.tuples(
+        st.one_of(
+            st.builds(Stretch, st.just("thigh"), FACTORS),
+            st.builds(Radius, st.just("thigh"), FACTORS),
+            st.builds(Mass, st.just("thigh"), scale=FACTORS),
+            st.builds(Damping, st.just("hip"), to=FACTORS),
+            st.builds(JointRange, st.just("hip"), lower=st.floats(-3.0, -1.0)),
+            st.builds(Gear, st.just("hip"), scale=FACTORS),
+            st.builds(Lock, st.just("hip"), ANGLES),
+        ),
+        st.one_of(
+            st.builds(Stretch, st.just("shin"), FACTORS),
+            st.builds(Density, st.just("shin"), to=st.floats(1.0, 5000.0)),
+            st.builds(Friction, st.just("sole"), to=FACTORS),
+            st.builds(Lock, st.just("knee"), ANGLES),
+            st.builds(AddSegment, st.just("shin"), st.just("foot"), st.just((0.1, 0.0, 0.0))),
+            st.builds(Split, st.just("shin"), st.just("foot"), PARTS),
+            st.builds(Remove, st.just("shin")),
+            st.builds(StartHeight, st.just("trunk"), SMALL),
+        ),
+    )
+)
+def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
+    """Who comes first does not matter where one does not touch what the other does."""
+    a, b = built(leg(), *edits), built(leg(), *reversed(edits))
+    for field in differing(a, b):
+        np.testing.assert_allclose(
+            getattr(a, field), getattr(b, field), rtol=1e-9, atol=1e-12, err_msg=field
+        )
+
+
+# --- Locking -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("load", "joint"), [(leg, "hip"), (leg, "knee"), (ant, "hip_1")])
+def test_locked_at_rest_nothing_moves(load: Callable[[], mujoco.MjSpec], joint: str) -> None:
+    """The bodies are where they are in the model's own pose."""
+    free = built(load())
+    rest = float(free.qpos0[free.joint(joint).qposadr[0]])
+    locked = built(load(), Lock(joint, rest))
+    np.testing.assert_allclose(posed(locked).xpos, posed(free).xpos, atol=1e-15)
+    np.testing.assert_allclose(posed(locked).xmat, posed(free).xmat, atol=1e-15)
+
+
+@law
+@given(
+    lock=st.sampled_from(["x", "yaw", "y", "pitch", "swing"]),
+    positions=st.fixed_dictionaries({j: SMALL for j in ("x", "yaw", "y", "pitch", "swing")}),
+)
+def test_locked_is_where_the_joint_would_be(lock: str, positions: dict[str, float]) -> None:
+    """Hinges and slides, alone or with others on one body, wherever those are."""
+    free = built(gantry())
+    locked = built(gantry(), Lock(lock, positions[lock]))
+    others = {joint: at for joint, at in positions.items() if joint != lock}
+    a, b = posed(free, positions), posed(locked, others)
+    np.testing.assert_allclose(b.geom_xpos, a.geom_xpos, atol=1e-12)
+    np.testing.assert_allclose(b.geom_xmat, a.geom_xmat, atol=1e-12)
+    np.testing.assert_allclose(b.site_xpos, a.site_xpos, atol=1e-12)
+
+
+@law
+@given(hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
+def test_locked_legs_reach_where_free_ones_do(hip: float, knee: float) -> None:
+    """In a model that is written in degrees, all joints at once."""
+    locked = built(leg(), Lock("knee", knee), Lock("hip", hip))
+    np.testing.assert_allclose(
+        tip(locked, "toe"), tip(built(leg()), "toe", {"hip": hip, "knee": knee}), atol=1e-12
+    )
+
+
+# --- Limbs -------------------------------------------------------------------------------------
+
+
+@law
+@given(at=PARTS, body=st.sampled_from(["thigh", "shin"]))
+def test_a_split_keeps_length_and_ends(at: float, body: str) -> None:
+    """The parts are as long as the whole, and everything is where it was."""
+    before, after = built(leg()), built(leg(), Split(body, "half", at))
+    lengths = [after.geom(name).size[1] for name in (body, f"{body}_of_half")]
+    assert sum(lengths) == pytest.approx(before.geom(body).size[1])
+    assert lengths[0] == pytest.approx(at * before.geom(body).size[1])
+    for site in ("scar", "knee_cap", "toe"):
+        np.testing.assert_allclose(tip(after, site), tip(before, site), atol=1e-12)
+
+
+@law
+@given(angle=ANGLES, hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
+def test_a_copied_limb_is_the_limb_turned(angle: float, hip: float, knee: float) -> None:
+    """About the trunk's vertical axis, in every pose of its joints."""
+    model = built(leg(), AddLimb("thigh", "_2", angle))
+    data = posed(model, {"hip": hip, "hip_2": hip, "knee": knee, "knee_2": knee})
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    for geom in ("thigh", "shin", "sole"):
+        old, new = data.geom(geom), data.geom(f"{geom}_2")
+        np.testing.assert_allclose(new.xpos, turn @ old.xpos, atol=1e-12)
+        np.testing.assert_allclose(
+            new.xmat.reshape(3, 3), turn @ old.xmat.reshape(3, 3), atol=1e-12
+        )
+    for body in ("thigh", "shin"):
+        np.testing.assert_array_equal(model.body(f"{body}_2").mass, model.body(body).mass)
+        np.testing.assert_array_equal(model.body(f"{body}_2").inertia, model.body(body).inertia)
+
+
+@pytest.mark.parametrize(
+    ("load", "add", "name"),
+    [
+        (leg, AddLimb("thigh", "_2", 1.0), "thigh_2"),
+        (leg, AddLimb("shin", "_2", 1.0, size=2.0), "shin_2"),
+        (leg, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=1.0), "foot"),
+        (ant, AddLimb("right_back_leg", "_5", 0.7), "right_back_leg_5"),
+        (gantry, AddLimb("boom", "_2", 0.7), "boom_2"),
+    ],
+)
+def test_what_was_added_can_be_removed(
+    load: Callable[[], mujoco.MjSpec], add: Edit, name: str
+) -> None:
+    """And the model is what it was, bit for bit."""
+    assert differing(built(load()), built(load(), add)) != []
+    assert differing(built(load()), built(load(), add, Remove(name))) == []
+
+
+# --- Values ------------------------------------------------------------------------------------
+
+_NAMES = st.text(min_size=1, max_size=8)
+_AMOUNTS = st.floats(0.0, 1.0)
+_VECTORS = st.tuples(SMALL, SMALL, SMALL).filter(any)
+_AXES: st.SearchStrategy[Any] = st.none() | _VECTORS
+_GEARS = st.none() | NUMBERS.filter(bool)
+_LIMITS = st.tuples(NUMBERS, NUMBERS).filter(lambda x: x[0] < x[1])
+
+
+def _values(kind: Any, to: st.SearchStrategy[float], **more: Any) -> st.SearchStrategy[Edit]:
+    """Any edit of one number, as a ratio or as a value."""
+    fields: dict[str, Any] = {"element": _NAMES, "amount": _AMOUNTS, **more}
+    return st.builds(kind, scale=RATIOS, **fields) | st.builds(kind, to=to, **fields)
+
+
+_ABOVE_ZERO = st.floats(1e-9, 1e9)
+_ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
+    Stretch: st.builds(
+        Stretch, _NAMES, RATIOS, st.sampled_from([None, "x", "y", "z"]), amount=_AMOUNTS
+    ),
+    Radius: st.builds(Radius, _NAMES, RATIOS, amount=_AMOUNTS),
+    Cut: st.builds(Cut, _NAMES, st.floats(0.01, 1.0), amount=_AMOUNTS),
+    Remove: st.builds(Remove, _NAMES, amount=_AMOUNTS),
+    Split: st.builds(
+        lambda limits, **fields: Split(lower=limits[0], upper=limits[1], **fields),
+        _LIMITS,
+        body=_NAMES,
+        name=_NAMES,
+        at=PARTS,
+        gear=_GEARS,
+        axis=_AXES,
+        amount=_AMOUNTS,
+    ),
+    AddSegment: st.builds(
+        lambda limits, **fields: AddSegment(lower=limits[0], upper=limits[1], **fields),
+        _LIMITS,
+        body=_NAMES,
+        name=_NAMES,
+        end=_VECTORS,
+        gear=_GEARS,
+        axis=_AXES,
+        radius=st.none() | _ABOVE_ZERO,
+        amount=_AMOUNTS,
+    ),
+    AddLimb: st.builds(AddLimb, _NAMES, _NAMES, NUMBERS, RATIOS, amount=_AMOUNTS),
+    Mass: _values(Mass, _ABOVE_ZERO),
+    Density: _values(Density, _ABOVE_ZERO),
+    Gear: _values(Gear, NUMBERS.filter(bool)),
+    Damping: _values(Damping, _ABOVE_ZERO),
+    Stiffness: _values(Stiffness, _ABOVE_ZERO),
+    Friction: _values(
+        Friction, _ABOVE_ZERO, component=st.sampled_from(["sliding", "torsional", "rolling"])
+    ),
+    JointRange: st.builds(
+        lambda limits, which, **fields: JointRange(
+            lower=limits[0] if which != 1 else None, upper=limits[1] if which else None, **fields
+        ),
+        _LIMITS,
+        st.integers(0, 2),
+        joint=_NAMES,
+        amount=_AMOUNTS,
+    ),
+    Lock: st.builds(Lock, _NAMES, st.none() | NUMBERS, amount=_AMOUNTS),
+    Gravity: st.builds(Gravity, _VECTORS, amount=_AMOUNTS),
+    StartHeight: st.builds(StartHeight, _NAMES, NUMBERS, amount=_AMOUNTS),
+}
+
+
+def test_there_is_a_strategy_for_every_kind() -> None:
+    """A new kind of edit is to be tried here."""
+    assert tuple(_ANY_EDIT) == EDITS
+
+
+@law
+@given(data=st.data())
+@pytest.mark.parametrize("kind", EDITS)
+def test_json_gives_back_every_edit(kind: type[Edit], data: st.DataObject) -> None:
+    """Every kind, with any numbers and names, whole or in part."""
+    edit = data.draw(_ANY_EDIT[kind])
+    text = to_json([edit])
+    assert from_json(text) == (edit,) == as_body(text)
+    assert f'"edit":"{kind.__struct_config__.tag}"' in text
+    assert hash(from_json(text)) == hash((edit,))
+
+
+@law
+@given(body=st.lists(st.one_of(*_ANY_EDIT.values()), max_size=6), alpha=_AMOUNTS)
+def test_json_gives_back_every_body(body: list[Edit], alpha: float) -> None:
+    """In order, and from a body to itself nothing changes."""
+    edits = tuple(body)
+    assert from_json(to_json(edits)) == edits
+    assert interpolate(edits, edits, alpha) == edits
+
+
+@law
+@given(
+    pair=st.tuples(*[st.lists(st.one_of(*_ANY_EDIT.values()), max_size=3)] * 2),
+    alpha=st.floats(0.0, 1.0),
+)
+def test_every_path_is_made_of_bodies(pair: tuple[list[Edit], list[Edit]], alpha: float) -> None:
+    """Whatever the ends, what lies between can be written as JSON and read again."""
+    a, b = (tuple(body) for body in pair)
+    assert interpolate(a, b, 0.0) == a
+    assert interpolate(a, b, 1.0) == b
+    between = interpolate(a, b, alpha)
+    assert from_json(to_json(between)) == between

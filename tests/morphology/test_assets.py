@@ -1,0 +1,207 @@
+"""The edits on every MuJoCo model that Gymnasium ships."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.morphology import (
+    AddLimb,
+    AddSegment,
+    Cut,
+    Damping,
+    Density,
+    Edit,
+    Friction,
+    Gear,
+    Lock,
+    Mass,
+    Radius,
+    Remove,
+    Split,
+    Stiffness,
+    Stretch,
+    name_elements,
+)
+from shapechanger.morphology.elements import limbs_and_trunks
+from shapechanger.morphology.geoms import volume
+from tests.morphology.models import Array, built, differing, mass, posed
+from tests.morphology.scenes import ASSETS, asset_spec
+
+_MODELS = sorted(name.removesuffix(".xml") for name in os.listdir(ASSETS) if name.endswith(".xml"))
+_ELEMENTS = ("bodies", "joints", "geoms", "sites", "cameras", "actuators")
+
+
+def _named(model: str) -> mujoco.MjSpec:
+    """The model with a name for everything."""
+    spec = asset_spec(model)
+    name_elements(spec)
+    return spec
+
+
+def _before(model: str) -> mujoco.MjModel:
+    """The model as it is, but for a total mass that is written out geom by geom."""
+    return built(_named(model), Mass("*", scale=1.0))
+
+
+def _limbs(spec: mujoco.MjSpec) -> list[str]:
+    """The names of all bodies that hang on another."""
+    return [b.name for b in limbs_and_trunks(spec) if b.parent.parent is not None]
+
+
+def test_these_are_all_of_them() -> None:
+    """Eleven bodies, some in two versions."""
+    assert {name.removesuffix("_v5") for name in _MODELS} == {
+        *("ant", "half_cheetah", "hopper", "humanoid", "humanoidstandup"),
+        *("inverted_double_pendulum", "inverted_pendulum", "point", "pusher", "reacher"),
+        *("swimmer", "walker2d"),
+    }
+
+
+@pytest.mark.parametrize("model", _MODELS)
+def test_everything_has_a_name_of_its_own(model: str) -> None:
+    """And naming changes nothing."""
+    spec = _named(model)
+    for elements in _ELEMENTS:
+        names = [element.name for element in getattr(spec, elements)]
+        assert all(names)
+        assert len({*names}) == len(names)
+    if model != "half_cheetah":  # MuJoCo warns about its total mass.
+        assert differing(built(asset_spec(model)), built(spec)) == []
+
+
+@pytest.mark.parametrize("model", _MODELS)
+@pytest.mark.parametrize("kind", [Mass, Density])
+def test_masses_and_inertias_follow(model: str, kind: Any) -> None:
+    """Half as heavy again, body by body."""
+    before, after = _before(model), built(_named(model), kind("*", scale=1.5))
+    np.testing.assert_allclose(after.body_mass, 1.5 * before.body_mass, rtol=1e-12)
+    np.testing.assert_allclose(after.body_inertia, 1.5 * before.body_inertia, rtol=1e-9)
+    for field in ("body_pos", "geom_size", "geom_friction", "jnt_range", "dof_armature"):
+        np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
+
+
+@pytest.mark.parametrize("model", _MODELS)
+@pytest.mark.parametrize("edit", [Stretch("*", 1.3), Radius("*", 0.8)])
+def test_masses_follow_the_volume(model: str, edit: Stretch | Radius) -> None:
+    """Every body is as dense as it was."""
+    densities = []
+    for model_built in (_before(model), built(_named(model), edit)):
+        volumes = _volumes(model_built, _weights(model))
+        densities.append(model_built.body_mass / np.where(volumes > 0.0, volumes, 1.0))
+    np.testing.assert_allclose(densities[1], densities[0], rtol=1e-9)
+
+
+def _weights(model: str) -> Array:
+    """The density of each geom, in the compiled order."""
+    spec = _named(model)
+    by_name = {
+        geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(spec, geom)
+        for geom in spec.geoms
+    }
+    compiled = _before(model)
+    return np.array([by_name[compiled.geom(i).name] for i in range(compiled.ngeom)])
+
+
+def _volumes(model: mujoco.MjModel, weights: Array) -> Array:
+    """For each body the volumes of its geoms, weighted, from the compiled sizes."""
+    a, b, c = model.geom_size.T
+    kind = mujoco.mjtGeom
+    shapes = {
+        kind.mjGEOM_SPHERE: 4.0 / 3.0 * np.pi * a**3,
+        kind.mjGEOM_CAPSULE: np.pi * a**2 * (2.0 * b + 4.0 / 3.0 * a),
+        kind.mjGEOM_CYLINDER: 2.0 * np.pi * a**2 * b,
+        kind.mjGEOM_BOX: 8.0 * a * b * c,
+    }
+    volumes = sum(np.where(model.geom_type == int(t), v, 0.0) for t, v in shapes.items())
+    return np.bincount(model.geom_bodyid, weights * volumes, minlength=model.nbody)
+
+
+@pytest.mark.parametrize("model", _MODELS)
+def test_poses_follow_a_stretch(model: str) -> None:
+    """Where each body is held is 1.3 times as far from where its parent is held."""
+    before, after = _before(model), built(_named(model), Stretch("*", 1.3))
+    for body in range(1, before.nbody):
+        parent = int(before.body_parentid[body])
+        if parent == 0:
+            np.testing.assert_array_equal(after.body_pos[body], before.body_pos[body])
+            continue
+        np.testing.assert_allclose(
+            _held(after, body, parent), 1.3 * _held(before, body, parent), atol=1e-9
+        )
+
+
+def _held(model: mujoco.MjModel, body: int, parent: int) -> Array:
+    """Where a body is held, as seen from where its parent is, in the parent's frame, m."""
+    turned = np.empty(3)
+    mujoco.mju_rotVecQuat(turned, _anchor(model, body), model.body_quat[body])
+    return model.body_pos[body] + turned - _anchor(model, parent)
+
+
+def _anchor(model: mujoco.MjModel, body: int) -> Array:
+    """The place of a body's first hinge in its frame, m."""
+    first = int(model.body_jntadr[body])
+    joints = range(first, first + int(model.body_jntnum[body]))
+    hinges = [j for j in joints if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE]
+    return model.jnt_pos[hinges[0]] if hinges else np.zeros(3)
+
+
+@pytest.mark.parametrize("model", _MODELS)
+@pytest.mark.parametrize(
+    ("edit", "field", "factor"),
+    [
+        (Friction("*", scale=0.5), "geom_friction", [0.5, 1.0, 1.0]),
+        (Gear("*", scale=0.5), "actuator_gear", 0.5),
+        (Damping("*", scale=2.0), "dof_damping", 2.0),
+        (Stiffness("*", scale=2.0), "jnt_stiffness", 2.0),
+    ],
+)
+def test_values_follow(model: str, edit: Edit, field: str, factor: Any) -> None:
+    """Every number of the kind, and no other."""
+    before, after = _before(model), built(_named(model), edit)
+    np.testing.assert_array_equal(getattr(after, field), getattr(before, field) * factor)
+    assert {*differing(before, after)} <= {field, "actuator_acc0", "actuator_moment0"}
+
+
+@pytest.mark.parametrize("model", _MODELS)
+def test_every_hinge_and_slide_can_be_locked(model: str) -> None:
+    """One after the other, at the model's own pose, where nothing moves."""
+    free = _before(model)
+    for joint in range(free.njnt):
+        if free.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            continue
+        rest = float(free.qpos0[free.jnt_qposadr[joint]])
+        locked = built(_named(model), Lock(free.joint(joint).name, rest))
+        assert locked.njnt == free.njnt - 1
+        np.testing.assert_allclose(posed(locked).xpos, posed(free).xpos, atol=1e-12)
+
+
+@pytest.mark.parametrize("model", _MODELS)
+def test_every_limb_can_be_removed_copied_cut_split_and_extended(model: str) -> None:
+    """And weighs afterwards what it should."""
+    spec = _named(model)
+    before = _before(model)
+    for limb in _limbs(spec):
+        subtree = float(before.body(limb).subtreemass[0])
+        assert mass(built(spec, Remove(limb))) == pytest.approx(mass(before) - subtree, abs=1e-9)
+        copied = built(spec, AddLimb(limb, "_copy", 0.5))
+        assert mass(copied) == pytest.approx(mass(before) + subtree)
+        if not any(geom.type in _LONG for geom in spec.body(limb).geoms):
+            continue
+        assert mass(built(spec, Cut(limb, 0.5))) < mass(before)
+        split = built(spec, Split(limb, "half", axis=(0.0, 1.0, 0.0)).partly(1e-9))
+        assert mass(split) == pytest.approx(mass(before))
+        np.testing.assert_allclose(
+            [posed(split).body(b.name).xpos for b in limbs_and_trunks(spec)],
+            posed(before).xpos[1:],
+            atol=1e-9,
+        )
+        grown = built(spec, AddSegment(limb, "tip", (0.0, 0.0, 0.1), axis=(0.0, 1.0, 0.0)))
+        assert grown.nbody == before.nbody + 1
+
+
+_LONG = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
