@@ -26,7 +26,7 @@ from rich.table import Table
 
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
-from shapechanger.morphology.fingerprint import fingerprint
+from shapechanger.morphology.effective import fingerprint
 
 RESULTS = Path(__file__).parent / "results"
 ROUNDS = 30

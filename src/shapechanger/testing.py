@@ -107,13 +107,20 @@ def pickles(make: MakeEnv) -> None:
 
 
 def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
-    """The reward is the sum of the terms that `info` reports."""
+    """The reward is the sum of the terms that `info` reports.
+
+    Those are called `reward_...`, or `..._penalty` as Gymnasium calls costs that are below zero.
+    """
     env = make()
     env.reset(seed=_SEED)
     env.action_space.seed(_SEED)
     for _ in range(_STEPS):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
-        terms = [float(value) for name, value in info.items() if name.startswith("reward_")]
+        terms = [
+            float(value)
+            for name, value in info.items()
+            if name.startswith("reward_") or name.endswith("_penalty")
+        ]
         _require(bool(terms), "info reports no reward terms.")
         _require(
             bool(np.isclose(float(reward), sum(terms), rtol=1e-9, atol=1e-12)),

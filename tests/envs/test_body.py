@@ -32,7 +32,7 @@ from shapechanger.morphology import (
     from_json,
     to_json,
 )
-from shapechanger.morphology.fingerprint import fingerprint
+from shapechanger.morphology.effective import fingerprint
 
 _BIG = (Stretch("shank_*", 2.0),)
 _OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))

@@ -27,8 +27,8 @@ from shapechanger.morphology import (
     Stretch,
     name_elements,
 )
-from shapechanger.morphology.elements import limbs_and_trunks
-from shapechanger.morphology.geoms import volume
+from shapechanger.morphology.spec.elements import limbs_and_trunks
+from shapechanger.morphology.spec.geoms import volume
 from tests.morphology.models import Array, built, differing, mass, posed
 from tests.morphology.scenes import ASSETS, asset_spec
 

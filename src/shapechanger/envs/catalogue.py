@@ -48,6 +48,16 @@ _EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
 _UP: Final = 950.0
 _RUNS: Final = 6000.0
 
+# Gymnasium's other bodies, as they are: name, summary, where the class is, threshold of its v5.
+_OTHERS: Final = (
+    ("HalfCheetah", "half a cheetah that runs in a plane", "planar", 4800.0),
+    ("Hopper", "one leg that hops in a plane", "planar", 3800.0),
+    ("Walker2d", "two legs that walk in a plane", "planar", None),
+    ("Swimmer", "three links that swim", "planar", 360.0),
+    ("Humanoid", "two legs, two arms and a waist", "humanoid", None),
+    ("InvertedDoublePendulum", "two poles on a cart", "double_pendulum", 9100.0),
+)
+
 CATALOGUE: Final[dict[str, Entry]] = {
     entry.id: entry
     for entry in (
@@ -97,6 +107,18 @@ CATALOGUE: Final[dict[str, Entry]] = {
             "ppo-run",
             "",
             _RUNS,
+        ),
+        *(
+            Entry(
+                name,
+                name,
+                summary,
+                f"shapechanger.envs.{module}:{name}Env",
+                "ppo-balance" if module == "double_pendulum" else "ppo-run",
+                name,
+                threshold,
+            )
+            for name, summary, module, threshold in _OTHERS
         ),
     )
 }

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import mujoco
 
 from shapechanger.layout import Element, Feature, Layout
 
-__all__ = ["action_layout", "contact_features", "position_features", "velocity_features"]
+__all__ = [
+    "action_layout",
+    "contact_features",
+    "drive_features",
+    "inertia_features",
+    "position_features",
+    "twist_features",
+    "velocity_features",
+]
 
 _J = mujoco.mjtJoint
 _POSITION_UNIT: Final = {_J.mjJNT_SLIDE: "m", _J.mjJNT_HINGE: "rad"}
@@ -41,23 +50,31 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
     return features
 
 
-def velocity_features(model: mujoco.MjModel) -> list[Feature]:
+def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Feature]:
     """A feature for each number of qvel.
 
     `joint/velocity` for a hinge or slide; `body/vx` ... `body/wz` for a free joint: velocity in the
     world's frame, m/s, and angular velocity in the body's, rad/s.
+
+    Args:
+        model: The model.
+        limit: Where the numbers are clipped, on both sides of 0.
     """
     features: list[Feature] = []
     for j in range(model.njnt):
         name, kind = model.joint(j).name, _J(model.jnt_type[j])
         if kind in _POSITION_UNIT:
             unit = f"{_POSITION_UNIT[kind]}/s"
-            features.append(Feature(f"{name}/velocity", unit, element=Element("joint", name)))
+            features.append(
+                Feature(f"{name}/velocity", unit, -limit, limit, Element("joint", name))
+            )
             continue
         body, element = _body_of(model, j)
         if kind == _J.mjJNT_FREE:
-            features += [Feature(f"{body}/v{axis}", "m/s", element=element) for axis in "xyz"]
-        features += [Feature(f"{body}/w{axis}", "rad/s", element=element) for axis in "xyz"]
+            features += [
+                Feature(f"{body}/v{axis}", "m/s", -limit, limit, element) for axis in "xyz"
+            ]
+        features += [Feature(f"{body}/w{axis}", "rad/s", -limit, limit, element) for axis in "xyz"]
     return features
 
 
@@ -78,6 +95,39 @@ def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Fea
                 Feature(f"{name}/contact/{prefix}{axis}", unit, low, high, element)
                 for axis in "xyz"
             ]
+    return features
+
+
+def inertia_features(model: mujoco.MjModel) -> list[Feature]:
+    """Ten features for each body but the world: MuJoCo's `cinert`, in the axes of the world.
+
+    `body/inertia/xx` ... `yz`, its inertia about the centre of mass of the whole, kg·m²; `mx` to
+    `mz`, its mass times its distance from there, kg·m; and `mass`, kg.
+    """
+    quantities = {axes: "kg·m²" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
+    quantities |= {"mx": "kg·m", "my": "kg·m", "mz": "kg·m", "mass": "kg"}
+    return _of_each_body(model, "inertia", quantities)
+
+
+def twist_features(model: mujoco.MjModel) -> list[Feature]:
+    """Six features for each body but the world: MuJoCo's `cvel`, in the axes of the world.
+
+    `body/twist/wx` ... `wz`, its angular velocity, rad/s, and `vx` ... `vz`, the velocity of what
+    turns with it at the centre of mass of the whole, m/s.
+    """
+    quantities = {"wx": "rad/s", "wy": "rad/s", "wz": "rad/s"}
+    return _of_each_body(model, "twist", quantities | {"vx": "m/s", "vy": "m/s", "vz": "m/s"})
+
+
+def drive_features(model: mujoco.MjModel) -> list[Feature]:
+    """A feature `joint/drive` for each hinge and slide: what the motors do there, N·m or N."""
+    features: list[Feature] = []
+    for j in range(model.njnt):
+        kind = _J(model.jnt_type[j])
+        if kind in _FORCE_UNIT:
+            name = model.joint(j).name
+            element = Element("joint", name)
+            features.append(Feature(f"{name}/drive", _FORCE_UNIT[kind], element=element))
     return features
 
 
@@ -109,3 +159,15 @@ def action_layout(model: mujoco.MjModel) -> Layout:
 def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:
     name = model.body(model.jnt_bodyid[joint]).name
     return name, Element("body", name)
+
+
+def _of_each_body(
+    model: mujoco.MjModel, block: str, quantities: Mapping[str, str]
+) -> list[Feature]:
+    """A feature `body/block/quantity`, in its unit, for each body but the world."""
+    names = [model.body(b).name for b in range(1, model.nbody)]
+    return [
+        Feature(f"{name}/{block}/{quantity}", unit, element=Element("body", name))
+        for name in names
+        for quantity, unit in quantities.items()
+    ]

@@ -24,14 +24,14 @@ from shapechanger.envs.picture import body_reach, draw
 from shapechanger.envs.renderer import Renderer
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, to_json
-from shapechanger.morphology.certifiable import Wrapped
-from shapechanger.morphology.certificate import Certificate, certify
+from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
     floor_gap,
     keep_within_limits,
     standing_height,
     start_pose,
     trunk_joint,
+    trunk_lift,
 )
 
 if TYPE_CHECKING:
@@ -164,9 +164,9 @@ class Reshapable(MujocoEnv):
         moved = not np.array_equal(pose, self.data.qpos)
         if moved:
             self.set_state(pose, self.data.qvel.copy())
-        trunk = trunk_joint(self.model)
-        if trunk is not None and (gap := floor_gap(self.model, self.data)) < 0.0:
-            pose[self.model.jnt_qposadr[trunk] + 2] -= gap
+        lift = trunk_lift(self.model)
+        if lift is not None and (gap := floor_gap(self.model, self.data)) < 0.0:
+            lift.raise_by(pose, -gap)
             self.set_state(pose, self.data.qvel.copy())
             moved = True
         return self._get_obs() if moved else observation

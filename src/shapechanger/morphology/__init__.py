@@ -10,15 +10,29 @@
 from __future__ import annotations
 
 from shapechanger.morphology.codec import EDITS, Body, as_body, from_json, to_json
-from shapechanger.morphology.edit import Edit
-from shapechanger.morphology.elements import name_elements
-from shapechanger.morphology.joint_edits import JointRange, Lock
-from shapechanger.morphology.limb_edits import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits import (
+    AddLimb,
+    AddSegment,
+    Cut,
+    Damping,
+    Density,
+    Edit,
+    Friction,
+    Gear,
+    Gravity,
+    JointRange,
+    Lock,
+    Mass,
+    Radius,
+    Remove,
+    Split,
+    StartHeight,
+    Stiffness,
+    Stretch,
+)
 from shapechanger.morphology.path import interpolate
 from shapechanger.morphology.reshape import compile_body, reshape
-from shapechanger.morphology.shape_edits import Radius, Stretch
-from shapechanger.morphology.value_edits import Damping, Density, Friction, Gear, Mass, Stiffness
-from shapechanger.morphology.world_edits import Gravity, StartHeight
+from shapechanger.morphology.spec import name_elements
 
 __all__ = [
     "EDITS",

@@ -14,12 +14,12 @@ from typing import Any, Final, cast
 import msgspec
 
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology.edit import Edit
-from shapechanger.morphology.joint_edits import JointRange, Lock
-from shapechanger.morphology.limb_edits import AddLimb, AddSegment, Cut, Remove, Split
-from shapechanger.morphology.shape_edits import Radius, Stretch
-from shapechanger.morphology.value_edits import Damping, Density, Friction, Gear, Mass, Stiffness
-from shapechanger.morphology.world_edits import Gravity, StartHeight
+from shapechanger.morphology.edits.edit import Edit
+from shapechanger.morphology.edits.joints import JointRange, Lock
+from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.shapes import Radius, Stretch
+from shapechanger.morphology.edits.values import Damping, Density, Friction, Gear, Mass, Stiffness
+from shapechanger.morphology.edits.world import Gravity, StartHeight
 
 __all__ = ["EDITS", "Body", "as_body", "from_json", "to_json"]
 

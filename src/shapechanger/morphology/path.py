@@ -15,7 +15,7 @@ import msgspec
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.codec import Body
-from shapechanger.morphology.edit import Edit, Vector
+from shapechanger.morphology.edits.edit import Edit, Vector
 
 __all__ = ["interpolate"]
 

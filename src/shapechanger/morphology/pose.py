@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["floor_gap", "keep_within_limits", "standing_height", "start_pose", "trunk_joint"]
+__all__ = [
+    "Lift",
+    "floor_gap",
+    "keep_within_limits",
+    "standing_height",
+    "start_pose",
+    "trunk_joint",
+    "trunk_lift",
+]
 
 _Array = NDArray[np.float64]
 _J = mujoco.mjtJoint
@@ -19,6 +27,34 @@ _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HF
 _INSIDE: Final = 0.1
 # How far down a floor is looked for; a body that stands higher stands on nothing.
 _FAR_M: Final = 1000.0
+# How near to 1 the vertical part of an axis is when it counts as vertical.
+_VERTICAL: Final = 1e-6
+
+
+class Lift(NamedTuple):
+    """The number of qpos that raises a trunk.
+
+    Attributes:
+        place: Its place in qpos.
+        up: 1 where a larger number is higher; -1 where it is lower, as on a slide that points down.
+        at_zero_m: Height of the trunk's origin in the world where the number is 0, m.
+    """
+
+    place: int
+    up: float
+    at_zero_m: float
+
+    def raise_by(self, pose: _Array, distance_m: float) -> None:
+        """Move the trunk of a pose (nq,) up, in place."""
+        pose[self.place] += self.up * distance_m
+
+    def height(self, pose: _Array) -> float:
+        """How high the trunk's origin is at a pose (nq,), m."""
+        return float(self.at_zero_m + self.up * pose[self.place])
+
+    def number_at(self, height_m: float) -> float:
+        """The number at which the trunk's origin is this high."""
+        return self.up * (height_m - self.at_zero_m)
 
 
 def trunk_joint(model: mujoco.MjModel) -> int | None:
@@ -27,19 +63,39 @@ def trunk_joint(model: mujoco.MjModel) -> int | None:
     return int(free[0]) if free.size else None
 
 
-def start_pose(model: mujoco.MjModel) -> _Array:
+def trunk_lift(model: mujoco.MjModel) -> Lift | None:
+    """What raises the trunk; None for a body that is fixed to the world or moves in a plane on it.
+
+    That of the first free joint; without one, the first vertical slide of a body that hangs on the
+    world, unless it has limits: a hoist does not stand.
+    """
+    trunk = trunk_joint(model)
+    if trunk is not None:
+        return Lift(int(model.jnt_qposadr[trunk]) + 2, 1.0, 0.0)
+    slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
+    for joint in np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0)):
+        body, axis = model.jnt_bodyid[joint], np.zeros(3)
+        mujoco.mju_rotVecQuat(axis, model.jnt_axis[joint], model.body_quat[body])
+        if abs(axis[2]) > 1.0 - _VERTICAL:
+            place, up = int(model.jnt_qposadr[joint]), float(np.sign(axis[2]))
+            # `ref` is the number at which the body is where the model puts it.
+            return Lift(place, up, float(model.body_pos[body, 2] - up * model.qpos0[place]))
+    return None
+
+
+def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
     """The pose to start from, shape (nq,): the model's own, made possible.
 
-    Each joint is as near to the model's pose as a tenth of its range inside its limits allows, and
-    a trunk that is free stands no lower than its feet need.
+    Each joint is as near to the model's pose as the part `inside` of its range inside its limits
+    allows, and a trunk that can be raised stands no lower than its feet need.
     """
     pose = model.qpos0.copy()
     places, lower, upper = _limits(model)
-    inside = _INSIDE * (upper - lower)
-    pose[places] = np.clip(pose[places], lower + inside, upper - inside)
-    trunk = trunk_joint(model)
-    if trunk is not None:
-        pose[model.jnt_qposadr[trunk] + 2] += max(0.0, -_gap_at(model, pose))
+    margin = inside * (upper - lower)
+    pose[places] = np.clip(pose[places], lower + margin, upper - margin)
+    lift = trunk_lift(model)
+    if lift is not None:
+        lift.raise_by(pose, max(0.0, -_gap_at(model, pose)))
     return pose
 
 
@@ -51,20 +107,26 @@ def keep_within_limits(model: mujoco.MjModel, pose: _Array) -> _Array:
     return result
 
 
-def standing_height(model: mujoco.MjModel) -> float | None:
+def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
     """How high the trunk's origin is when the lowest point touches the floor, m.
 
-    Each joint is in the middle of its range and the trunk upright. None for a body that is fixed to
-    the world or has no floor to stand on.
+    Args:
+        model: The body.
+        pose: The pose (nq,) in which it stands; None for each joint in the middle of its range and
+            the trunk upright.
+
+    Returns:
+        None for a body that nothing raises or that has no floor to stand on.
     """
-    trunk = trunk_joint(model)
-    if trunk is None:
+    lift = trunk_lift(model)
+    if lift is None:
         return None
-    pose = model.qpos0.copy()
-    places, lower, upper = _limits(model)
-    pose[places] = 0.5 * (lower + upper)
+    if pose is None:
+        pose = model.qpos0.copy()
+        places, lower, upper = _limits(model)
+        pose[places] = 0.5 * (lower + upper)
     gap = _gap_at(model, pose)
-    return None if gap >= _FAR_M else float(pose[model.jnt_qposadr[trunk] + 2] - gap)
+    return None if gap >= _FAR_M else lift.height(pose) - gap
 
 
 def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -8,8 +8,8 @@ import mujoco
 
 from shapechanger.errors import BrokenModel, ShapechangerError
 from shapechanger.morphology.codec import to_json
-from shapechanger.morphology.edit import Edit
-from shapechanger.morphology.explicit import make_explicit
+from shapechanger.morphology.edits.edit import Edit
+from shapechanger.morphology.spec.explicit import make_explicit
 
 __all__ = ["compile_body", "reshape"]
 

@@ -23,8 +23,12 @@ from shapechanger.transfer.body_map.wildcards import filled_in
 __all__ = ["mirror"]
 
 # The last part of a feature's name, where it is a component along an axis of the world.
-_TURNED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz"})
-_KEPT: Final = frozenset({"x", "z", "vx", "vz", "fx", "fz", "wy", "ty", "qw", "qy"})
+# Of an inertia the products with y turn; the cosine of an angle is that of the opposite.
+_TURNED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz", "xy", "yz", "my"})
+_KEPT: Final = frozenset(
+    {"x", "z", "vx", "vz", "fx", "fz", "wy", "ty", "qw", "qy", "xx", "yy", "zz", "xz", "mx", "mz"}
+    | {"cos"}
+)
 
 
 def mirror(

@@ -1,0 +1,174 @@
+"""The certificate of a shift: what differs between two embodiments, proven, or a refusal.
+
+Shifts are easily declared and not applied: a friction that the floor outvotes, a context that
+nobody reads. So two environments are compared by what their compiled models effectively do and by
+what they answer to the same commands. A shift that changes neither is refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import msgspec
+import mujoco
+
+from shapechanger.errors import EmptyShift, MorphologyError
+from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped, attribute
+from shapechanger.morphology.certificate.comparison import compare
+from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
+from shapechanger.morphology.certificate.rollout import Rollout, compare_rollouts
+from shapechanger.morphology.certificate.wording import Change, grouped
+from shapechanger.morphology.effective import fingerprint
+
+__all__ = ["Certificate", "certify"]
+
+
+class Certificate(msgspec.Struct, frozen=True):
+    """What a target does differently from its source.
+
+    Attributes:
+        source: Label of the source.
+        target: Label of the target.
+        source_fingerprint: Fingerprint of the source's effective model.
+        target_fingerprint: Fingerprint of the target's.
+        changes: Differences of the effective models, and of the standing heights.
+        rollout: What both answered to the same commands.
+        source_inconsistencies: What does not fit together in the source's model.
+        target_inconsistencies: What does not fit together in the target's, or between the two.
+    """
+
+    source: str
+    target: str
+    source_fingerprint: str
+    target_fingerprint: str
+    changes: tuple[Change, ...]
+    rollout: Rollout
+    source_inconsistencies: tuple[str, ...] = ()
+    target_inconsistencies: tuple[str, ...] = ()
+
+    @property
+    def same_model(self) -> bool:
+        """Whether the two models do the same."""
+        return self.source_fingerprint == self.target_fingerprint
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing differs: neither what the models do nor what the rollout showed."""
+        return self.same_model and self.rollout.identical
+
+    @property
+    def verdict(self) -> str:
+        """The certificate in one sentence."""
+        if self.is_empty:
+            return (
+                f"{self.source} and {self.target} do the same: both models have the fingerprint "
+                f"{self.source_fingerprint}, and {self.rollout.steps} steps gave the same numbers."
+            )
+        if self.same_model:
+            return (
+                f"The models of {self.source} and {self.target} are the same "
+                f"({self.source_fingerprint}); only what is sensed, done or rewarded differs."
+            )
+        if self.rollout.identical:
+            return (
+                f"The models of {self.source} and {self.target} differ, but "
+                f"{self.rollout.steps} steps did not show it."
+            )
+        return f"{self.target} does something else than {self.source}."
+
+    def __str__(self) -> str:
+        """The whole certificate as text; changes that several elements share are told once."""
+        lines = [
+            f"{self.source} [{self.source_fingerprint}] -> "
+            f"{self.target} [{self.target_fingerprint}]",
+            self.verdict,
+        ]
+        for title, sentences in (
+            ("Changes", [item.sentence for item in grouped(self.changes)]),
+            ("Rollout", [str(self.rollout)]),
+            (f"Does not fit together in {self.source}", self.source_inconsistencies),
+            (f"Does not fit together in {self.target}", self.target_inconsistencies),
+        ):
+            if sentences:
+                lines += [f"{title}:", *(f"  {sentence}" for sentence in sentences)]
+        return "\n".join(lines)
+
+    def to_json(self) -> str:
+        """The certificate as JSON."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Certificate:
+        """Read what `to_json` wrote.
+
+        Raises:
+            MorphologyError: If the text is no certificate.
+        """
+        try:
+            return msgspec.json.decode(text, type=cls)
+        except msgspec.MsgspecError as error:
+            raise MorphologyError(f"This is not a certificate: {error}.") from error
+
+
+def certify(
+    source: Certifiable | Wrapped,
+    target: Certifiable | Wrapped,
+    *,
+    steps: int = 100,
+    seed: int = 0,
+    labels: tuple[str, str] | None = None,
+    allow_empty: bool = False,
+) -> Certificate:
+    """Compare two environments and certify what the shift between them is.
+
+    Both are reset and stepped, and left in the midst of an episode. Wrappers count: observations
+    are those that the outermost one gives.
+
+    Args:
+        source: Where a skill is learned.
+        target: Where it moves to.
+        steps: Commands of the rollout.
+        seed: Seed of the resets and of the commands.
+        labels: What to call the two; the environments' ids, or their classes, where None.
+        allow_empty: Whether to certify a shift that changes nothing.
+
+    Raises:
+        EmptyShift: If nothing differs and `allow_empty` is false.
+    """
+    models = cast(
+        "tuple[mujoco.MjModel, mujoco.MjModel]",
+        tuple(attribute(env, "model") for env in (source, target)),
+    )
+    rollout = compare_rollouts(source, target, steps=steps, seed=seed)
+    names = labels or (_label(source), _label(target))
+    certificate = Certificate(
+        source=names[0],
+        target=names[1],
+        source_fingerprint=fingerprint(models[0]),
+        target_fingerprint=fingerprint(models[1]),
+        changes=compare(*models, standing_height=(_height(source), _height(target))),
+        rollout=rollout,
+        source_inconsistencies=inconsistencies(models[0]),
+        target_inconsistencies=(*inconsistencies(models[1]), *lone_masses(*models)),
+    )
+    if certificate.is_empty and not allow_empty:
+        raise EmptyShift(
+            f"{certificate.verdict} There is nothing to transfer across. A setting may be "
+            "outvoted, such as the friction of a foot by that of the floor, or never read."
+        )
+    return certificate
+
+
+def _height(env: Certifiable | Wrapped) -> float | None:
+    """The standing height, where the environment knows it."""
+    try:
+        return attribute(env, "standing_height")
+    except AttributeError:
+        return None
+
+
+def _label(env: Any) -> str:
+    """The id that Gymnasium registered the environment under, or the name of its class."""
+    spec = getattr(env, "spec", None)
+    inner = getattr(env, "unwrapped", env)
+    return str(getattr(spec, "id", None) or type(inner).__name__)

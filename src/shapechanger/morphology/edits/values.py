@@ -1,0 +1,172 @@
+"""Edits of one number: mass, density, gear, damping, stiffness, friction.
+
+Each is given as a ratio to what it was (`scale`) or as a new value (`to`), never both. The field's
+words for these are the operations `scale` and `abs` of domain randomization.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology.edits.edit import Edit, part_of_the_way, require_factor
+from shapechanger.morphology.spec.elements import limbs_and_trunks, select
+from shapechanger.morphology.spec.segments import inertia_is_written_out, scale_mass
+
+if TYPE_CHECKING:
+    import mujoco
+
+__all__ = ["Damping", "Density", "Friction", "Gear", "Mass", "Stiffness"]
+
+_FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
+
+
+class ValueEdit(Edit, frozen=True, tag=None):
+    """A number that is scaled or set; the base of the edits below.
+
+    Attributes:
+        element: Name or glob of the bodies, geoms, joints or actuators.
+        scale: New value over old value, 0.01 to 100.
+        to: New value, in the SI unit that the edit names.
+    """
+
+    element: str
+    scale: float | None = None
+    to: float | None = None
+
+    def check(self) -> None:
+        """Refuse anything but one of `scale` and `to`, or a number out of its range."""
+        name = type(self).__name__
+        if (self.scale is None) == (self.to is None):
+            raise MorphologyError(f"{name} takes either scale or to, got {self}.")
+        if self.scale is not None:
+            require_factor(f"The scale of {name}", self.scale)
+        if self.to is not None and not self._possible(self.to):
+            raise MorphologyError(f"{name} cannot be {self.to}.")
+
+    @staticmethod
+    def _possible(value: float) -> bool:
+        """Whether the number can be set to this."""
+        return math.isfinite(value) and value >= 0.0
+
+    def changed(self, old: float) -> float:
+        """The new value in place of `old`."""
+        new = old * self.scale if self.scale is not None else self.to
+        assert new is not None  # `check` has seen to it.
+        return part_of_the_way(old, new, self.amount)
+
+
+class Mass(ValueEdit, frozen=True):
+    """Change the mass of bodies, kg; the inertia follows, as if the material became denser.
+
+    `to` is the mass of each body by itself, without what hangs on it.
+    """
+
+    @staticmethod
+    def _possible(value: float) -> bool:
+        return math.isfinite(value) and value > 0.0
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every body that fits."""
+        bodies = select("body", self.element, limbs_and_trunks(spec))
+        # Only the compiler knows the volume of every shape.
+        masses = spec.copy().compile().body_mass if self.to is not None else None
+        for body in bodies:
+            old = 1.0 if masses is None else float(masses[body.id])
+            if old <= 0.0:
+                raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
+            scale_mass(body, self.changed(old) / old)
+
+
+class Density(ValueEdit, frozen=True):
+    """Change the density of all geoms of bodies, kg/m³; masses and inertias follow."""
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every body that fits."""
+        bodies = select("body", self.element, limbs_and_trunks(spec))
+        for body in bodies:
+            if inertia_is_written_out(spec, body):
+                raise MorphologyError(
+                    f"{body.name!r} has its inertia written out, so a density counts for nothing: "
+                    "change its mass instead."
+                )
+        for geom in (geom for body in bodies for geom in body.geoms):
+            if not math.isnan(geom.mass):
+                raise MorphologyError(
+                    f"{geom.name!r} has its mass written out, so its density counts for nothing: "
+                    "change the mass of its body instead."
+                )
+            geom.density = self.changed(geom.density)
+
+
+class Gear(ValueEdit, frozen=True):
+    """Change the gear of actuators: N·m of torque, or N of force, for a control of 1.
+
+    `to` sets the strongest axis of the gear and keeps its direction.
+    """
+
+    @staticmethod
+    def _possible(value: float) -> bool:
+        return math.isfinite(value) and value != 0.0
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every actuator that fits."""
+        for actuator in select("actuator", self.element, spec.actuators):
+            gear = np.array(actuator.gear)
+            strongest = gear[np.argmax(np.abs(gear))]
+            if not strongest:
+                raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
+            new = self.changed(float(strongest))
+            actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
+
+
+class Damping(ValueEdit, frozen=True):
+    """Change the damping of joints: N·m·s/rad of a hinge, N·s/m of a slide."""
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every joint that fits."""
+        for joint in select("joint", self.element, spec.joints):
+            joint.damping = _first_changed(self, joint.damping)
+
+
+class Stiffness(ValueEdit, frozen=True):
+    """Change the stiffness of joints: N·m/rad of a hinge, N/m of a slide."""
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every joint that fits."""
+        for joint in select("joint", self.element, spec.joints):
+            joint.stiffness = _first_changed(self, joint.stiffness)
+
+
+class Friction(ValueEdit, frozen=True):
+    """Change a friction coefficient of geoms, dimensionless for sliding, m for the other two.
+
+    MuJoCo takes the larger of the two geoms that touch: with the floor at 1, a foot at 0.2 slides
+    like a foot at 1, and `certify` says so. Change the floor too, or all geoms with `"*"`.
+
+    Attributes:
+        component: Which coefficient.
+    """
+
+    component: Literal["sliding", "torsional", "rolling"] = "sliding"
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every geom that fits."""
+        place = _FRICTION_PLACES[self.component]
+        for geom in select("geom", self.element, spec.geoms):
+            friction = np.array(geom.friction)
+            friction[place] = self.changed(float(friction[place]))
+            geom.friction = friction
+
+
+def _first_changed(edit: ValueEdit, polynomial: np.ndarray) -> np.ndarray:
+    """The linear coefficient changed; higher ones, where a model has them, in proportion."""
+    old = np.array(polynomial)
+    new = old.copy()
+    new[0] = edit.changed(float(old[0]))
+    if edit.scale is not None:
+        new[1:] = [edit.changed(float(x)) for x in old[1:]]
+    return new

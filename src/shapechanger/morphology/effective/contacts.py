@@ -1,0 +1,228 @@
+"""What a contact between two geoms is, after MuJoCo has combined what the two say.
+
+A geom's friction is no fact of the simulation: the contact takes the larger of the two geoms'
+coefficients, so a slippery foot on a rough floor is a rough foot. These are the rules by which
+MuJoCo 4.0.0 combines what the two say (`mujoco/doc/modeling.rst`, "Contact parameters"). The tests
+compare them with the contacts of simulated scenes.
+
+Measured, and easy to get wrong:
+
+- margins add up, and so do gaps, whatever the priority;
+- adhesions add up unless one geom has the higher priority;
+- a friction coefficient is never below 1e-5;
+- a time constant below two time steps counts as two time steps, unless the model switches
+  `refsafe` off or integrates with `discrete`: softer than that is possible, harder is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Final
+
+import msgspec
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.morphology.effective.collisions import colliding_pairs, geoms_of_pairs
+from shapechanger.morphology.effective.naming import Names, names_of
+
+__all__ = ["Contact", "effective_contacts", "safe_solref"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+# For each contact dimension how many of (slide, slide, spin, roll, roll) act.
+_FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
+_SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
+
+
+class Contact(msgspec.Struct, frozen=True):
+    """The parameters with which two geoms touch.
+
+    Attributes:
+        dim: 1 without friction, 3 with sliding friction, 4 with torsional, 6 with rolling friction.
+        friction: The `dim` - 1 coefficients that act: slide, slide, spin, roll, roll. Sliding ones
+            are pure numbers, the others are in m.
+        solref: Time constant in s and damping ratio, or minus stiffness and minus damping.
+        solreffriction: The same for the friction directions; empty where they use `solref`.
+        solimp: Impedance: at contact, at full width, width in m, midpoint, power.
+        margin: Distance in m below which the geoms push each other.
+        gap: Distance in m beyond the margin up to which a contact is found, but does not push.
+        adhesion: Force in N with which the contact can pull.
+    """
+
+    dim: int
+    friction: tuple[float, ...]
+    solref: tuple[float, ...]
+    solreffriction: tuple[float, ...]
+    solimp: tuple[float, ...]
+    margin: float
+    gap: float
+    adhesion: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """The parameters of n contacts, as columns."""
+
+    dim: _Ints
+    friction: _Floats
+    solref: _Floats
+    solreffriction: _Floats
+    solimp: _Floats
+    margin: _Floats
+    gap: _Floats
+    adhesion: _Floats
+
+
+def effective_contacts(model: mujoco.MjModel, names: Names | None = None) -> dict[str, Contact]:
+    """The contacts that a model can have and that can move something, by the names of the geoms.
+
+    Args:
+        model: The compiled model.
+        names: Names of its elements, where they are known already.
+
+    Returns:
+        For each pair of geoms, named `floor + left_foot` in alphabetical order and sorted by name,
+        its parameters. A second explicit `<pair>` of the same geoms is another contact, named
+        `floor + left_foot (2)`.
+    """
+    geom_names = (names or names_of(model)).geoms
+    explicit, dynamic = colliding_pairs(model)
+    rows = _overridden(model, _joined(_explicit_rows(model, explicit), _mixed(model, dynamic)))
+    solref = safe_solref(model, rows.solref)
+    solreffriction = safe_solref(model, rows.solreffriction)
+    # Pyramidal cones mix the normal with the friction directions, so only `solref` is used.
+    own = rows.solreffriction.any(axis=1) & (solreffriction != solref).any(axis=1)
+    own &= (rows.dim > 1) & (model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+    pairs = np.vstack([geoms_of_pairs(model, explicit), dynamic]).tolist()
+    columns = zip(
+        pairs,
+        rows.dim.tolist(),
+        (rows.friction + 0.0).tolist(),
+        (solref + 0.0).tolist(),
+        (solreffriction + 0.0).tolist(),
+        own.tolist(),
+        (rows.solimp + 0.0).tolist(),
+        (rows.margin + 0.0).tolist(),
+        (rows.gap + 0.0).tolist(),
+        (rows.adhesion + 0.0).tolist(),
+        strict=True,
+    )
+    found: dict[str, Contact] = {}
+    for (g1, g2), dim, friction, ref, ref_friction, has_own, *numbers in columns:
+        first, second = sorted((geom_names[int(g1)], geom_names[int(g2)]))
+        name, count = f"{first} + {second}", 1
+        while name in found:
+            count += 1
+            name = f"{first} + {second} ({count})"
+        impedance, margin, gap, adhesion = numbers
+        found[name] = Contact(
+            dim=dim,
+            friction=tuple(friction[: _FRICTION_COUNT[dim]]),
+            solref=tuple(ref),
+            solreffriction=tuple(ref_friction) if has_own else (),
+            solimp=tuple(impedance),
+            margin=margin,
+            gap=gap,
+            adhesion=adhesion,
+        )
+    return dict(sorted(found.items()))
+
+
+def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
+    """What the solver makes of reference parameters, shape (n, 2).
+
+    A positive time constant is raised to two time steps, unless `refsafe` is off or the integrator
+    is `discrete`, which is stable at any.
+    """
+    off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
+    if off or model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        return solref
+    safe = solref.copy()
+    safe[:, 0] = np.where(
+        solref[:, 0] > 0.0, np.maximum(solref[:, 0], 2.0 * model.opt.timestep), solref[:, 0]
+    )
+    return safe
+
+
+def _explicit_rows(model: mujoco.MjModel, explicit: _Ints) -> _Rows:
+    """What explicit pairs say about themselves."""
+    return _Rows(
+        dim=model.pair_dim[explicit].astype(np.int64),
+        friction=model.pair_friction[explicit],
+        solref=model.pair_solref[explicit],
+        solreffriction=model.pair_solreffriction[explicit],
+        solimp=model.pair_solimp[explicit],
+        margin=model.pair_margin[explicit],
+        gap=model.pair_gap[explicit],
+        adhesion=model.pair_adhesion[explicit],
+    )
+
+
+def _mixed(model: mujoco.MjModel, pairs: _Ints) -> _Rows:
+    """What two geoms make of their parameters."""
+    first, second = pairs[:, 0], pairs[:, 1]
+    one = model.geom_priority[first] > model.geom_priority[second]
+    two = model.geom_priority[first] < model.geom_priority[second]
+
+    def pick(values: _Floats, if_equal: _Floats) -> _Floats:
+        wide = (slice(None),) + (None,) * (values.ndim - 1)
+        chosen = np.where(two[wide], values[second], if_equal)
+        return np.where(one[wide], values[first], chosen)
+
+    share = _share_of_first(model.geom_solmix[first], model.geom_solmix[second])[:, None]
+    dims, frictions = model.geom_condim.astype(np.float64), model.geom_friction
+    refs, imps = model.geom_solref, model.geom_solimp
+    mixed_ref = share * refs[first] + (1.0 - share) * refs[second]
+    both_standard = (refs[first, 0] > 0.0) & (refs[second, 0] > 0.0)
+    mixed_ref = np.where(both_standard[:, None], mixed_ref, np.minimum(refs[first], refs[second]))
+    friction = pick(frictions, np.maximum(frictions[first], frictions[second]))
+    return _Rows(
+        dim=pick(dims, np.maximum(dims[first], dims[second])).astype(np.int64),
+        friction=friction[:, _SLIDE_SPIN_ROLL],
+        solref=pick(refs, mixed_ref),
+        solreffriction=np.zeros((len(pairs), 2)),
+        solimp=pick(imps, share * imps[first] + (1.0 - share) * imps[second]),
+        margin=model.geom_margin[first] + model.geom_margin[second],
+        gap=model.geom_gap[first] + model.geom_gap[second],
+        adhesion=pick(
+            model.geom_adhesion, model.geom_adhesion[first] + model.geom_adhesion[second]
+        ),
+    )
+
+
+def _share_of_first(one: _Floats, two: _Floats) -> _Floats:
+    """The weight of the first geom's solver parameters; half when neither geom claims one."""
+    small = mujoco.mjMINVAL
+    neither = (one < small) & (two < small)
+    one, two = np.where(one < small, 0.0, one), np.where(two < small, 0.0, two)
+    return np.where(neither, 0.5, one / np.where(neither, 1.0, one + two))
+
+
+def _joined(one: _Rows, two: _Rows) -> _Rows:
+    """Both sets of contacts."""
+    return _Rows(
+        *(np.concatenate([getattr(one, f.name), getattr(two, f.name)]) for f in fields(_Rows))
+    )
+
+
+def _overridden(model: mujoco.MjModel, rows: _Rows) -> _Rows:
+    """The contacts after the model's switches, and with friction at its floor or above."""
+    option, count = model.opt, len(rows.dim)
+    if option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
+        rows = replace(
+            rows,
+            friction=np.tile(option.o_friction, (count, 1)),
+            solref=np.tile(option.o_solref, (count, 1)),
+            solreffriction=np.tile(option.o_solref, (count, 1)),
+            solimp=np.tile(option.o_solimp, (count, 1)),
+            margin=np.full(count, option.o_margin),
+        )
+    return replace(
+        rows,
+        friction=np.maximum(rows.friction, mujoco.mjMINMU),
+        # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
+        adhesion=rows.adhesion * model.flg_adhesion,
+    )

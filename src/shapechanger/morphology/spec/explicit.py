@@ -1,0 +1,141 @@
+"""What a model says indirectly, said outright: names, frames and a total mass.
+
+Edits change numbers in place. A name that is missing cannot be asked for, a pose that is seen from
+a frame has other axes than its body, and a total mass that the compiler restores undoes any change.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology.spec.elements import limbs_and_trunks, name_elements
+from shapechanger.morphology.spec.geoms import Array, has_ends, orientation, rotation
+from shapechanger.morphology.spec.segments import scale_mass
+
+__all__ = ["make_explicit", "resolve_frames"]
+
+_UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
+
+
+def make_explicit(spec: mujoco.MjSpec) -> None:
+    """Name every element, and write out frames and a total mass, in place; the physics stays.
+
+    Raises:
+        MorphologyError: If a frame scales what it holds.
+    """
+    name_elements(spec)
+    resolve_frames(spec)
+    if spec.compiler.settotalmass > 0.0:
+        total = spec.compiler.settotalmass
+        spec.compiler.settotalmass = -1.0
+        factor = total / float(spec.copy().compile().body_mass.sum())
+        for body in limbs_and_trunks(spec):
+            scale_mass(body, factor)
+
+
+def resolve_frames(spec: mujoco.MjSpec) -> None:
+    """Write every pose as seen from its body, and let the frames be where their bodies are.
+
+    Raises:
+        MorphologyError: If a frame scales what it holds.
+    """
+    frames = [frame for frame in spec.frames if not _is_trivial(frame)]
+    if not frames:
+        return
+    for frame in frames:
+        if np.any(frame.scale != 1.0) or frame.massscale:
+            raise MorphologyError(
+                f"The frame {frame.name!r} scales what it holds: write the sizes out instead."
+            )
+    for body in limbs_and_trunks(spec):
+        _resolve(spec, body)
+    for element in (*spec.geoms, *spec.sites, *spec.cameras):
+        _resolve(spec, element)
+    for joint in spec.joints:
+        pose = _pose_of_frames(spec, joint.frame)
+        if pose:
+            joint.pos = _seen(joint.pos, pose)
+            joint.axis = rotation(pose.turn) @ joint.axis
+    for light in spec.lights:
+        pose = _pose_of_frames(spec, light.frame)
+        if pose:
+            light.pos = _seen(light.pos, pose)
+            light.dir = rotation(pose.turn) @ light.dir
+    for frame in frames:
+        frame.pos = np.zeros(3)
+        frame.quat = _UPRIGHT
+        frame.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _is_trivial(frame: mujoco.MjsFrame) -> bool:
+    """Whether a frame changes nothing."""
+    return (
+        not np.any(frame.pos)
+        and tuple(frame.quat) == _UPRIGHT
+        and frame.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+        and bool(np.all(frame.scale == 1.0))
+        and not frame.massscale
+    )
+
+
+def _resolve(
+    spec: mujoco.MjSpec,
+    element: mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera,
+) -> None:
+    """Write an element's pose as seen from its body."""
+    pose = _pose_of_frames(spec, element.frame)
+    if pose is None:
+        return
+    if isinstance(element, mujoco.MjsGeom | mujoco.MjsSite) and has_ends(element):
+        if element.type != mujoco.mjtGeom.mjGEOM_BOX:
+            element.fromto = np.concatenate([_seen(e, pose) for e in element.fromto.reshape(2, 3)])
+            return
+        _write_pose(element)  # How a box is turned about its axis follows from the frame.
+    element.pos = _seen(element.pos, pose)
+    turned = np.empty(4)
+    mujoco.mju_mulQuat(turned, pose.turn, orientation(spec, element))
+    element.quat = turned
+    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _write_pose(element: mujoco.MjsGeom | mujoco.MjsSite) -> None:
+    """Give an element that has ends a place and an orientation instead, as MuJoCo does."""
+    first, last = element.fromto.reshape(2, 3)
+    axis = first - last
+    length = float(np.linalg.norm(axis))
+    quaternion = np.empty(4)
+    mujoco.mju_quatZ2Vec(quaternion, axis / length)
+    element.pos, element.quat = 0.5 * (first + last), quaternion
+    element.size = [element.size[0], element.size[0], 0.5 * length]
+    element.fromto = np.full(6, np.nan)
+
+
+class _Pose(NamedTuple):
+    """Where frames are in their body's frame: quaternion (w, x, y, z) and position, m."""
+
+    turn: Array
+    shift: Array
+
+
+def _seen(point: Array, pose: _Pose) -> Array:
+    """A point of a frame as seen from the body, m."""
+    return pose.shift + rotation(pose.turn) @ point
+
+
+def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
+    """The pose of a frame within those around it; None where there is no frame."""
+    pose = None
+    while frame is not None:
+        around = _Pose(orientation(spec, frame), np.array(frame.pos))
+        if pose is None:
+            pose = around
+        else:
+            turn = np.empty(4)
+            mujoco.mju_mulQuat(turn, around.turn, pose.turn)
+            pose = _Pose(turn, _seen(pose.shift, around))
+        frame = frame.frame
+    return pose

@@ -1,0 +1,137 @@
+"""Copying and moving whole limbs, and single geoms and sites, within a model.
+
+MuJoCo attaches parts of one model to another, under a prefix. So a limb is attached from a copy of
+the model, and then renamed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import mujoco
+
+from shapechanger.morphology.spec.elements import require_free_name, subtree
+from shapechanger.morphology.spec.explicit import resolve_frames
+from shapechanger.morphology.spec.geoms import orientation
+
+__all__ = ["copy_geom", "graft_copy", "move_limb", "move_point"]
+
+# Begins no name that anybody writes.
+_MARK: Final = "graft~"
+# What geoms and sites name that lies outside the tree of bodies.
+_ASSETS: Final = ("material", "meshname", "hfieldname")
+# What makes a site what it is, and a geom, but for the name and the place in the tree.
+_SITE_FIELDS: Final = ("type", "size", "pos", "fromto", "group", "rgba", "material")
+_GEOM_FIELDS: Final = (
+    *(*_SITE_FIELDS, "density", "mass", "typeinertia", "contype", "conaffinity", "condim"),
+    *("priority", "friction", "adhesion", "surfacevel", "solmix", "solref", "solimp", "margin"),
+    *("gap", "fluid_ellipsoid", "fluid_coefs"),
+)
+
+
+def graft_copy(
+    spec: mujoco.MjSpec, limb: mujoco.MjsBody, suffix: str, angle: float
+) -> mujoco.MjsBody:
+    """Add a copy of `limb` with its motors, turned by `angle` (rad) about its parent's z axis.
+
+    Returns:
+        The first body of the copy; each of its elements is called as the original's plus `suffix`.
+    """
+    frame = limb.parent.add_frame(quat=[math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
+    copy = _attach(spec, frame, limb.name, with_motors=True)
+    resolve_frames(spec)
+    _rename(copy, lambda name: name.removeprefix(_MARK) + suffix)
+    for actuator in spec.actuators:
+        if actuator.name.startswith(_MARK):
+            actuator.name = actuator.name.removeprefix(_MARK) + suffix
+            actuator.target = actuator.target.removeprefix(_MARK) + suffix
+    return copy
+
+
+def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody) -> mujoco.MjsBody:
+    """Hang `limb` on another body at the same pose in its frame; its motors keep their places.
+
+    Returns:
+        The limb, which is another object now.
+    """
+    moved = _attach(spec, parent.add_frame(), limb.name, with_motors=False)
+    # Actuators find their joint by name: under another name the old joints go without them.
+    _rename(limb, lambda name: name + _MARK)
+    spec.delete(limb)
+    _rename(moved, lambda name: name.removeprefix(_MARK))
+    return moved
+
+
+def copy_geom(
+    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str
+) -> mujoco.MjsGeom:
+    """A geom like `geom`, at the same pose in the frame of another body.
+
+    Raises:
+        MorphologyError: If the name is taken.
+    """
+    require_free_name(spec, "geom", name)
+    copy = body.add_geom(name=name, quat=orientation(spec, geom))
+    for field in _GEOM_FIELDS:
+        setattr(copy, field, getattr(geom, field))
+    return copy
+
+
+def move_point(
+    spec: mujoco.MjSpec, point: mujoco.MjsSite | mujoco.MjsGeom, body: mujoco.MjsBody
+) -> mujoco.MjsSite | mujoco.MjsGeom:
+    """Move a site or geom to another body, to the same pose in its frame.
+
+    Returns:
+        The site or geom, which is another object now.
+    """
+    name = point.name
+    point.name = name + _MARK  # What refers to it does so by name.
+    if isinstance(point, mujoco.MjsGeom):
+        moved = copy_geom(spec, point, body, name)
+    else:
+        moved = body.add_site(name=name, quat=orientation(spec, point))
+        for field in _SITE_FIELDS:
+            setattr(moved, field, getattr(point, field))
+    spec.delete(point)
+    return moved
+
+
+def _attach(
+    spec: mujoco.MjSpec, frame: mujoco.MjsFrame, limb_name: str, *, with_motors: bool
+) -> mujoco.MjsBody:
+    """Attach a copy of the limb to the frame, each of its names with the mark before it."""
+    donor = spec.copy()
+    unwanted: list[Any] = [*donor.sensors, *donor.tendons, *donor.equalities, *donor.pairs]
+    unwanted += [*donor.excludes, *donor.keys, *donor.numerics, *donor.texts, *donor.tuples]
+    unwanted += [*donor.skins, *donor.flexes]
+    if not with_motors:
+        unwanted += donor.actuators
+    for element in unwanted:
+        donor.delete(element)
+    # Assets would come along as copies; the limb is to share those that are there.
+    shared: dict[tuple[type, str], dict[str, str]] = {}
+    for element in (*donor.geoms, *donor.sites):
+        assets = {field: getattr(element, field, "") for field in _ASSETS}
+        named = {field: asset for field, asset in assets.items() if asset}
+        shared[type(element), element.name] = named
+        for field in named:
+            setattr(element, field, "")
+    for element in [*donor.materials, *donor.textures, *donor.meshes, *donor.hfields]:
+        donor.delete(element)
+    attached = frame.attach_body(donor.body(limb_name), _MARK, "")
+    for body in subtree(attached):
+        for element in (*body.geoms, *body.sites):
+            for field, asset in shared[type(element), element.name.removeprefix(_MARK)].items():
+                setattr(element, field, asset)
+    return attached
+
+
+def _rename(limb: mujoco.MjsBody, renamed: Callable[[str], str]) -> None:
+    """Rename a limb's bodies and what they hold."""
+    for body in subtree(limb):
+        body.name = renamed(body.name)
+        for element in (*body.joints, *body.geoms, *body.sites, *body.cameras, *body.lights):
+            element.name = renamed(element.name)

@@ -1,0 +1,137 @@
+"""Certificates of shifts, and shifts that get none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import pytest
+from gymnasium.envs.mujoco.ant_v5 import AntEnv
+from gymnasium.wrappers import TransformObservation
+
+from shapechanger.errors import EmptyShift, MorphologyError
+from shapechanger.layout import Feature, Layout
+from shapechanger.morphology.certificate.certify import Certificate, certify
+from tests.morphology.scenes import ASSETS
+from tests.morphology.swing import Noisy, Swing, Wrapper
+
+
+def test_a_longer_arm_is_certified() -> None:
+    """Model and rollout both differ, and both are told."""
+    certificate = certify(Swing(standing_height=0.5), Swing(length=0.8, standing_height=0.8))
+    assert not certificate.is_empty
+    assert not certificate.same_model
+    text = str(certificate)
+    assert "arm: length 0.5 m -> 0.8 m (x1.6)" in text
+    assert "robot: standing height 0.5 m -> 0.8 m (x1.6)" in text
+    assert "Rollout:\n  100 steps from the same seed" in text
+    assert certificate.source_fingerprint in text
+    assert certificate.verdict == "Swing does something else than Swing."
+
+
+def test_an_empty_shift_is_refused() -> None:
+    """Source and target that do the same are no transfer."""
+    with pytest.raises(EmptyShift, match="do the same: both models have the fingerprint"):
+        certify(Swing(), Swing())
+
+
+def test_an_empty_shift_may_be_asked_for() -> None:
+    """Then the certificate itself says that it is empty."""
+    certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)
+    assert certificate.is_empty
+    assert certificate.changes == ()
+    assert "do the same" in str(certificate)
+    assert "Changes" not in str(certificate)
+
+
+def test_noise_alone_is_a_shift_of_senses() -> None:
+    """The models are the same, and the certificate says so."""
+    certificate = certify(Swing(), Noisy(Swing()), labels=("quiet", "noisy"))
+    assert certificate.same_model
+    assert not certificate.is_empty
+    assert certificate.verdict.startswith("The models of quiet and noisy are the same (")
+    assert certificate.verdict.endswith("only what is sensed, done or rewarded differs.")
+
+
+def test_a_difference_that_the_rollout_does_not_reach_is_told() -> None:
+    """Another range of a joint that never gets there: a shift, but unseen in these steps."""
+    target = Swing()
+    target.model.jnt_limited[:] = 1
+    target.model.jnt_range[:] = (-50.0, 50.0)
+    certificate = certify(Swing(), target, steps=3)
+    assert certificate.rollout.identical
+    assert certificate.verdict.endswith("differ, but 3 steps did not show it.")
+
+
+def test_inconsistent_models_are_told_of() -> None:
+    """A mass that was written into the compiled model, without inertia and without constants."""
+    target = Swing()
+    target.model.body_mass[1] = 5.0
+    certificate = certify(Swing(), target, steps=5, labels=("light", "heavy"))
+    assert certificate.source_inconsistencies == ()
+    told = " ".join(certificate.target_inconsistencies)
+    assert "body_subtreemass" in told
+    assert "its inertia stays" in told
+    assert "Does not fit together in heavy:" in str(certificate)
+
+
+def test_json_keeps_everything() -> None:
+    """A certificate is a record: what is written is what is read."""
+    certificate = certify(Swing(), Swing(wrist=True, gear=3.0))
+    assert Certificate.from_json(certificate.to_json()) == certificate
+    assert Certificate.from_json(certificate.to_json().encode()) == certificate
+
+
+@pytest.mark.parametrize("text", ["{}", "no", '{"source": 1}'])
+def test_what_is_no_certificate_is_refused(text: str) -> None:
+    """With the reason."""
+    with pytest.raises(MorphologyError, match="This is not a certificate: "):
+        Certificate.from_json(text)
+
+
+def test_environments_without_a_standing_height_are_certified() -> None:
+    """A swing does not stand; an environment may say so by not having the attribute."""
+    source = Swing()
+    del source.standing_height
+    certificate = certify(Wrapper(source), Swing(gear=2.0, standing_height=1.0))
+    assert not any(item.quantity == "standing height" for item in certificate.changes)
+
+
+class _Ant(AntEnv):
+    """Gymnasium's ant with layouts."""
+
+    standing_height = 0.532
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self.observation_layout = Layout(tuple(Feature(f"o{i}", "1") for i in range(105)))
+        self.action_layout = Layout(tuple(Feature(f"a{i}", "1", -1.0, 1.0) for i in range(8)))
+
+
+def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> None:
+    """The ant equals the ant with slippery feet, but not one that senses otherwise."""
+    # Edited as text: a spec that is written to a file has its numbers rounded.
+    text = Path(ASSETS, "ant.xml").read_text(encoding="utf-8")
+    edited = text.replace('_ankle_geom" size', '_ankle_geom" friction="0.1 0.5 0.5" size')
+    assert edited != text
+    (tmp_path / "slippery.xml").write_text(edited, encoding="utf-8")
+    with _Ant() as source, _Ant(xml_file=str(tmp_path / "slippery.xml")) as slippery:
+        with pytest.raises(EmptyShift):
+            certify(source, slippery, steps=10)
+        wrapped = TransformObservation(source, lambda seen: seen + 1.0, source.observation_space)
+        shifted = certify(source, wrapped, steps=3)
+        assert shifted.same_model
+        assert shifted.rollout.largest_difference == pytest.approx(1.0)
+        assert shifted.source == "_Ant"
+
+
+def test_registered_ids_are_the_labels() -> None:
+    """What `gymnasium.make` was asked for is what the certificate calls it."""
+    with gymnasium.make("InvertedPendulum-v5") as env:
+        inner: Any = env.unwrapped
+        inner.observation_layout = Layout(tuple(Feature(f"o{i}", "1") for i in range(4)))
+        inner.action_layout = Layout((Feature("slide", "1", -3.0, 3.0),))
+        certificate = certify(env, env, allow_empty=True, steps=20)
+    assert certificate.source == certificate.target == "InvertedPendulum-v5"
+    assert certificate.is_empty

@@ -1,0 +1,143 @@
+"""Compiled models whose numbers do not fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import pytest
+
+from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
+from tests.morphology.scenes import EVERYTHING, asset, everything
+
+
+@pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "pusher_v5"])
+def test_compiled_models_fit_together(name: str) -> None:
+    """Nothing is wrong with what MuJoCo itself computed."""
+    assert inconsistencies(asset(name)) == ()
+    assert inconsistencies(everything()) == ()
+
+
+def test_a_mass_written_into_a_compiled_model_is_found() -> None:
+    """RRLS's way to change a mass, with the numbers measured on Ant-v5."""
+    model = asset("ant")
+    model.body("torso").mass[:] = 3.0
+    told = " ".join(inconsistencies(model))
+    assert "body_subtreemass is 0.9109, but the model makes it 3.584" in told
+    assert "torso: body_invweight0 is 1.101, but the model makes it 0.2793" in told
+    assert "mj_setConst" in told
+
+
+def test_set_const_mends_the_constants_but_not_the_inertia() -> None:
+    """Mass without inertia shows only beside the model it came from."""
+    model = asset("ant")
+    model.body("torso").mass[:] = 3.0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    assert inconsistencies(model) == ()
+    (told,) = lone_masses(asset("ant"), model)
+    assert told.startswith("torso: mass goes from 0.3272 to 3 kg, but its inertia stays 0.00818")
+    assert lone_masses(asset("ant"), asset("ant")) == ()
+
+
+def test_mass_and_inertia_together_are_fine() -> None:
+    """A denser torso has more of both."""
+    model = asset("ant")
+    model.body("torso").mass[:] *= 2.0
+    model.body("torso").inertia[:] *= 2.0
+    assert lone_masses(asset("ant"), model) == ()
+    assert lone_masses(asset("hopper"), asset("ant")) == ()
+
+
+_IGNORED: dict[str, tuple[Callable[[mujoco.MjModel], object], str]] = {
+    "centre of mass": (
+        lambda m: m.body("wheel").ipos.fill(0.1),
+        "wheel: body_sameframe is 1, but the model makes it 3, so body_ipos or body_iquat",
+    ),
+    "place of a geom": (
+        lambda m: m.geom("leg").pos.fill(0.1),
+        "geom_pos or geom_quat is ignored",
+    ),
+    "size of a geom": (lambda m: m.geom("leg").size.fill(0.2), "leg: geom_rbound is 0.1"),
+    "gravity compensation": (
+        lambda m: m.body_gravcomp.fill(1.0),
+        "flg_gravcomp is not set, so body_gravcomp is ignored",
+    ),
+    "adhesion": (
+        lambda m: m.geom_adhesion.fill(1.0),
+        "flg_adhesion is not set, so geom_adhesion and pair_adhesion are ignored",
+    ),
+    "surface velocity": (
+        lambda m: m.geom_surfacevel.fill(1.0),
+        "flg_surfacevel is not set, so geom_surfacevel is ignored",
+    ),
+    "damping of an actuator": (
+        lambda m: m.actuator_damping.fill(1.0),
+        "so the actuator's damping or armature is ignored",
+    ),
+    "length of a tendon": (lambda m: m.tendon_length0.fill(9.0), "tendon_length0 is 9"),
+}
+
+
+@pytest.mark.parametrize("what", _IGNORED)
+def test_writes_without_effect_are_found(what: str) -> None:
+    """What a compiled model takes and then ignores, or answers with stale numbers."""
+    edit, told = _IGNORED[what]
+    spec = mujoco.MjSpec.from_string(_plain_everything())
+    model = spec.compile()
+    assert inconsistencies(model) == ()
+    edit(model)
+    assert told in " ".join(inconsistencies(model))
+
+
+def _plain_everything() -> str:
+    """The model of everything, without gravity compensation."""
+    return EVERYTHING.replace('gravcomp=".1"', "")
+
+
+def test_bits_that_were_not_compiled_are_found() -> None:
+    """A geom that is made to collide later does not, or not always: recompile."""
+    model = everything()
+    model.geom("wheel").contype[:] = 1
+    (told,) = inconsistencies(model)
+    assert told.startswith("wheel: geom_contype or geom_conaffinity has bits that its body")
+    model = everything()
+    model.geom("paint").contype[:] = 1
+    (told,) = inconsistencies(model)
+    assert told.startswith("MuJoCo cannot derive its constants from the model: ")
+
+
+@pytest.mark.parametrize(
+    ("inertia", "told"),
+    [
+        ((0.0, 0.0, 0.0), "comes with inertia 0 kg·m²"),
+        ((-1.0, 1.0, 1.0), "comes with inertia -1 kg·m²"),
+        ((0.1, 0.1, 0.3), "more than the other two together"),
+    ],
+)
+def test_inertias_that_no_body_has_are_found(
+    inertia: tuple[float, float, float], told: str
+) -> None:
+    """The largest principal moment is at most the sum of the others."""
+    xml = (
+        "<mujoco><worldbody><body name='b'><joint type='slide'/><geom size='.1'/></body>"
+        "</worldbody></mujoco>"
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.body("b").inertia[:] = inertia
+    assert any(
+        sentence.startswith("b: mass") and told in sentence for sentence in inconsistencies(model)
+    )
+
+
+def test_a_thin_rod_is_possible() -> None:
+    """Its largest moment equals the other two together."""
+    xml = (
+        "<mujoco><worldbody><body><joint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 2'/>"
+        "</body></worldbody></mujoco>"
+    )
+    assert inconsistencies(mujoco.MjModel.from_xml_string(xml)) == ()
+
+
+def test_a_model_without_parts_fits_together() -> None:
+    """No joints, no tendons, nothing to compare."""
+    assert inconsistencies(mujoco.MjModel.from_xml_string("<mujoco/>")) == ()

@@ -1,0 +1,305 @@
+"""Effective contacts against the contacts of simulated scenes."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.morphology.effective.contacts import Contact, effective_contacts
+from tests.morphology.scenes import asset, asset_spec
+
+_SHAPES = {
+    "sphere": "size='.1'",
+    "capsule": "size='.08 .1'",
+    "box": "size='.1 .08 .09'",
+    "ellipsoid": "size='.1 .08 .09'",
+    "cylinder": "size='.1 .08'",
+}
+_SCENE = """
+<mujoco>
+  <option timestep="0.002" cone="elliptic" {option}><flag {flag}/></option>
+  <asset>{assets}</asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1" {floor}/>
+    <body name="ball" pos="0 0 .05">
+      <freejoint/>
+      <geom name="ball" size=".1" {ball}/>
+      {children}
+    </body>
+    {bodies}
+  </worldbody>
+  <contact>{contact}</contact>
+</mujoco>
+"""
+
+
+def _scene(**parts: str) -> mujoco.MjModel:
+    """A ball that has sunk into the floor, with attributes and neighbours to taste."""
+    defaults = {
+        "assets": "",
+        "option": "",
+        "flag": "contact='enable'",
+        "floor": "",
+        "ball": "",
+        "children": "",
+        "bodies": "",
+        "contact": "",
+    }
+    return mujoco.MjModel.from_xml_string(_SCENE.format(**(defaults | parts)))
+
+
+def _simulated(model: mujoco.MjModel) -> dict[str, list[mujoco.MjContact]]:
+    """The contacts that MuJoCo finds in the starting pose, by the names of the geoms."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    found: dict[str, list[mujoco.MjContact]] = {}
+    for contact in data.contact:
+        names = sorted(model.geom(geom).name for geom in contact.geom)
+        found.setdefault(" + ".join(names), []).append(contact)
+    return found
+
+
+def _assert_equal(ours: Contact, theirs: mujoco.MjContact) -> None:
+    """What we say of a contact is what the simulation did."""
+    assert ours.dim == theirs.dim
+    counts = {1: 0, 3: 2, 4: 3, 6: 5}
+    np.testing.assert_array_equal(ours.friction, theirs.friction[: counts[theirs.dim]])
+    np.testing.assert_allclose(ours.solref, theirs.solref, rtol=1e-15)
+    np.testing.assert_allclose(ours.solimp, theirs.solimp, rtol=1e-15)
+    assert ours.margin == theirs.includemargin
+    assert ours.adhesion == theirs.adhesion
+    if ours.solreffriction:
+        np.testing.assert_array_equal(ours.solreffriction, theirs.solreffriction)
+
+
+def _random_geom(random: np.random.Generator, name: str) -> str:
+    """A geom of any shape with any contact parameters."""
+    shape = str(random.choice(list(_SHAPES)))
+    solref = random.uniform(0.01, 0.05), random.uniform(0.5, 2.0)
+    if random.random() < 0.3:
+        solref = -random.uniform(100.0, 900.0), -random.uniform(1.0, 50.0)
+    low, high = sorted(random.uniform(0.5, 0.99, size=2))
+    numbers = {
+        "priority": (int(random.integers(0, 2)),),
+        "condim": (int(random.choice([1, 3, 4, 6])),),
+        "solmix": (float(random.choice([0.0, 0.5, 1.0, 3.0])),),
+        "friction": random.uniform(0.0, 2.0, size=3),
+        "solref": solref,
+        "solimp": (low, high, random.uniform(0.001, 0.01), 0.4, 2.0),
+        "margin": (random.uniform(0.0, 0.01),),
+        "gap": (random.uniform(0.0, 0.01),),
+        "adhesion": (random.uniform(0.0, 1.0),),
+    }
+    written = " ".join(f'{key}="{" ".join(map(str, row))}"' for key, row in numbers.items())
+    x, y, z = random.uniform(-0.03, 0.03, size=3)
+    return f"<geom name='{name}' type='{shape}' {_SHAPES[shape]} pos='{x} {y} {z}' {written}/>"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_scenes_touch_as_predicted(seed: int) -> None:
+    """Whatever shapes and parameters meet, dimension, friction, softness and margin are as said."""
+    random = np.random.default_rng(seed)
+    bodies = "".join(
+        f"<body pos='0 0 .05'><freejoint/>{_random_geom(random, f'g{i}')}</body>" for i in range(6)
+    )
+    model = _scene(bodies=bodies)
+    predicted, simulated = effective_contacts(model), _simulated(model)
+    assert len(simulated) > 10
+    assert set(simulated) <= set(predicted)
+    for name, contacts in simulated.items():
+        for contact in contacts:
+            _assert_equal(predicted[name], contact)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("flag", ["contact='enable'", "filterparent='disable'"])
+def test_pairs_are_those_that_mujoco_collides(seed: int, flag: str) -> None:
+    """In a heap of overlapping balls on any tree, exactly the pairs that pass the filters touch."""
+    random = np.random.default_rng(seed)
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
+    bodies = [spec.worldbody]
+    for i in range(9):
+        parent = bodies[random.integers(len(bodies))]
+        body = parent.add_body(name=f"b{i}")
+        if random.random() < 0.5:
+            body.add_joint(name=f"j{i}", axis=random.normal(size=3))
+        types = random.integers(0, 4, size=2).tolist()
+        body.add_geom(name=f"g{i}", size=[0.1, 0, 0], contype=types[0], conaffinity=types[1])
+        body.mass, body.inertia, body.explicitinertial = 1.0, [1, 1, 1], True
+        bodies.append(body)
+    for i, j in random.integers(0, 9, size=(2, 2)):
+        if i != j:
+            spec.add_exclude(bodyname1=f"b{i}", bodyname2=f"b{j}")
+    i, j = random.choice(9, size=2, replace=False)
+    spec.add_pair(geomname1=f"g{i}", geomname2=f"g{j}", condim=4)
+    if "filterparent" in flag:
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    model = spec.compile()
+    moving = {
+        name
+        for name in _simulated(model)
+        if any(model.body_treeid[model.geom(geom).bodyid[0]] >= 0 for geom in name.split(" + "))
+    }
+    assert set(effective_contacts(model)) == moving
+
+
+def test_a_slippery_foot_on_a_rough_floor_is_a_rough_foot() -> None:
+    """Lowering the friction of the ant's feet below the floor's does nothing; raising it does."""
+    nominal = effective_contacts(asset("ant"))
+    spec = asset_spec("ant")
+    for geom in spec.geoms:
+        if "ankle" in geom.name:
+            geom.friction = [0.1, 0.5, 0.5]
+    assert effective_contacts(spec.compile()) == nominal
+    for geom in spec.geoms:
+        if "ankle" in geom.name:
+            geom.friction = [1.5, 0.5, 0.5]
+    rough = effective_contacts(spec.compile())
+    changed = {name for name in nominal if rough[name] != nominal[name]}
+    assert len(changed) == 4
+    assert {rough[name].friction for name in changed} == {(1.5, 1.5)}
+
+
+@pytest.mark.parametrize(("condim", "acting"), [(1, 0), (3, 1), (4, 2), (6, 3)])
+def test_only_the_friction_that_the_dimension_uses_counts(condim: int, acting: int) -> None:
+    """Of slide, spin and roll, one more acts at each dimension."""
+    nominal = effective_contacts(_scene(ball=f"condim='{condim}'", floor="condim='1'"))
+    for i in range(3):
+        friction = [1.0, 0.005, 0.0001]
+        friction[i] = 2.0
+        written = " ".join(map(str, friction))
+        changed = _scene(ball=f"condim='{condim}' friction='{written}'", floor="condim='1'")
+        assert (effective_contacts(changed) != nominal) == (i < acting)
+
+
+def test_margins_and_gaps_add_up_whatever_the_priority() -> None:
+    """MuJoCo 4 sums both; before 4 the larger one counted."""
+    model = _scene(floor="margin='.02' gap='.1'", ball="margin='.03' gap='.2' priority='1'")
+    contact = effective_contacts(model)["ball + floor"]
+    assert contact.margin == pytest.approx(0.05)
+    assert contact.gap == pytest.approx(0.3)
+    _assert_equal(contact, _simulated(model)["ball + floor"][0])
+
+
+def test_the_gap_is_where_mujoco_begins_to_find_contacts() -> None:
+    """A contact is found up to margin plus gap away, and not beyond."""
+    for distance, found in ((0.049, True), (0.051, False)):
+        model = _scene(floor="gap='.02'", ball="gap='.01' margin='.02'")
+        model.qpos0[2] = 0.1 + distance
+        contact = effective_contacts(model)["ball + floor"]
+        assert contact.margin + contact.gap == pytest.approx(0.05)
+        assert ("ball + floor" in _simulated(model)) == found
+
+
+def test_friction_has_a_floor() -> None:
+    """Zero friction is one in a hundred thousand."""
+    model = _scene(floor="friction='0 0 0'", ball="friction='0 0 0' condim='6'")
+    contact = effective_contacts(model)["ball + floor"]
+    assert contact.friction == (1e-5,) * 5
+    _assert_equal(contact, _simulated(model)["ball + floor"][0])
+
+
+def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
+    """With the flag set, the model's own contact parameters do not count."""
+    option = "o_margin='.1' o_solref='.05 3' o_solimp='.8 .9 .01 .5 2' o_friction='.1 .2 .3 .4 0'"
+    model = _scene(
+        option=option,
+        flag="override='enable'",
+        ball="condim='6' friction='9 9 9' solref='.1 1' gap='.3' adhesion='2'",
+    )
+    contact = effective_contacts(model)["ball + floor"]
+    assert contact.friction == (0.1, 0.2, 0.3, 0.4, 1e-5)
+    assert contact.gap == 0.3
+    _assert_equal(contact, _simulated(model)["ball + floor"][0])
+
+
+def test_an_explicit_pair_has_its_own_parameters() -> None:
+    """A pair needs no matching bits, may be of parent and child, and may slip like a skate."""
+    child = "<body name='c'><joint/><geom name='c' size='.1' contype='0' conaffinity='0'/></body>"
+    pair = (
+        "<pair geom1='floor' geom2='ball' friction='.1 .9 .01 .02 .03' condim='6'"
+        " solref='.03 1' solreffriction='.1 2' margin='.01' adhesion='3'/>"
+        "<pair geom1='c' geom2='ball'/>"
+    )
+    model = _scene(children=child, contact=pair)
+    predicted, simulated = effective_contacts(model), _simulated(model)
+    assert set(predicted) == set(simulated) == {"ball + floor", "ball + c"}
+    assert predicted["ball + floor"].solreffriction == (0.1, 2.0)
+    for name, (contact,) in simulated.items():
+        _assert_equal(predicted[name], contact)
+
+
+def test_own_softness_of_friction_counts_only_in_elliptic_cones() -> None:
+    """A pyramidal cone mixes the directions, so there it is no difference."""
+    pair = "<pair geom1='floor' geom2='ball' solreffriction='.1 2'/>"
+    model = _scene(contact=pair)
+    assert effective_contacts(model)["ball + floor"].solreffriction == (0.1, 2.0)
+    model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    assert effective_contacts(model)["ball + floor"].solreffriction == ()
+
+
+def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
+    """MuJoCo makes a contact of each; so do we."""
+    pair = "<pair geom1='floor' geom2='ball'/><pair geom1='ball' geom2='floor' condim='1'/>"
+    model = _scene(contact=pair)
+    predicted = effective_contacts(model)
+    assert {name: contact.dim for name, contact in predicted.items()} == {
+        "ball + floor": 3,
+        "ball + floor (2)": 1,
+    }
+    assert [contact.dim for contact in _simulated(model)["ball + floor"]] == [3, 1]
+
+
+@pytest.mark.parametrize("flag", ["contact='disable'", "constraint='disable'"])
+def test_switched_off_contacts_are_none(flag: str) -> None:
+    """A model without contacts has no contact parameters."""
+    assert effective_contacts(_scene(flag=flag, contact="<pair geom1='floor' geom2='ball'/>")) == {}
+
+
+def test_what_cannot_move_or_cannot_collide_is_no_contact() -> None:
+    """A flying hill passes through the floor, and a ghost moved by hand is not stopped by it."""
+    asset = "<hfield name='h' nrow='2' ncol='2' size='1 1 1 1' elevation='0 1 0 1'/>"
+    bodies = (
+        "<body mocap='true'><geom name='ghost' size='.1'/></body>"
+        "<body pos='0 0 .05'><freejoint/><geom name='tray' type='hfield' hfield='h'/>"
+        "<inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/></body>"
+    )
+    assert set(effective_contacts(_scene(bodies=bodies, assets=asset))) == {
+        "ball + floor",
+        "ball + ghost",
+        "ball + tray",
+        "ghost + tray",
+    }
+
+
+_HARD, _HARDER = "0.012 1", "0.002 1"
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast", "discrete"])
+@pytest.mark.parametrize("refsafe", ["enable", "disable"])
+def test_contacts_are_no_harder_than_the_time_step_allows(integrator: str, refsafe: str) -> None:
+    """Below two time steps the time constant does nothing, and we say the same as the simulation.
+
+    The integrator `discrete` needs no such safety, and a model may switch it off.
+    """
+    effective, moved = [], []
+    for solref in (_HARD, _HARDER):
+        model = _scene(
+            option=f"integrator='{integrator}'",
+            flag=f"refsafe='{refsafe}'",
+            floor=f"solref='{solref}'",
+            ball=f"solref='{solref}'",
+        )
+        model.opt.timestep = 0.01
+        data = mujoco.MjData(model)
+        for _ in range(20):
+            mujoco.mj_step(model, data)
+        effective.append(effective_contacts(model))
+        moved.append(data.qpos.copy())
+    same = integrator != "discrete" and refsafe == "enable"
+    assert (effective[0] == effective[1]) == same
+    assert np.array_equal(*moved) == same
+    if same:
+        assert effective[0]["ball + floor"].solref == (0.02, 1.0)

@@ -1,0 +1,223 @@
+"""What an effective model holds, and what it leaves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.morphology.effective.model import effective_model
+from tests.morphology.scenes import asset, everything
+
+
+def test_the_record_reads_like_the_model() -> None:
+    """Numbers are found under the names of section, element and field."""
+    effective = effective_model(everything())
+    assert effective["bodies"]["hand"]["parent"] == ("arm",)
+    assert effective["joints"]["wrist"]["joint range"] == (-1.0, 1.0)
+    assert effective["joints"]["wrist"]["spring reference"] == (0.2,)
+    assert effective["joints"]["root"]["rest position"] == (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+    assert effective["geoms"]["arm"]["size"] == (0.03, 0.15)
+    assert effective["actuators"]["motor"]["gear"] == (5.0,)
+    assert effective["actuators"]["ball"]["gear"] == (1.0, 2.0, 3.0)
+    assert effective["actuators"]["jet"]["second site"] == ("shoulder",)
+    assert effective["actuators"]["pose"]["target"] == ("shoulder",)
+    assert effective["tendons"]["couple"]["path"] == ("joint", "knee", 1.0, "joint", "axle", -2.0)
+    assert effective["tendons"]["string"]["path"][3:6] == ("cylinder", "bone", "bypass")
+    assert effective["equalities"]["mirror"]["between"] == ("knee", "wrist")
+    assert effective["equalities"]["glue"]["between"] == ("glued", "anchor")
+    assert effective["contacts"]["floor + leg"]["contact friction"] == (0.7, 0.6)
+    assert effective["sizes"]["nv"]["dimensions"] == (13.0,)
+    with pytest.raises(KeyError):
+        effective["cameras"]
+
+
+def test_equal_models_are_equal_values() -> None:
+    """Compiling twice gives the same record, also as a key of a dictionary."""
+    one, two = effective_model(everything()), effective_model(everything())
+    assert one == two
+    assert len({one: 1, two: 2}) == 1
+
+
+def test_minus_zero_is_zero() -> None:
+    """Nothing can tell the two apart, so neither do we."""
+    model = everything()
+    nominal = effective_model(model)
+    for array in (model.body_pos, model.jnt_pos, model.geom_margin, model.qpos0, model.wrap_prm):
+        array[array == 0.0] = -0.0
+    assert repr(effective_model(model)) == repr(nominal)
+
+
+def test_a_quaternion_and_its_opposite_are_one_rotation() -> None:
+    """The signs of a quaternion mean nothing."""
+    model = everything()
+    nominal = effective_model(model)
+    for array in (model.body_quat, model.body_iquat, model.geom_quat, model.site_quat):
+        array *= -1.0
+    assert effective_model(model) == nominal
+
+
+_UNSEEN: dict[str, Any] = {
+    "colour": lambda m: m.geom_rgba.fill(0.5),
+    "material": lambda m: m.geom_matid.fill(-1),
+    "material colour": lambda m: m.mat_rgba.fill(0.1),
+    "texture": lambda m: m.tex_data.fill(7),
+    "camera": lambda m: m.cam_pos.fill(3.0),
+    "light": lambda m: m.light_pos.fill(3.0),
+    "visual": lambda m: setattr(m.vis.map, "znear", 0.5),
+    "extent": lambda m: setattr(m.stat, "extent", 99.0),
+    "size of a plane": lambda m: m.geom("floor").size.fill(9.0),
+    "geom group": lambda m: m.geom_group.fill(3),
+    "site size": lambda m: m.site_size.fill(1.0),
+    "site without a use": lambda m: m.site("decor").pos.fill(1.0),
+    "geom without a use": lambda m: m.geom("paint").size.fill(1.0),
+    "tendon width": lambda m: m.tendon_width.fill(0.5),
+    "range of a joint without limits": lambda m: m.joint("axle").range.fill(0.7),
+    "softness of a joint without limits": lambda m: m.joint("axle").solimp.fill(0.7),
+    "spring reference without a spring": lambda m: m.qpos_spring.__setitem__(-1, 0.7),
+    "softness of friction that is zero": lambda m: m.dof_solimp.__setitem__(-1, 0.7),
+    "mass of what cannot move": lambda m: m.body("stand").mass.fill(9.0),
+    "inertia of what cannot move": lambda m: m.body("stand").inertia.fill(9.0),
+    "control range without a limit": lambda m: m.actuator("servo").ctrlrange.fill(7.0),
+    "gain that the type ignores": lambda m: m.actuator("motor").gainprm.__setitem__(5, 7.0),
+    "bias that the type ignores": lambda m: m.actuator("motor").biasprm.fill(7.0),
+    "gear that a hinge ignores": lambda m: m.actuator("motor").gear.__setitem__(3, 7.0),
+    "tendon range without a limit": lambda m: m.tendon_range.__setitem__(1, 7.0),
+    "geom parameters under a pair": lambda m: m.geom("leg").friction.fill(0.5),
+    "magnetic field": lambda m: m.opt.magnetic.fill(0.5),
+    "override that is off": lambda m: m.opt.o_friction.fill(0.5),
+    "energy flag": lambda m: _set(m, "enableflags", mujoco.mjtEnableBit.mjENBL_ENERGY),
+    "sensor flag": lambda m: _set(m, "disableflags", mujoco.mjtDisableBit.mjDSBL_SENSOR),
+    "sleep tolerance without sleep": lambda m: setattr(m.opt, "sleep_tolerance", 0.5),
+}
+
+
+def _set(model: mujoco.MjModel, flags: str, bit: int) -> None:
+    """Set one bit of the model's flags."""
+    setattr(model.opt, flags, getattr(model.opt, flags) | bit)
+
+
+@pytest.mark.parametrize("what", _UNSEEN)
+def test_what_decides_no_motion_is_left_out(what: str) -> None:
+    """An edit without effect leaves no trace."""
+    model = everything()
+    nominal = effective_model(model)
+    _UNSEEN[what](model)
+    assert effective_model(model) == nominal
+
+
+@pytest.mark.parametrize("what", ["size of a plane", "mass of what cannot move"])
+def test_what_is_left_out_does_not_move_anything(what: str) -> None:
+    """The two least obvious of them, checked by stepping."""
+    positions = []
+    for edit in (lambda m: None, _UNSEEN[what]):
+        model = everything()
+        edit(model)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        data = mujoco.MjData(model)
+        data.ctrl[0] = 0.5
+        mujoco.mj_step(model, data, nstep=100)
+        positions.append(data.qpos.copy())
+    np.testing.assert_array_equal(*positions)
+
+
+def test_wind_counts_only_in_a_medium() -> None:
+    """In a vacuum nothing blows, and no shape is pushed."""
+    model = everything()
+    model.opt.density = model.opt.viscosity = 0.0
+    still = effective_model(model)
+    model.opt.wind[:] = 3.0
+    model.geom_fluid[:, 3] = 7.0
+    assert effective_model(model) == still
+
+
+def test_empty_bodies_are_left_out() -> None:
+    """A frame that holds only a camera moves nothing; one that carries a shape stays."""
+    xml = (
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/>{}<body name='b'><freejoint/>"
+        "<geom size='.1'/>{}</body></worldbody></mujoco>"
+    )
+    mount = "<body name='mount'><camera/></body>"
+    plain = effective_model(mujoco.MjModel.from_xml_string(xml.format("", "")))
+    assert effective_model(mujoco.MjModel.from_xml_string(xml.format(mount, mount * 0))) == plain
+    assert effective_model(mujoco.MjModel.from_xml_string(xml.format("", mount))) == plain
+    shelf = "<body name='shelf'><body name='stone'><geom size='.1'/></body></body>"
+    shelved = effective_model(mujoco.MjModel.from_xml_string(xml.format(shelf, "")))
+    assert list(shelved["bodies"]) == ["b", "shelf", "stone"]
+
+
+def test_sleep_counts_once_it_is_allowed() -> None:
+    """Policies of trees matter only with the flag that lets them sleep."""
+    model = everything()
+    awake = effective_model(model)
+    assert "sleep policy" not in awake["bodies"]["trunk"]
+    _set(model, "enableflags", mujoco.mjtEnableBit.mjENBL_SLEEP)
+    asleep = effective_model(model)
+    assert "sleep policy" in asleep["bodies"]["trunk"]
+    assert asleep["options"]["simulation"]["with sleep"] == ("yes",)
+
+
+def test_switched_off_actuators_say_so() -> None:
+    """A group that the options disable is told of."""
+    model = everything()
+    model.actuator("motor").group[:] = 3
+    model.opt.disableactuator = 1 << 3
+    actuators = effective_model(model)["actuators"]
+    assert [name for name in actuators if "switched off" in actuators[name]] == ["motor"]
+
+
+_CLOTH = """
+<mujoco>
+  <option><flag override="enable"/></option>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1" pos="0 0 -.1"/>
+    <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" pos="0 0 1" dim="2"
+              radius=".01" mass="1"><edge equality="true"/></flexcomp>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda m: m.flex_friction.fill(0.3),
+        lambda m: m.flex_radius.fill(0.02),
+        lambda m: m.flex_vert.fill(0.1),
+        lambda m: m.opt.o_friction.fill(0.3),
+        lambda m: m.geom_pos.fill(0.1),
+    ],
+)
+def test_soft_bodies_count(edit: Any) -> None:
+    """Flexes are compared by their own parameters, and so is what they can touch."""
+    model = mujoco.MjModel.from_xml_string(_CLOTH)
+    nominal = effective_model(model)
+    assert nominal["flexes"]["cloth"]["radius"] == (0.01,)
+    assert any(fields["between"] == ("cloth",) for fields in nominal["equalities"].values())
+    assert "floor" in nominal["geoms"]
+    edit(model)
+    assert effective_model(model) != nominal
+
+
+def test_plugins_count() -> None:
+    """What an engine plugin was given is part of the model."""
+    xml = (
+        "<mujoco><extension><plugin plugin='mujoco.pid'><instance name='pid'>"
+        "<config key='kp' value='{}'/></instance></plugin></extension>"
+        "<worldbody><body><joint name='j'/><geom size='.1'/></body></worldbody>"
+        "<actuator><plugin joint='j' plugin='mujoco.pid' instance='pid' actdim='0'/></actuator>"
+        "</mujoco>"
+    )
+    models = [mujoco.MjModel.from_xml_string(xml.format(kp)) for kp in ("1", "2")]
+    assert effective_model(models[0]) != effective_model(models[1])
+
+
+@pytest.mark.parametrize("name", ["ant", "humanoid", "hopper", "reacher", "swimmer", "pusher"])
+def test_gymnasium_bodies_have_a_record(name: str) -> None:
+    """Every body has as many joints and actuators in its record as in its model."""
+    model = asset(name)
+    effective = effective_model(model)
+    assert len(effective["joints"]) == model.njnt
+    assert len(effective["actuators"]) == model.nu

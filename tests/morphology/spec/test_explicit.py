@@ -1,0 +1,152 @@
+"""What a model says indirectly: names, frames and a total mass."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import AddLimb, Cut, Mass, Stretch, reshape
+from shapechanger.morphology.spec.explicit import make_explicit, resolve_frames
+from tests.morphology.models import built, differing, leg, mass, posed, spec_of, tip
+from tests.morphology.scenes import asset_spec
+
+# Everything that can be in a frame, in frames within frames, in degrees.
+_FRAMES = """
+<mujoco>
+  <worldbody>
+    <frame name="stand" pos="0 0 1" euler="0 0 90">
+      <body name="trunk" pos=".1 0 0" euler="0 30 0">
+        <freejoint name="root"/>
+        <geom name="trunk" type="box" size=".2 .1 .05"/>
+        <frame pos="0 .1 0" axisangle="1 1 0 40">
+          <geom name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
+          <geom name="beam" type="box" fromto="0 0 0 .1 .2 .1" size=".02"/>
+          <geom name="pose" type="capsule" pos="0 .1 0" euler="10 20 30" size=".01 .1"/>
+          <site name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
+          <site name="pose" pos=".1 .1 .1"/>
+          <camera name="eye" pos="1 0 0" xyaxes="0 1 0 0 0 1"/>
+          <light name="lamp" pos="0 0 1" dir="1 0 -1"/>
+          <frame pos=".3 0 0" quat="1 2 0 0">
+            <body name="limb" pos="0 .2 0" euler="10 0 0">
+              <geom name="limb" type="capsule" fromto="0 0 0 0 .3 0" size=".03"/>
+              <frame pos=".1 .02 0" euler="0 0 20"><joint name="hip" axis="1 0 0"/></frame>
+              <joint name="twist" axis="0 0 1"/>
+            </body>
+          </frame>
+        </frame>
+      </body>
+    </frame>
+    <light name="sun" pos="0 0 3"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_poses_are_written_as_seen_from_the_body() -> None:
+    """The compiled model is the same, and the frames are where their bodies are."""
+    spec = spec_of(_FRAMES)
+    before = built(spec)
+    resolve_frames(spec)
+    after = built(spec)
+    # How a capsule is turned about its own axis decides nothing but its bounding box.
+    boxes = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid", "geom_aabb", "geom_quat")
+    for field in differing(before, after, ignoring=(*boxes, "site_quat")):
+        np.testing.assert_allclose(
+            getattr(after, field), getattr(before, field), rtol=1e-9, atol=1e-12, err_msg=field
+        )
+    for name in ("trunk", "beam", "pose"):
+        np.testing.assert_allclose(after.geom(name).quat, before.geom(name).quat, atol=1e-12)
+    for name in ("ends", "limb"):
+        places = [posed(model).geom(name).xmat[[2, 5, 8]] for model in (before, after)]
+        np.testing.assert_allclose(places[0], places[1], atol=1e-12)
+    assert all(not np.any(frame.pos) for frame in spec.frames)
+    once = built(spec)
+    resolve_frames(spec)
+    assert differing(once, built(spec)) == []
+
+
+def test_frames_do_not_hide_where_a_segment_grows() -> None:
+    """A limb in a frame that is turned moves along the trunk's axis, not the frame's."""
+    spec = spec_of(
+        """<mujoco><worldbody><body name="trunk"><geom type="box" size=".1 .2 .3"/>
+        <frame euler="0 0 90"><body name="limb" pos=".2 0 0"><geom size=".1"/></body></frame>
+        </body></worldbody></mujoco>"""
+    )
+    np.testing.assert_allclose(built(spec).body("limb").pos, [0.0, 0.2, 0.0], atol=1e-12)
+    model = built(spec, Stretch("trunk", 2.0, axis="y"))
+    np.testing.assert_allclose(model.body("limb").pos, [0.0, 0.4, 0.0], atol=1e-12)
+
+
+def test_copied_limbs_are_seen_from_their_body_too() -> None:
+    """A copy on the other side is beyond a cut where the limb is, not where the original was."""
+    spec = leg()
+    turned = built(spec, AddLimb("thigh", "_2", math.pi / 2.0), Stretch("trunk", 2.0, axis="x"))
+    np.testing.assert_allclose(turned.body("thigh_2").pos, [-0.4, 0.0, 0.0], atol=1e-12)
+    fixed = spec_of(
+        """<mujoco><worldbody><body name="base"><geom size=".1"/>
+        <body name="arm"><joint name="arm"/><geom type="capsule" fromto="0 0 0 1 0 0" size=".1"/>
+        <body name="hand" pos=".9 0 0"><joint name="hand"/><geom name="hand" size=".1"/></body>
+        </body></body></worldbody></mujoco>"""
+    )
+    kept = built(fixed, AddLimb("hand", "_2", math.pi), Cut("arm", 0.5))
+    assert [kept.body(i).name for i in range(kept.nbody)] == ["world", "base", "arm", "hand_2"]
+
+
+@pytest.mark.parametrize("scaling", ['scale="2"', 'scale="2" massscale="1"'])
+def test_frames_that_scale_are_refused(scaling: str) -> None:
+    """What they hold has other sizes than it says."""
+    text = f"""<mujoco><worldbody><frame name="big" {scaling}><body name="b"><joint/>
+    <geom size=".1"/></body></frame></worldbody></mujoco>"""
+    with pytest.raises(MorphologyError, match="The frame 'big' scales what it holds: write the"):
+        built(spec_of(text), Mass("b", scale=2.0))
+
+
+def test_a_total_mass_does_not_undo_an_edit() -> None:
+    """The half cheetah says that it weighs 14 kg: so it does, until it is made heavier."""
+    spec = asset_spec("half_cheetah")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MuJoCo would rather not have total masses at all.
+        before = spec.copy().compile()
+    make_explicit(spec)
+    after = built(spec)
+    for field in differing(before, after):
+        np.testing.assert_allclose(
+            getattr(after, field), getattr(before, field), rtol=1e-9, atol=1e-12, err_msg=field
+        )
+    heavier = built(asset_spec("half_cheetah"), Mass("torso", scale=2.0))
+    assert mass(heavier) == pytest.approx(14.0 + mass(before, "torso"))
+    assert mass(built(asset_spec("half_cheetah"), Mass("*", to=0.5))) == pytest.approx(3.5)
+
+
+def test_a_total_mass_counts_what_is_written_out() -> None:
+    """Inertias that are the body's own numbers are scaled like those of geoms."""
+    spec = spec_of(
+        """<mujoco><compiler settotalmass="10"/><worldbody>
+        <body name="a"><freejoint/><geom type="capsule" size=".1 .2" mass="1"/>
+        <body name="b"><inertial pos="0 0 0" mass="3" diaginertia=".1 .2 .2"/></body></body>
+        </worldbody></mujoco>"""
+    )
+    make_explicit(spec)
+    model = built(spec)
+    assert mass(model, "a") == pytest.approx(2.5)
+    assert mass(model, "b") == pytest.approx(7.5)
+    np.testing.assert_allclose(sorted(model.body("b").inertia), [0.25, 0.5, 0.5])
+
+
+def test_names_are_there_to_be_asked_for() -> None:
+    """Also in a model that was loaded without a family."""
+    model = built(asset_spec("ant"), Stretch("ankle_1", 2.0))
+    assert model.geom("left_ankle_geom").size[1] == pytest.approx(0.4 * math.sqrt(2.0))
+    assert "ankle_1" not in [body.name for body in asset_spec("ant").bodies]
+
+
+def test_a_model_without_edits_is_left_alone() -> None:
+    """Nothing is named and nothing resolved where nothing changes."""
+    spec = spec_of(_FRAMES)
+    assert any(np.any(frame.pos) for frame in reshape(spec, ()).frames)
+    assert any(np.any(f.pos) for f in reshape(spec, [Stretch("limb", 2.0, amount=0.0)]).frames)
+    assert tip(built(spec), "pose").shape == (3,)

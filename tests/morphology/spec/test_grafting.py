@@ -1,0 +1,183 @@
+"""Copying and moving limbs within a model that has one of nearly everything."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import AddLimb, Split
+from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
+from tests.morphology.models import built, leg, posed, spec_of
+from tests.morphology.scenes import EVERYTHING
+
+# A limb that others refer to in every way, with assets and defaults of its own.
+_REFERRED_TO = """
+<mujoco>
+  <compiler angle="radian"/>
+  <asset>
+    <mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/>
+    <texture name="plain" type="2d" builtin="flat" rgb1="1 0 0" width="4" height="4"/>
+    <material name="red" texture="plain"/>
+  </asset>
+  <default><default class="leg"><geom density="500"/><joint damping="3"/></default></default>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1"/>
+    <body name="trunk" pos="0 0 1"><freejoint name="root"/>
+      <geom name="trunk" type="box" size=".2 .1 .05"/>
+      <body name="thigh" pos="0 .2 0" childclass="leg">
+        <joint name="hip" axis="1 0 0" range="-1 1"/>
+        <geom name="thigh" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
+        <site name="palm" pos="0 .3 0"/>
+        <body name="shin" pos="0 .3 0">
+          <joint name="knee" axis="1 0 0" range="-1 1"/>
+          <geom name="shin" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
+          <geom name="horn" type="mesh" mesh="wedge" mass=".1"/>
+          <site name="tip" pos="0 .3 0" material="red"/>
+          <camera name="eye"/><light name="lamp"/>
+        </body>
+      </body>
+      <body name="wing" pos="0 -.2 0">
+        <joint name="flap" axis="1 0 0" range="-1 1"/>
+        <geom name="wing" type="capsule" fromto="0 0 0 0 -.3 0" size=".03"/>
+      </body>
+    </body>
+  </worldbody>
+  <contact>
+    <exclude name="apart" body1="trunk" body2="shin"/><pair name="p" geom1="floor" geom2="shin"/>
+  </contact>
+  <tendon>
+    <fixed name="sum"><joint joint="knee" coef="1"/><joint joint="flap" coef="-2"/></fixed>
+    <spatial name="rope"><site site="palm"/><site site="tip"/></spatial>
+  </tendon>
+  <equality>
+    <joint name="couple" joint1="knee" joint2="flap"/>
+    <weld name="weld" body1="shin" body2="wing" active="false"/>
+  </equality>
+  <actuator>
+    <motor name="knee" joint="knee" gear="3"/><motor name="hip" joint="hip" gear="2"/>
+    <motor name="flap" joint="flap"/><motor name="tie" tendon="sum"/>
+    <motor name="jet" site="tip" gear="0 0 1 0 0 0"/>
+  </actuator>
+  <sensor>
+    <jointpos name="angle" joint="knee"/><touch name="touch" site="tip"/>
+    <framepos name="place" objtype="body" objname="shin"/>
+    <actuatorpos name="drive" actuator="knee"/><tendonpos name="length" tendon="rope"/>
+  </sensor>
+</mujoco>
+"""
+
+
+def _referring(model: mujoco.MjModel) -> dict[str, list[object]]:
+    """What the model's elements refer to, by name."""
+    kind, name_of = mujoco.mjtObj, mujoco.mj_id2name
+
+    def names(obj: int, ids: np.ndarray) -> list[object]:
+        return [name_of(model, obj, int(i)) for i in ids]
+
+    return {
+        "motors": names(kind.mjOBJ_ACTUATOR, np.arange(model.nu)),
+        "driven": names(kind.mjOBJ_JOINT, model.actuator_trnid[:3, 0]),
+        "sensed": [
+            name_of(model, int(t), int(i))
+            for t, i in zip(model.sensor_objtype, model.sensor_objid, strict=True)
+        ],
+        "tendons": [int(x) for x in model.tendon_num],
+        "coupled": names(kind.mjOBJ_JOINT, model.eq_obj1id[:1]),
+        "welded": names(kind.mjOBJ_BODY, model.eq_obj1id[1:2]),
+        "pairs": names(kind.mjOBJ_GEOM, model.pair_geom2),
+        "excluded": [model.nexclude],
+    }
+
+
+def test_a_moved_limb_keeps_what_refers_to_it() -> None:
+    """Motors, sensors, tendons, couplings, contact pairs: all find it under its name."""
+    spec = spec_of(_REFERRED_TO)
+    before = built(spec)
+    moved = move_limb(spec, spec.body("shin"), spec.body("wing"))
+    after = built(spec)
+    assert moved.name == "shin"
+    assert after.body("shin").parentid == after.body("wing").id
+    np.testing.assert_array_equal(after.body("shin").pos, before.body("shin").pos)
+    assert _referring(after) == _referring(before)
+    assert (after.nmesh, after.nmat, after.ntex) == (before.nmesh, before.nmat, before.ntex)
+    assert after.geom("shin").matid == after.site("tip").matid == after.material("red").id
+    assert after.joint("knee").damping[0] == 3.0
+    assert not [n for n in range(after.nbody) if "graft" in after.body(n).name]
+
+
+def test_a_copied_limb_shares_the_assets() -> None:
+    """Materials and meshes are there once, however many limbs use them."""
+    spec = spec_of(_REFERRED_TO)
+    before = built(spec)
+    for suffix, angle in (("_2", 2.0), ("_3", 4.0)):
+        copy = graft_copy(spec, spec.body("thigh"), suffix, angle)
+        assert copy.name == f"thigh{suffix}"
+    after = built(spec)
+    assert (after.nmesh, after.nmat, after.ntex) == (before.nmesh, before.nmat, before.ntex)
+    assert after.geom("shin_3").matid == after.site("tip_2").matid == after.material("red").id
+    assert after.geom("horn_2").dataid == after.geom("horn").dataid
+    np.testing.assert_array_equal(after.body("shin_2").inertia, before.body("shin").inertia)
+    assert after.joint("knee_3").damping[0] == 3.0
+    assert after.camera("eye_2").bodyid == after.body("shin_2").id
+    assert after.light("lamp_2").bodyid == after.body("shin_2").id
+
+
+def test_a_copied_limb_has_motors_and_nothing_else_that_refers() -> None:
+    """Sensors, tendons and couplings stay with the original."""
+    spec = spec_of(_REFERRED_TO)
+    before = _referring(built(spec))
+    graft_copy(spec, spec.body("thigh"), "_2", 2.0)
+    after = _referring(built(spec))
+    assert after["motors"] == [*before["motors"], "knee_2", "hip_2", "jet_2"]
+    for kind in ("sensed", "tendons", "coupled", "welded", "pairs", "excluded"):
+        assert after[kind] == before[kind]
+
+
+def test_limbs_of_a_model_with_one_of_nearly_everything() -> None:
+    """Height fields, skyboxes, mocap bodies, ball joints and muscles are no hindrance."""
+    before = built(spec_of(EVERYTHING))
+    model = built(spec_of(EVERYTHING), AddLimb("arm", "_2", 2.0), Split("hand", "finger"))
+    assert (model.nbody, model.nmesh, model.nhfield) == (
+        before.nbody + 3,
+        before.nmesh,
+        before.nhfield,
+    )
+
+
+def test_a_copied_geom_is_as_the_original() -> None:
+    """In everything that decides physics and looks, but for its name and its body."""
+    spec = spec_of(
+        """<mujoco><asset><material name="red"/></asset><worldbody>
+        <body name="a"><freejoint/><geom name="a" type="ellipsoid" size=".1 .2 .3" pos="1 2 3"
+        euler="10 20 30" density="7" contype="2" conaffinity="4" condim="6" priority="3"
+        friction=".1 .2 .3" solmix=".4" solref=".03 .5" solimp=".8 .9 .01 .4 3" margin=".01"
+        gap=".005" group="3" rgba=".1 .2 .3 .4" material="red" fluidshape="ellipsoid"
+        fluidcoef=".6 .3 1.6 1.1 1.2"/></body>
+        <body name="b"><freejoint/></body></worldbody></mujoco>"""
+    )
+    copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
+    model = built(spec)
+    for field in [name for name in dir(model) if name.startswith("geom_")]:
+        if field not in ("geom_bodyid",):
+            first, second = getattr(model, field)
+            np.testing.assert_array_equal(second, first, err_msg=field)
+    np.testing.assert_array_equal(model.body("b").inertia, model.body("a").inertia)
+    with pytest.raises(MorphologyError, match="A new geom needs a name that is free"):
+        copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
+
+
+def test_a_moved_point_keeps_its_pose_and_its_name() -> None:
+    """A site or a geom, in the frame of its new body."""
+    spec = leg()
+    spec.site("toe").size = [0.02, 0.03, 0.04]
+    before = built(spec)
+    for name, point in (("toe", spec.site("toe")), ("sole", spec.geom("sole"))):
+        moved = move_point(spec, point, spec.body("trunk"))
+        assert (moved.name, moved.parent.name) == (name, "trunk")
+    after = built(spec)
+    np.testing.assert_array_equal(after.site("toe").pos, before.site("toe").pos)
+    np.testing.assert_array_equal(after.site("toe").size, before.site("toe").size)
+    np.testing.assert_array_equal(after.geom("sole").size, before.geom("sole").size)
+    np.testing.assert_allclose(posed(after).geom("sole").xpos, [0.0, 0.0, 0.75])
