@@ -18,6 +18,12 @@ _IDS = (
     "shapechanger/AmputatedAnt-v1",
     "shapechanger/BigAnt-v1",
     "shapechanger/ExtendedAnt-v1",
+    "shapechanger/HalfCheetah-v1",
+    "shapechanger/Hopper-v1",
+    "shapechanger/Walker2d-v1",
+    "shapechanger/Swimmer-v1",
+    "shapechanger/Humanoid-v1",
+    "shapechanger/InvertedDoublePendulum-v1",
 )
 
 # Every import of a blocked package fails, as where it is not installed.

@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from shapechanger.morphology.pose import floor_gap, trunk_lift
+
 
 def _same_info(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
     assert ours.keys() == theirs.keys()
@@ -98,6 +100,96 @@ def test_the_ant_starts_with_gymnasiums_noise() -> None:
             np.testing.assert_allclose(ours.data.qpos[hips], drawn[hips], atol=1e-12)
             turned = drawn[3:7] / np.linalg.norm(drawn[3:7])
             np.testing.assert_allclose(ours.data.qpos[3:7], turned, atol=1e-12)
+
+
+_PLACE = {"exclude_current_positions_from_observation": False}
+_OTHERS: dict[str, tuple[str, dict[str, Any]]] = {
+    "HalfCheetah": ("HalfCheetah", {}),
+    "HalfCheetah with its place": ("HalfCheetah", _PLACE | {"frame_skip": 2}),
+    "Hopper": ("Hopper", {}),
+    "Hopper with its place": ("Hopper", _PLACE | {"healthy_z_range": (1.2, 1.3)}),
+    "Walker2d": ("Walker2d", {}),
+    "Walker2d with its place": ("Walker2d", _PLACE | {"healthy_angle_range": (-0.1, 0.1)}),
+    "Swimmer": ("Swimmer", {}),
+    "Swimmer with its place": ("Swimmer", _PLACE | {"ctrl_cost_weight": 0.1}),
+    "Humanoid": ("Humanoid", {}),
+    "Humanoid with its place": ("Humanoid", _PLACE | {"include_cvel_in_observation": False}),
+    "InvertedDoublePendulum": ("InvertedDoublePendulum", {}),
+    "InvertedDoublePendulum, paid": ("InvertedDoublePendulum", {"healthy_reward": 2.0}),
+}
+
+
+@pytest.mark.parametrize("case", _OTHERS)
+def test_the_others_step_like_gymnasiums(case: str) -> None:
+    """From the same states the same actions give the same numbers, to the end of the episode."""
+    name, arguments = _OTHERS[case]
+    rng = np.random.default_rng(5)
+    with (
+        gym.make(f"shapechanger/{name}-v1", **arguments) as made,
+        gym.make(f"{name}-v5", **arguments) as other,
+    ):
+        ours: Any = made.unwrapped
+        theirs: Any = other.unwrapped
+        assert ours.action_space == theirs.action_space
+        assert ours.observation_space == theirs.observation_space
+        assert ours.metadata == theirs.metadata
+        high = ours.action_space.high
+        ends = 0
+        for seed in range(3):
+            ours.reset(seed=seed)
+            pose, velocity = ours.data.qpos.copy(), ours.data.qvel.copy()
+            for env in (ours, theirs):
+                # Of an episode the physics remembers more than its state: begin without.
+                mujoco.mj_resetData(env.model, env.data)
+                env.set_state(pose, velocity)
+            theirs.init_qpos = ours.init_qpos
+            for _ in range(60):
+                action = rng.uniform(-high, high).astype(np.float32)
+                (observation, *rest, info), (expected, *expected_rest, expected_info) = (
+                    env.step(action) for env in (ours, theirs)
+                )
+                np.testing.assert_array_equal(observation, expected)
+                assert rest == expected_rest
+                _same_info(info, expected_info)
+                if rest[1]:
+                    ends += 1
+                    break
+    assert ends > 0 or name in ("HalfCheetah", "Swimmer")
+
+
+@pytest.mark.parametrize("name", dict(_OTHERS.values()))
+def test_the_others_start_like_gymnasiums(name: str) -> None:
+    """The same draws, but for what limits and floor forbid."""
+    untouched = 0
+    with gym.make(f"shapechanger/{name}-v1") as made, gym.make(f"{name}-v5") as other:
+        ours: Any = made.unwrapped
+        theirs: Any = other.unwrapped
+        limited = theirs.model.jnt_limited != 0
+        places = theirs.model.jnt_qposadr[limited]
+        low, high = theirs.model.jnt_range[limited].T
+        lift = trunk_lift(theirs.model)
+        for seed in range(10):
+            ours.reset(seed=seed)
+            theirs.reset(seed=seed)
+            np.testing.assert_array_equal(ours.data.qvel, theirs.data.qvel)
+            pose, drawn = ours.data.qpos, theirs.data.qpos.copy()
+            raised = lift is not None and floor_gap(theirs.model, theirs.data) < 0.0
+            inside = (drawn[places] >= low) & (drawn[places] <= high)
+            untouched += bool(inside.all() and not raised)
+            same = np.ones(drawn.size, bool)
+            same[places[~inside]] = False
+            if lift is not None and raised:
+                same[lift.place] = False
+                assert lift.height(pose) > lift.height(drawn)
+            if name == "Humanoid":
+                drawn[3:7] /= np.linalg.norm(drawn[3:7])
+                np.testing.assert_allclose(pose[3:7], drawn[3:7], atol=1e-12)
+                same[3:7] = False
+            np.testing.assert_array_equal(pose[same], drawn[same])
+            np.testing.assert_array_less(low - 1e-12, pose[places])
+            np.testing.assert_array_less(pose[places], high + 1e-12)
+    # Straight legs are at the limit of their knees, so noise bends half of them the wrong way.
+    assert untouched > 0 or name in ("Walker2d", "Humanoid")
 
 
 def test_the_arguments_are_gymnasiums() -> None:

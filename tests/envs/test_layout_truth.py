@@ -14,16 +14,35 @@ import pytest
 from shapechanger.envs import CATALOGUE
 from shapechanger.layout import Feature
 from shapechanger.morphology import AddLimb, Lock, Split, to_json
+from shapechanger.morphology.pose import trunk_lift
 
 _PLACE = {"exclude_current_positions_from_observation": False}
 _NO_CONTACTS = {"include_cfrc_ext_in_observation": False}
+_JOINTS = {
+    f"include_{block}_in_observation": False
+    for block in ("cinert", "cvel", "qfrc_actuator", "cfrc_ext")
+}
+_PLANAR = ("HalfCheetah", "Hopper", "Walker2d", "Swimmer")
+# The joints by which a trunk moves in the world have no limits.
+_ROOTS = {
+    *("root", "rootx", "rootz", "rooty"),
+    *("slider1", "slider2", "free_body_rot"),
+}
 _OTHER_BODY = (
     AddLimb("aux_1", "_5", 0.8, 0.7),
     Lock("ankle_3"),
     Split("shank_2", "shin_2", 0.4, -0.3, 0.6, 55.0),
 )
 _CASES: dict[str, tuple[str, dict[str, Any]]] = {
-    **{env_id.removeprefix("shapechanger/"): (env_id, {}) for env_id in CATALOGUE},
+    **{
+        env_id.removeprefix("shapechanger/"): (env_id, {})
+        for env_id, entry in CATALOGUE.items()
+        # They see more than joints: test_layout_truth_of_blocks.py.
+        if entry.family not in ("Humanoid", "InvertedDoublePendulum")
+    },
+    **{f"{name} with its place": (f"shapechanger/{name}-v1", _PLACE) for name in _PLANAR},
+    "Humanoid's joints": ("shapechanger/Humanoid-v1", _JOINTS),
+    "Humanoid's joints and place": ("shapechanger/Humanoid-v1", _JOINTS | _PLACE),
     "Ant with its place": ("shapechanger/Ant-v1", _PLACE),
     "BigAnt without contacts": ("shapechanger/BigAnt-v1", _NO_CONTACTS),
     "ExtendedAnt with place, without contacts": (
@@ -58,7 +77,9 @@ def env(request: pytest.FixtureRequest) -> Iterator[Any]:
     yield from _made(request.param)
 
 
-@pytest.fixture(params=[case for case in _CASES if "Pendulum" not in case])
+@pytest.fixture(
+    params=[case for case in _CASES if not case.startswith(_PLANAR) and "Pendulum" not in case]
+)
 def ant(request: pytest.FixtureRequest) -> Iterator[Any]:
     """The same, of those whose trunk is free."""
     yield from _made(request.param)
@@ -86,8 +107,9 @@ def _state(env: Any) -> tuple[np.ndarray, np.ndarray]:
 def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
     """The pose where nothing touches the body; the pendulum's rail is high enough."""
     result = pose.copy()
-    if env.model.jnt_type[0] == _J.mjJNT_FREE:
-        result[2] += _HIGH_M
+    lift = trunk_lift(env.model)
+    if lift is not None:
+        lift.raise_by(result, _HIGH_M)
     return result
 
 
@@ -114,7 +136,8 @@ def test_a_joint_moves_its_own_position(env: Any) -> None:
         place = env.model.jnt_qposadr[j]
         changed[place] += _STEP
         moved = _moved(before, _sensed(env, changed, velocity))
-        assert moved == {f"{env.model.joint(j).name}/{_ONE_NUMBER[kind]}": changed[place]}
+        own = {f"{env.model.joint(j).name}/{_ONE_NUMBER[kind]}": changed[place]}
+        assert moved == _visible(env, own)
 
 
 def test_the_trunk_moves_its_own_place(ant: Any) -> None:
@@ -259,7 +282,7 @@ def test_contacts_are_clipped_to_their_range(push_n: float, seen: float) -> None
 def test_a_motor_pulls_its_own_joint(env: Any) -> None:
     """A control of c gives gain times c, in N·m or N, on one joint and on no other."""
     for a, feature in enumerate(env.action_layout):
-        control = 0.5
+        control = 0.25
         action = np.zeros(env.model.nu)
         action[a] = control
         _in_the_air(env)
@@ -281,16 +304,21 @@ def test_ranges_are_those_of_the_model(env: Any) -> None:
         for j in range(env.model.njnt)
         if env.model.jnt_limited[j]
     }
-    assert len(limits) == env.model.njnt - (env.model.jnt_type[0] == _J.mjJNT_FREE)
+    names = {env.model.joint(j).name for j in range(env.model.njnt)}
+    # The ant's root has the name that its body gives it.
+    assert names - limits.keys() <= _ROOTS | {env.model.joint(0).name}
+    clipped = env.family.name in ("Hopper", "Walker2d")
 
     def expected(feature: Feature) -> tuple[float, float]:
         element, _, quantity = feature.name.partition("/")
         if quantity in ("angle", "position"):
-            return tuple(limits[element])
+            return tuple(limits.get(element, (-math.inf, math.inf)))
         if quantity in ("qw", "qx", "qy", "qz"):
             return -1.0, 1.0
         if quantity.startswith("contact/"):
             return -1.0, 1.0
+        if quantity == "velocity" and clipped:
+            return -10.0, 10.0
         return -math.inf, math.inf
 
     for feature in env.observation_layout:

@@ -9,11 +9,13 @@ import pytest
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import JointRange, StartHeight, Stretch
 from shapechanger.morphology.pose import (
+    Lift,
     floor_gap,
     keep_within_limits,
     standing_height,
     start_pose,
     trunk_joint,
+    trunk_lift,
 )
 from tests.morphology.models import ant, built, gantry, leg, pendulum, posed, spec_of
 
@@ -169,3 +171,96 @@ def test_a_body_without_joints_has_a_pose() -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert start_pose(model).shape == keep_within_limits(model, np.zeros(0)).shape == (0,)
     assert standing_height(model) is None
+
+
+_HOPPER = """
+<mujoco>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="torso" pos="0 0 {height}" euler="{turn}">
+      <joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="{axis}" ref="{ref}" {limits}/>
+      <geom size=".2"/>
+      <body pos="0 0 -.5"><joint name="leg" range="-150 -30" ref="-20"/><geom size=".1"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _hopper(
+    height: float = 1.0,
+    axis: str = "0 0 1",
+    ref: float = 0.0,
+    turn: str = "0 0 0",
+    limits: str = "",
+) -> mujoco.MjModel:
+    """A ball with a foot half a metre below, on a rail and a slide."""
+    text = _HOPPER.format(height=height, axis=axis, ref=ref, turn=turn, limits=limits)
+    return built(spec_of(text))
+
+
+@pytest.mark.parametrize(
+    ("axis", "ref", "turn", "lift"),
+    [
+        ("0 0 1", 0.0, "0 0 0", Lift(1, 1.0, 1.0)),
+        ("0 0 3", 1.0, "0 0 0", Lift(1, 1.0, 0.0)),
+        ("0 0 -1", 0.25, "0 0 0", Lift(1, -1.0, 1.25)),
+        # The axis is the body's own.
+        ("0 1 0", 0.0, "90 0 0", Lift(1, 1.0, 1.0)),
+        ("0 0 1", 0.0, "180 0 0", Lift(1, -1.0, 1.0)),
+    ],
+)
+def test_a_slide_raises_a_trunk(axis: str, ref: float, turn: str, lift: Lift) -> None:
+    """Whichever way it points, and wherever it counts from."""
+    model = _hopper(axis=axis, ref=ref, turn=turn)
+    found = trunk_lift(model)
+    assert found is not None
+    assert found == pytest.approx(lift, abs=1e-12)
+    pose = model.qpos0.copy()
+    found.raise_by(pose, 0.5)
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(model, data)
+    assert data.body("torso").xpos[2] == pytest.approx(found.height(pose)) == pytest.approx(1.5)
+    assert found.number_at(1.5) == pytest.approx(pose[found.place])
+
+
+@pytest.mark.parametrize(
+    ("axis", "limits"),
+    [("0 1 0", ""), ("0 .1 1", ""), ("0 0 1", 'range="-1 1"')],
+    ids=["flat", "aslant", "a hoist"],
+)
+def test_other_slides_raise_nothing(axis: str, limits: str) -> None:
+    """Then the body stays where its model puts it."""
+    model = _hopper(height=0.1, axis=axis, limits=limits)
+    assert trunk_lift(model) is None
+    assert standing_height(model) is None
+    assert start_pose(model)[1] == model.qpos0[1]
+
+
+def test_a_free_trunk_raises_itself() -> None:
+    """By its third number, which is its height."""
+    assert trunk_lift(built(leg())) == Lift(2, 1.0, 0.0)
+    for spec in (pendulum(), gantry()):
+        assert trunk_lift(built(spec)) is None
+
+
+@pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
+def test_feet_on_a_slide_start_on_the_floor(axis: str) -> None:
+    """Raised, not lowered; at the height at which the body stands in that pose."""
+    for height in (0.1, 1.0, 9.0):
+        model = _hopper(height=height, axis=axis, ref=0.3)
+        pose, lift = start_pose(model), trunk_lift(model)
+        assert lift is not None
+        stands = standing_height(model, pose)
+        assert stands is not None
+        assert lift.height(pose) == pytest.approx(max(height, stands))
+
+
+def test_a_start_may_be_at_the_limits() -> None:
+    """A joint that the model puts beyond is moved as far inside as is asked for."""
+    model = _hopper()
+    place = model.joint("leg").qposadr[0]
+    starts = [np.rad2deg(start_pose(model, inside)[place]) for inside in (0.0, 0.1, 0.5)]
+    assert starts == pytest.approx([-30.0, -42.0, -90.0])

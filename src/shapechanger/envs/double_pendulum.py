@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any, Final, cast
 
 import gymnasium as gym
-import mujoco
 
 from shapechanger.errors import MissingExtra, MorphologyError
 
 try:
+    import mujoco
     from gymnasium.envs.mujoco.inverted_double_pendulum_v5 import (
         InvertedDoublePendulumEnv as GymnasiumInvertedDoublePendulumEnv,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Final
 
 import gymnasium as gym
@@ -9,6 +10,7 @@ import gymnasium as gym
 from shapechanger.errors import MissingExtra
 
 try:
+    import mujoco
     from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
     from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
     from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
@@ -35,6 +37,13 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     """
 
     family = HALF_CHEETAH
+
+    def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        with warnings.catch_warnings():
+            # MuJoCo deprecates how Gymnasium's file says what the cheetah weighs; another way of
+            # saying it would change the last bits.
+            warnings.filterwarnings("ignore", message=".*settotalmass.*")
+            return super()._initialize_simulation()
 
 
 class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]

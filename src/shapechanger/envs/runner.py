@@ -64,11 +64,15 @@ class Runner(Reshapable):
         self.standing_height = standing_height(self.model, self.init_qpos)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        kinds = tuple(_KINDS[mujoco.mjtJoint(kind)] for kind in model.jnt_type[: len(self.root)])
-        if kinds != self.root:
+        trunk = [
+            _KINDS[mujoco.mjtJoint(kind)]
+            for kind, body in zip(model.jnt_type, model.jnt_bodyid, strict=True)
+            if body == model.jnt_bodyid[0]
+        ]
+        if tuple(trunk) != self.root:
             raise MorphologyError(
-                f"The task reads where the {self.family.name} is from its first joints, which must "
-                f"be {', '.join(self.root)}; here they are {', '.join(kinds) or 'none'}."
+                f"The task reads where the {self.family.name} is from the joints of its trunk, "
+                f"which must be {', '.join(self.root)}; here they are {', '.join(trunk) or 'none'}."
             )
         features = position_features(model)[self.place_size if self._place_hidden else 0 :]
         return features + velocity_features(model, self.velocity_limit)
@@ -82,8 +86,8 @@ class HealthyRunner(Runner):
 
     Args:
         body: As in `Runner`.
-        healthy_z_range: Heights of the trunk between which the body is healthy, m; None derives
-            them from the body.
+        healthy_z_range: Heights of the trunk between which the body is healthy, m, as the joint
+            that raises it counts them; None derives them from the body.
         **arguments: All other arguments of Gymnasium's env.
     """
 
@@ -121,7 +125,7 @@ class HealthyRunner(Runner):
 
     @property
     def healthy_z_range(self) -> tuple[float, float]:
-        """Heights of the trunk between which the body is healthy, m."""
+        """Heights between which the body is healthy, m, as the joint of the trunk counts them."""
         return self._healthy_z_range
 
 

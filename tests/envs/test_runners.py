@@ -1,0 +1,154 @@
+"""Starts and ends that follow from the body: runners, and poles on poles."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import Edit, Gear, Lock, Remove, StartHeight, Stretch
+from shapechanger.morphology.pose import floor_gap, trunk_lift
+
+_HEALTHY = ("Hopper", "Walker2d", "Humanoid")
+_LEGS = {"HalfCheetah": "?shin", "Hopper": "leg", "Walker2d": "leg*", "Humanoid": "*_shin"}
+_POLES = "shapechanger/InvertedDoublePendulum-v1"
+
+
+def _made(name: str, **arguments: Any) -> Any:
+    with gym.make(f"shapechanger/{name}-v1", **arguments) as env:
+        return env.unwrapped
+
+
+@pytest.mark.parametrize("name", [*_LEGS, "Swimmer"])
+def test_a_body_starts_as_in_gymnasium(name: str) -> None:
+    """The humanoid's knees excepted, which Gymnasium stretches 2 degrees beyond their limit."""
+    ours = _made(name)
+    with gym.make(f"{name}-v5") as env:
+        theirs: Any = env.unwrapped
+    moved = np.flatnonzero(ours.init_qpos != theirs.init_qpos)
+    names = ("right_knee", "left_knee") if name == "Humanoid" else ()
+    knees = [ours.model.joint(knee).qposadr[0] for knee in names]
+    assert moved.tolist() == knees
+    np.testing.assert_allclose(ours.init_qpos[knees], math.radians(-2.0))
+
+
+@pytest.mark.parametrize("name", _HEALTHY)
+def test_a_body_as_it_is_is_healthy_where_gymnasiums_is(name: str) -> None:
+    """The numbers are Gymnasium's own, also for a body that only its motors tell apart."""
+    with gym.make(f"{name}-v5") as env:
+        theirs = env.unwrapped._healthy_z_range
+    for body in (name, Gear("*", 2.0)):
+        assert _made(name, body=body).healthy_z_range == theirs
+
+
+@pytest.mark.parametrize("name", _HEALTHY)
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_healthy_heights_grow_with_the_body(name: str, factor: float) -> None:
+    """In proportion to the height at which it stands; at a reset as well."""
+    plain, legs = _made(name), Stretch(_LEGS[name], factor)
+    tall = _made(name, body=legs)
+    growth = tall.standing_height / plain.standing_height
+    assert (growth > 1.0) == (factor > 1.0)
+    assert tall.healthy_z_range == pytest.approx([growth * z for z in plain.healthy_z_range])
+    plain.reset(seed=0, options={"body": legs})
+    assert plain.healthy_z_range == tall.healthy_z_range
+    assert plain.is_healthy
+
+
+@pytest.mark.parametrize("name", _HEALTHY)
+def test_an_explicit_range_wins(name: str) -> None:
+    """Whatever the body, and in a copy; None asks for the derived one."""
+    env = _made(name, body=Stretch(_LEGS[name], 2.0), healthy_z_range=(0.1, 9.0))
+    for one in (env, pickle.loads(pickle.dumps(env))):
+        assert one.healthy_z_range == (0.1, 9.0)
+    assert _made(name, healthy_z_range=None).healthy_z_range == _made(name).healthy_z_range
+
+
+@pytest.mark.parametrize("name", _LEGS)
+def test_long_legs_start_above_the_floor(name: str) -> None:
+    """The trunk is raised as far as they need, and noise does not push them in."""
+    env = _made(name, body=Stretch(_LEGS[name], 2.0))
+    lift = trunk_lift(env.model)
+    assert lift is not None
+    assert lift.height(env.init_qpos) == pytest.approx(env.standing_height)
+    for seed in range(5):
+        env.reset(seed=seed)
+        assert floor_gap(env.model, env.data) > -1e-9
+
+
+@pytest.mark.parametrize("height_m", [0.5, 2.0])
+def test_the_range_follows_where_the_joint_counts_from(height_m: float) -> None:
+    """A hopper whose model puts it elsewhere is as high when it counts as fallen."""
+    env = _made("Hopper", body=StartHeight("torso", height_m))
+    lift = trunk_lift(env.model)
+    assert lift is not None
+    pose = env.init_qpos.copy()
+    pose[lift.place] = env.healthy_z_range[0]
+    assert lift.height(pose) == pytest.approx(0.7)
+    assert env.standing_height == pytest.approx(1.21)
+    env.reset(seed=0)
+    assert env.is_healthy
+
+
+def test_a_torso_without_legs_has_a_range_too() -> None:
+    """It stands on its end: still a height."""
+    env = _made("Walker2d", body=(Remove("thigh"), Remove("thigh_left")))
+    plain = _made("Walker2d")
+    growth = env.standing_height / plain.standing_height
+    assert env.healthy_z_range == pytest.approx((0.8 * growth, 2.0 * growth))
+
+
+@pytest.mark.parametrize(("name", "joint"), [("Hopper", "rooty"), ("HalfCheetah", "rooty")])
+def test_the_joints_of_the_trunk_stay(name: str, joint: str) -> None:
+    """Reward and end are read from them."""
+    with pytest.raises(MorphologyError, match="must be slide, slide, hinge; here they are slide"):
+        _made(name, body=Lock(joint))
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_poles_of_any_length_are_judged_alike(factor: float) -> None:
+    """Reward and end depend on the height in parts of the length."""
+    with gym.make(_POLES, body=Stretch("pole*", factor)) as made:
+        env: Any = made.unwrapped
+        made.reset(seed=0)
+        for part, fallen in ((1.01, False), (0.99, True)):
+            # Both poles lean alike, so that the tip is at 1 m on the model as it is.
+            lean = math.acos(part / 1.2)
+            env.set_state(np.array([0.0, lean, 0.0]), np.zeros(3))
+            y = env.data.site_xpos[0, 2]
+            assert y == pytest.approx(factor * part)
+            reward, terms = env._get_rew(0.0, y, not fallen)
+            assert terms["distance_penalty"] == pytest.approx(-((part - 2.0) ** 2))
+            assert terms["reward_survive"] == (0.0 if fallen else 10.0)
+            assert reward == pytest.approx(sum(terms.values()))
+        env.set_state(np.array([0.0, 1.0, 0.0]), np.zeros(3))
+        assert made.step(np.zeros(1, np.float32))[2]
+        made.reset(seed=0)
+        assert not made.step(np.zeros(1, np.float32))[2]
+
+
+def test_a_rail_elsewhere_changes_no_reward() -> None:
+    """Heights are those above the first hinge."""
+    rewards: list[float] = []
+    for body in ((), StartHeight("cart", 1.0)):
+        with gym.make(_POLES, body=body) as env:
+            env.reset(seed=0)
+            rewards.append(float(env.step(np.zeros(1, np.float32))[1]))
+    assert rewards[1] == pytest.approx(rewards[0])
+
+
+@pytest.mark.parametrize("body", [Lock("hinge2"), Remove("pole2")])
+def test_a_double_pendulum_keeps_its_poles(body: Edit) -> None:
+    """Nine numbers and a reward count on them, when it is made and when it is changed."""
+    with pytest.raises(MorphologyError, match="two poles on hinges and a tip above them"):
+        gym.make(_POLES, body=body)
+    with gym.make(_POLES) as env:
+        env.reset(seed=0)
+        with pytest.raises(MorphologyError, match="two poles on hinges"):
+            env.reset(options={"body": body})
+        env.step(np.zeros(1, np.float32))
