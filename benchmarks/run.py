@@ -1,8 +1,8 @@
 """Measure every number that Shapechanger promises, beside what it promised.
 
-`make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times of
-the machine are the best of several rounds, with the spread; compare ratios, not milliseconds, between
-machines.
+`make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times
+of the machine are the median of several rounds, with the spread; compare ratios, not milliseconds,
+between machines.
 """
 
 from __future__ import annotations
