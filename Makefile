@@ -28,7 +28,7 @@ setup: $(INSTALLED_DEV)  ## create .venv with everything that the other targets 
 
 demo: $(INSTALLED_ALL)  ## move a skill from a pole to one twice as long; see results/demo
 	$(BIN)/shapechanger transfer shapechanger/InvertedPendulum-v1 \
-		shapechanger/BigInvertedPendulum-v1 --seeds 5 --out results/demo
+		shapechanger/BigInvertedPendulum-v1 --seeds 5 --source-steps 16384 --out results/demo
 
 test: $(INSTALLED_DEV)  ## run the quick tests; the pure parts must be covered to the last line
 	$(TEST) -m "not slow"

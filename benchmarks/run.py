@@ -104,6 +104,7 @@ def demo() -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
         command = ["shapechanger", "transfer", "InvertedPendulum", "BigInvertedPendulum"]
+        command += ["--seeds", "5", "--source-steps", "16384"]
         call = f"import sys; sys.argv = {command!r} + ['--out', {str(out)!r}]; "
         began = time.monotonic()
         subprocess.run(

@@ -68,7 +68,7 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
 
-# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 32,768 steps.
+# `ppo-balance` was tuned on the three inverted pendulums, which it solves within 24,576 steps.
 # `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
 # return of 2,215, after 1,048,576 steps.
 LEARNERS: Final[dict[str, LearnerSettings]] = {
@@ -78,7 +78,7 @@ LEARNERS: Final[dict[str, LearnerSettings]] = {
         batch_size=128,
         n_epochs=10,
         learning_rate=1e-3,
-        steps=32_768,
+        steps=24_576,
         eval_every=3072,
         eval_episodes=5,
     ),
