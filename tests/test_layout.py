@@ -127,3 +127,11 @@ def test_other_json_is_no_layout(text: str | bytes) -> None:
     """Whatever is wrong with the text, the error is one of ours."""
     with pytest.raises(LayoutError, match="This is not a layout: "):
         Layout.from_json(text)
+
+
+def test_infinite_bounds_go_round_whichever_way_they_were_computed() -> None:
+    """An infinity that was computed is left out of the JSON as the default is."""
+    for infinity in (math.inf, float("inf"), 1e308 * 10):
+        layout = Layout((Feature("a", "m", -infinity, infinity),))
+        assert Layout.from_json(layout.to_json()) == layout
+        assert "null" not in layout.to_json()

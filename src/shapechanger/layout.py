@@ -26,6 +26,8 @@ __all__ = ["Element", "ElementKind", "Feature", "Layout"]
 ElementKind = Literal["body", "joint", "actuator", "tendon", "sensor", "camera", "task"]
 
 _GLOB_CHARACTERS: Final = frozenset("*?[")
+_LOWEST: Final = -math.inf
+_HIGHEST: Final = math.inf
 
 
 class Element(msgspec.Struct, frozen=True):
@@ -62,8 +64,8 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
 
     name: str
     unit: str
-    low: float = -math.inf
-    high: float = math.inf
+    low: float = _LOWEST
+    high: float = _HIGHEST
     element: Element | None = None
     shape: tuple[int, ...] = ()
     gain: float = 1.0
@@ -79,6 +81,12 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
             raise LayoutError(f"{self.name}: the gain must be above zero, got {self.gain}.")
         if any(n < 1 for n in self.shape):
             raise LayoutError(f"{self.name}: the shape {self.shape} holds a number below one.")
+        # JSON has no infinity, so infinite bounds are left out; msgspec leaves out what *is* the
+        # default, not what equals it.
+        if self.low == _LOWEST:
+            msgspec.structs.force_setattr(self, "low", _LOWEST)
+        if self.high == _HIGHEST:
+            msgspec.structs.force_setattr(self, "high", _HIGHEST)
 
     def __str__(self) -> str:
         """The name with its unit, as in `torso/z [m]`."""

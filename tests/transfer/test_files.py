@@ -19,7 +19,7 @@ from shapechanger.transfer.files import (
 def test_json_goes_round(tmp_path: Path) -> None:
     """What is written reads back."""
     write_json(tmp_path / "a.json", {"x": [1, 2]})
-    assert read_json(tmp_path / "a.json", dict[str, list[int]]) == {"x": [1, 2]}
+    assert read_json(tmp_path / "a.json", dict[str, list[int]], "try") == {"x": [1, 2]}
 
 
 def test_a_file_appears_whole_or_keeps_what_was_there(
@@ -44,8 +44,8 @@ def test_a_file_that_is_not_what_it_should_be_is_named(tmp_path: Path, content: 
     """The message says which file, and what to do."""
     path = tmp_path / "run.json"
     path.write_bytes(content)
-    with pytest.raises(CorruptStudy, match=r"run\.json cannot be read"):
-        read_json(path, dict[str, int])
+    with pytest.raises(CorruptStudy, match=r"run\.json cannot be read .*: delete it\."):
+        read_json(path, dict[str, int], "delete it")
 
 
 def test_lines_are_added_and_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -21,7 +22,6 @@ from shapechanger.errors import (
     StudyError,
     UnknownName,
 )
-from shapechanger.transfer import files
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
@@ -70,7 +70,7 @@ def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> 
 def test_the_study_file_reads_back(finished: tuple[Study, Path]) -> None:
     """study.json holds all that the study holds."""
     study, out = finished
-    assert read_json(out / STUDY_FILE, Study) == study
+    assert read_json(out / STUDY_FILE, Study, "") == study
     assert json.loads((out / STUDY_FILE).read_text())["command"] == "test"
 
 
@@ -157,16 +157,21 @@ def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: P
     assert not study.of("source")
     assert study.source_return == ()
     assert plan.source_steps == load_policy(policy).card.steps == 64
-    assert study.of("zero-shot")[0].curve[0].mean_return == (
-        finished[0].of("zero-shot")[0].curve[0].mean_return
-    )
+    (unchanged,) = study.of("zero-shot")
+    assert unchanged.curve[0].mean_return == (finished[0].of("zero-shot")[0].curve[0].mean_return)
+    with pytest.raises(StudyError, match="not the one that this study was planned with"):
+        run_study(
+            plan, tmp_path / "study", source_policy=policy_path(finished[1], Run("source", 1))
+        )
 
 
 def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
     """A pendulum's policy is no source for an ant."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
     policy = policy_path(finished[1], Run("source", 0))
-    with pytest.raises(SpaceMismatch, match="does not belong to the source env"):
+    with pytest.raises(
+        SpaceMismatch, match="was trained in shapechanger/Small.*the source is shapechanger/Ant"
+    ):
         tiny_plan(task=ants, source_policy=policy)
 
 
@@ -174,7 +179,7 @@ def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
     """A pendulum is not moved to itself, and nothing is trained for it."""
     with pytest.raises(EmptyShift, match="nothing to transfer across"):
         run_study(tiny_plan(task=TransferTask(BIG, BIG)), tmp_path / "s", executor=Serial())
-    assert not (tmp_path / "s" / "runs").exists()
+    assert not (tmp_path / "s").exists()
 
 
 def test_spaces_that_cannot_be_mapped_are_refused() -> None:
@@ -202,6 +207,8 @@ def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
     """Everything is measured against scratch."""
     with pytest.raises(UnknownName, match="'fine-tune'"):
         tiny_plan(arms=("scratch", "fine-tun"))
+    with pytest.raises(StudyError, match="named once"):
+        tiny_plan(arms=("scratch", "fine-tune", "fine-tune"))
     with pytest.raises(StudyError, match="compares scratch"):
         tiny_plan(arms=("zero-shot", "fine-tune"))
 
@@ -220,7 +227,7 @@ def test_a_folder_of_another_study_is_left_alone(
     shutil.copytree(finished[1], out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
         run_study(tiny_plan(seed=1), out, executor=Serial())
-    assert read_json(out / STUDY_FILE, Study) == finished[0]
+    assert read_json(out / STUDY_FILE, Study, "") == finished[0]
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
@@ -229,6 +236,46 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(ForeignStudy, match="holds other files"):
         run_study(tiny_plan(), tmp_path, executor=Serial())
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_policy_that_was_deleted_is_made_again(
+    finished: tuple[Study, Path], tmp_path: Path
+) -> None:
+    """A source run without its policy is no finished run."""
+    out = tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    (out / "runs" / "source-1" / "policy.zip").unlink()
+    again = run_study(tiny_plan(), out, executor=Serial())
+    assert curves(again) == curves(finished[0])
+    assert (out / "runs" / "source-1" / "policy.zip").exists()
+
+
+@pytest.mark.parametrize("how", ["another run's", "cut short", "empty"])
+def test_a_result_that_is_not_the_runs_own_is_refused(
+    finished: tuple[Study, Path], tmp_path: Path, how: str
+) -> None:
+    """A run.json that was copied or cut counts for nothing, and the message says what to do."""
+    out = tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    path = out / "runs" / "scratch-0" / "run.json"
+    if how == "another run's":
+        shutil.copy(out / "runs" / "scratch-1" / "run.json", path)
+    else:
+        content = json.loads(path.read_text())
+        content["curve"] = content["curve"][:2] if how == "cut short" else []
+        path.write_text(json.dumps(content))
+    with pytest.raises(CorruptStudy, match=r"does not hold the result of scratch-0: delete"):
+        run_study(tiny_plan(), out, executor=Serial())
+
+
+def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """A study that was begun with another MuJoCo is not gone on with."""
+    out = tmp_path / "study"
+    shutil.copytree(finished[1], out)
+    plan = tiny_plan()
+    other = msgspec.structs.replace(plan, versions={**plan.versions, "mujoco": "0.1"})
+    with pytest.raises(ForeignStudy, match="differs in versions"):
+        run_study(other, out, executor=Serial())
 
 
 @pytest.mark.parametrize("name", ["plan.json", "runs/scratch-0/run.json"])
@@ -258,16 +305,16 @@ def test_a_disk_that_runs_full_loses_nothing(
 ) -> None:
     """Runs that had ended are kept, and the study goes on when there is room again."""
     out = tmp_path / "study"
-    write_whole = files.write_whole
+    replace = Path.replace
 
-    def full(path: Path, content: bytes) -> None:
+    def full(path: Path, target: Path) -> Path:
         if path.parent.name == "scratch-1":
-            raise OutputError(f"Cannot write {path}: {errno.errorcode[errno.ENOSPC]}.")
-        write_whole(path, content)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return replace(path, target)
 
     with monkeypatch.context() as patch:
-        patch.setattr(files, "write_whole", full)
-        with pytest.raises(OutputError, match="ENOSPC"):
+        patch.setattr(Path, "replace", full)
+        with pytest.raises(OutputError, match=r"policy\.zip: No space left"):
             run_study(tiny_plan(), out, executor=Serial())
     assert (out / "runs" / "scratch-0" / "run.json").exists()
     assert not (out / "runs" / "scratch-1" / "run.json").exists()

@@ -6,15 +6,26 @@ import ctypes
 import ctypes.util
 import os
 import sys
-from typing import Final
+import warnings
+from importlib import import_module
+from typing import Any, Final
 
 from shapechanger.errors import RenderError
 
-__all__ = ["choose_gl", "has_screen", "require_screen"]
+__all__ = ["choose_gl", "has_screen", "require_context", "require_known_gl", "require_screen"]
+
+_LIBRARIES: Final = ("egl", "osmesa", "glfw")
+# What else MuJoCo takes for MUJOCO_GL, to draw with GLFW or not at all; else it does not load.
+_OTHER_VALUES: Final = (
+    *("", "enable", "enabled", "on", "true", "1", "glx", "wgl", "cgl"),
+    *("disable", "disabled", "off", "false", "0"),
+)
 
 # From the Khronos registry: EGL_EXT_platform_device.
 _EGL_PLATFORM_DEVICE_EXT: Final = 0x313F
 _MOST_DEVICES: Final = 16
+# Pixels of a context that is only tried.
+_PROBE: Final = 16
 
 
 def has_screen() -> bool:
@@ -28,22 +39,26 @@ def require_screen() -> None:
     """Refuse to open a window where there is no screen; GLFW would end the process.
 
     Raises:
-        RenderError: If there is none.
+        RenderError: If there is none, or it does not open.
     """
     if not has_screen():
         raise RenderError(
             "There is no screen to open a window on: make the env with render_mode='rgb_array', "
             "or run the program under `xvfb-run`."
         )
+    _require_glfw()
 
 
 def choose_gl() -> None:
     """Set `MUJOCO_GL` to EGL or OSMesa where there is no screen and nobody has set it.
 
     Raises:
-        RenderError: If neither works.
+        RenderError: If neither works, or somebody has set it to what cannot draw.
     """
-    if os.environ.get("MUJOCO_GL") or has_screen():
+    chosen = os.environ.get("MUJOCO_GL", "")
+    if chosen and chosen not in _LIBRARIES:
+        raise _no_library(chosen)
+    if chosen or has_screen():
         return
     if _egl_works():
         os.environ["MUJOCO_GL"] = "egl"
@@ -54,6 +69,80 @@ def choose_gl() -> None:
             "There is no screen, and neither EGL nor OSMesa to draw without one: on Debian or "
             "Ubuntu run `apt-get install libegl1 libgl1-mesa-dri`, or libosmesa6."
         )
+
+
+def require_known_gl() -> None:
+    """Refuse a `MUJOCO_GL` with which MuJoCo would not load.
+
+    Raises:
+        RenderError: If it is so.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if chosen not in (*_LIBRARIES, *_OTHER_VALUES):
+        raise _no_library(chosen)
+
+
+def require_context() -> None:
+    """Open a context of what draws without a window, and close it again.
+
+    MuJoCo's own errors come late, of many kinds, and GLFW gives none at all.
+
+    Raises:
+        RenderError: If none opens.
+    """
+    library = os.environ.get("MUJOCO_GL") or "glfw"
+    if library == "glfw":
+        _require_glfw()
+        return
+    try:
+        context: Any = import_module(f"mujoco.{library}").GLContext(_PROBE, _PROBE)
+        context.make_current()
+        context.free()
+    except Exception as error:  # Of PyOpenGL, ctypes or MuJoCo, by what is missing.
+        raise RenderError(
+            f"MUJOCO_GL={library} does not draw here ({_first_line(error)}): set it to one of "
+            f"{', '.join(_LIBRARIES)}, or not at all."
+        ) from error
+
+
+def _no_library(chosen: str) -> RenderError:
+    return RenderError(
+        f"MUJOCO_GL={chosen} draws nothing here: set it to one of {', '.join(_LIBRARIES)}, or not "
+        "at all."
+    )
+
+
+def _require_glfw() -> None:
+    """Open a hidden window, and close it again.
+
+    Raises:
+        RenderError: If it does not open.
+    """
+    try:
+        glfw: Any = import_module("glfw")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # What it says is in the error below.
+            window = None
+            if glfw.init() and glfw.get_primary_monitor():
+                glfw.window_hint(glfw.VISIBLE, False)
+                window = glfw.create_window(_PROBE, _PROBE, "", None, None)
+                glfw.default_window_hints()
+            if window:
+                glfw.destroy_window(window)
+                return
+    except ImportError as error:  # Its library is not there.
+        raise RenderError(f"GLFW opens no window here: {_first_line(error)}.") from error
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
+    where = f" on the display {display}" if display else ""
+    raise RenderError(
+        f"GLFW opens no window{where}: set DISPLAY to a display that is there, or unset it and "
+        "MUJOCO_GL to draw without a screen."
+    )
+
+
+def _first_line(error: Exception) -> str:
+    """What an error says, in one line."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
 
 
 def _egl_works() -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import gymnasium as gym
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, MorphologyError
 
 try:
+    import mujoco
     from gymnasium.envs.mujoco.inverted_pendulum_v5 import (
         InvertedPendulumEnv as GymnasiumInvertedPendulumEnv,
     )
@@ -18,8 +19,11 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.embodiments.family import BodyLike
 from shapechanger.embodiments.pendulum import PENDULUM
 from shapechanger.envs.reshapable import Reshapable
+from shapechanger.layout import Feature
 
 __all__ = ["InvertedPendulumEnv"]
+
+_CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -42,3 +46,11 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         self._begin(body, arguments)
         cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
         self._finish(arguments)
+
+    def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
+        if tuple(model.jnt_type[:2]) != _CART_AND_POLE:
+            raise MorphologyError(
+                "A pendulum needs a cart on a slide and a pole on a hinge, in this order: the end "
+                "of an episode is read from the hinge."
+            )
+        return super()._observation_features(model)

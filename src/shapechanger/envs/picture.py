@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shapechanger.envs.headless import choose_gl
 from shapechanger.envs.renderer import Renderer
+from shapechanger.errors import RenderError
 
 __all__ = ["body_reach", "draw"]
 
@@ -24,6 +25,8 @@ _HEADLIGHT: Final = 0.5
 # Where the depth buffer, from 0 to 1, holds nothing.
 _FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
+# Pixels; graphics cards draw no picture much larger than this.
+_LARGEST: Final = 8192
 
 
 def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
@@ -40,8 +43,12 @@ def draw(
     Bodies drawn with the same reach are drawn to the same scale.
 
     Raises:
-        RenderError: If there is no screen and nothing to draw without one.
+        RenderError: If the size is no size, or there is nothing to draw with.
     """
+    if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
+        raise RenderError(
+            f"A picture is 1 to {_LARGEST} pixels wide and high, got {width} x {height}."
+        )
     choose_gl()
     lit = _well_lit(model, width, height)
     data = _posed(lit, pose)

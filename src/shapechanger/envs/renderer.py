@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import weakref
 from typing import Any, cast
 
+import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
+
+from shapechanger.envs.headless import require_context
+from shapechanger.errors import RenderError
 
 __all__ = ["Renderer"]
 
@@ -33,8 +38,17 @@ class Renderer(MujocoRenderer):
         weakref.finalize(self, _free, self._viewers).atexit = False
 
     def render(self, render_mode: str | None) -> Any:
-        """A frame of `render_mode`, as Gymnasium's renderer draws it."""
-        viewer = cast("Any", self._get_viewer(render_mode))
+        """A frame of `render_mode`, as Gymnasium's renderer draws it.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        if render_mode != "human":
+            _require_context_once()
+        try:
+            viewer = cast("Any", self._get_viewer(render_mode))
+        except mujoco.FatalError as error:
+            raise RenderError(f"MuJoCo cannot draw here: {error}.") from error
         viewer.make_context_current()
         if self._follow is not None and self.camera_id == -1:
             viewer.cam.lookat[:] = self.data.xpos[self._follow]
@@ -44,6 +58,12 @@ class Renderer(MujocoRenderer):
         """Free the contexts; the next frame is drawn in a new one."""
         self.viewer = None
         _free(self._viewers)
+
+
+@functools.cache
+def _require_context_once() -> None:
+    """Refuse where no context opens; asked once, because what opens once opens again."""
+    require_context()
 
 
 def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:

@@ -91,6 +91,10 @@ class Reshapable(MujocoEnv):
     def _finish(self, arguments: dict[str, Any]) -> None:
         """What follows from the compiled model, and what a pickle needs to build it again."""
         self._follow_body()
+        if self.observation_space.shape != (self.observation_layout.size,):
+            # Gymnasium has written down the size of its own body's.
+            shape = (self.observation_layout.size,)
+            self.observation_space = gym.spaces.Box(-np.inf, np.inf, shape, np.float64)
         self._renew_renderer()
         # Gymnasium's constructor has recorded its own arguments; these are ours.
         self._ezpickle_args: tuple[Any, ...] = ()

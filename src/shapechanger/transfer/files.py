@@ -10,7 +10,7 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, OutputError
 
-__all__ = ["append_line", "make_folder", "read_json", "read_lines", "write_json", "write_whole"]
+__all__ = ["append_line", "make_folder", "read_json", "write_json", "write_whole"]
 
 _T = TypeVar("_T")
 
@@ -70,8 +70,13 @@ def append_line(path: Path, value: Any) -> None:
         raise _cannot_write(path, error) from error
 
 
-def read_json(path: Path, kind: type[_T]) -> _T:
+def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
     """Read what `write_json` wrote.
+
+    Args:
+        path: The file.
+        kind: What it should hold.
+        remedy: What a user can do if it does not, as the end of a sentence.
 
     Raises:
         CorruptStudy: If the file cannot be read, or is not what it should be.
@@ -79,24 +84,7 @@ def read_json(path: Path, kind: type[_T]) -> _T:
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)
     except (OSError, msgspec.MsgspecError, ValueError) as error:
-        raise CorruptStudy(
-            f"{path} cannot be read ({error}): move it away, or give another --out; "
-            "nothing was changed."
-        ) from error
-
-
-def read_lines(path: Path, kind: type[_T]) -> list[_T]:
-    """Read what `append_line` wrote.
-
-    Raises:
-        CorruptStudy: If the file cannot be read, or is not what it should be.
-    """
-    try:
-        return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()]
-    except (OSError, msgspec.MsgspecError, ValueError) as error:
-        raise CorruptStudy(
-            f"{path} cannot be read ({error}): delete it to run it again."
-        ) from error
+        raise CorruptStudy(f"{path} cannot be read ({error}): {remedy}.") from error
 
 
 def _cannot_write(path: Path, error: OSError) -> OutputError:

@@ -52,7 +52,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         source_policy: SHA-256 of the policy file that was brought along; empty if the study trains
             its own, one for each seed.
         last_k: How many of the last evaluations count as the end of a run.
-        version: Version of Shapechanger.
+        versions: Version of each package that the numbers depend on: a study that goes on with
+            others would mix two kinds of numbers.
 
     Raises:
         StudyError: If there are fewer than two seeds, or nothing to compare.
@@ -69,7 +70,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     seed: int = 0
     source_policy: str = ""
     last_k: int = 3
-    version: str
+    versions: dict[str, str]
 
     def __post_init__(self) -> None:
         if self.seeds < _FEWEST_SEEDS:
@@ -80,6 +81,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         for arm in self.arms:
             if arm not in ARMS:
                 raise UnknownName("arm", arm, ARMS)
+        if len(set(self.arms)) != len(self.arms):
+            raise StudyError(f"Each arm is named once, got {', '.join(self.arms)}.")
         if "scratch" not in self.arms or len(self.arms) < 2:
             raise StudyError("A study compares scratch with at least one other arm.")
 
@@ -89,7 +92,11 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         wanted: list[RunKind] = ["random", *(arm for arm in ARMS if arm in self.arms)]
         if not brought:
             wanted.insert(0, "source")
-        return tuple(Run(kind, i) for kind in wanted for i in range(self.seeds))
+        # One policy that was brought along does the same in every run; one says it all.
+        once = {"zero-shot"} if brought else set[str]()
+        return tuple(
+            Run(kind, i) for kind in wanted for i in range(1 if kind in once else self.seeds)
+        )
 
     def seed_of(self, run: Run) -> int:
         """The seed of a run, independent of every other run's and of what else runs."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from typing import Final
 
 import msgspec
 
+from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.transfer.body_map import MappedEnv
 from shapechanger.transfer.evaluation import Evaluation, evaluate, random_actions
 from shapechanger.transfer.executor import Report
@@ -41,14 +43,24 @@ class RunResult(msgspec.Struct, frozen=True):
     wall_s: float
 
 
-def finished(study: Path, run: Run) -> RunResult | None:
-    """The result of a run; None if it has not ended.
+def finished(plan: Plan, study: Path, run: Run) -> RunResult | None:
+    """The result of a run; None if it has not ended, or its policy is no longer there.
 
     Raises:
-        CorruptStudy: If its file cannot be read.
+        CorruptStudy: If its file cannot be read, or is not that of this run.
     """
     path = run.folder(study) / _RESULT
-    return read_json(path, RunResult) if path.exists() else None
+    trains = run.kind in ("source", "scratch", "fine-tune")
+    if not path.exists() or (trains and not policy_path(study, run).exists()):
+        return None
+    remedy = f"delete {path.parent} to do that run again"
+    result = read_json(path, RunResult, remedy)
+    steps = [evaluation.steps for evaluation in result.curve]
+    last = {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}
+    whole = bool(steps) and steps[0] == 0 and steps[-1] == last.get(run.kind, 0)
+    if result.run != run or result.seed != plan.seed_of(run) or not whole:
+        raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
+    return result
 
 
 def policy_path(study: Path, run: Run) -> Path:
@@ -77,6 +89,11 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
     curve: list[Evaluation] = []
 
     def on_evaluation(evaluation: Evaluation) -> None:
+        if not math.isfinite(evaluation.mean_return):
+            raise StudyError(
+                f"{run.name} diverged: its return after {evaluation.steps} steps is "
+                f"{evaluation.mean_return}. Try a smaller learning rate or a milder body."
+            )
         curve.append(evaluation)
         append_line(folder / _CURVE, evaluation)
 

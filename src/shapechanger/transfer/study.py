@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import ForeignStudy, SpaceMismatch
+from shapechanger.errors import ForeignStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import layouts_of
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
@@ -25,7 +25,7 @@ from shapechanger.transfer.runs import RunResult, finished, perform
 from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.training import require_budget
 
-__all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "make_plan", "run_study", "unfinished"]
+__all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "holds", "make_plan", "run_study", "unfinished"]
 
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
@@ -40,7 +40,6 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         plan: What was done.
         command: The command that did it; empty if it was called from Python.
-        versions: Version of Python and of each package that the numbers depend on.
         machine: What it ran on.
         shift: The certificate of the shift, in words; empty if the envs publish none.
         runs: Every run with its learning curve.
@@ -51,7 +50,6 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     plan: Plan
     command: str
-    versions: dict[str, str]
     machine: str
     shift: str
     runs: tuple[RunResult, ...]
@@ -112,10 +110,13 @@ def make_plan(
     digest = ""
     if source_policy is not None:
         card = load_policy(source_policy).card
-        _require_same_body(card.observation.names, body_map.source_observation.names)
-        _require_same_body(card.action.names, body_map.source_action.names)
+        if card.env != task.source:
+            raise SpaceMismatch(
+                f"The policy that was brought along was trained in {card.env}, and the source is "
+                f"{task.source}: name the env and the body that it was trained in."
+            )
         source_budget = card.steps
-        digest = hashlib.sha256(source_policy.read_bytes()).hexdigest()
+        digest = _digest(source_policy)
     else:
         require_budget(source_budget, settings)
     return Plan(
@@ -129,7 +130,11 @@ def make_plan(
         arms=tuple(arms),
         seed=seed,
         source_policy=digest,
-        version=shapechanger.__version__,
+        versions={
+            "shapechanger": shapechanger.__version__,
+            "python": platform.python_version(),
+            **{name: version_of(name) for name in _PACKAGES},
+        },
     )
 
 
@@ -161,8 +166,11 @@ def run_study(
         ForeignStudy: If `out` holds another study, or something else.
         CorruptStudy: If a file in `out` cannot be read.
     """
-    claim_folder(plan, out)
+    digest = _digest(source_policy) if source_policy is not None else ""
+    if digest != plan.source_policy:
+        raise StudyError("The source policy is not the one that this study was planned with.")
     shift = _shift(plan.task)
+    claim_folder(plan, out)
     jobs = [
         Job(
             run.name,
@@ -174,7 +182,7 @@ def run_study(
     ]
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
-    results = [finished(out, run) for run in plan.runs()]
+    results = [finished(plan, out, run) for run in plan.runs()]
     study = _study(plan, [result for result in results if result is not None], command, shift)
     write_json(out / STUDY_FILE, study)
     return study
@@ -186,7 +194,26 @@ def unfinished(plan: Plan, out: Path) -> tuple[Run, ...]:
     Raises:
         CorruptStudy: If the file of one that has cannot be read.
     """
-    return tuple(run for run in plan.runs() if finished(out, run) is None)
+    return tuple(run for run in plan.runs() if finished(plan, out, run) is None)
+
+
+def holds(plan: Plan, out: Path) -> bool:
+    """Whether `out` is the folder of this study.
+
+    Raises:
+        CorruptStudy: If the plan in it cannot be read.
+    """
+    return (out / PLAN_FILE).exists() and _plan_in(out) == plan
+
+
+def _plan_in(out: Path) -> Plan:
+    remedy = "give another --out, or delete that folder to begin again; nothing was changed"
+    return read_json(out / PLAN_FILE, Plan, remedy)
+
+
+def _digest(policy: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(policy.read_bytes()).hexdigest()
 
 
 def claim_folder(plan: Plan, out: Path) -> None:
@@ -200,11 +227,11 @@ def claim_folder(plan: Plan, out: Path) -> None:
     make_folder(out)
     path = out / PLAN_FILE
     if path.exists():
-        there = read_json(path, Plan)
-        if there != plan:
+        if not holds(plan, out):
+            differs = plan.difference(_plan_in(out))
             raise ForeignStudy(
-                f"{out} holds another study, which differs in {plan.difference(there)}: give "
-                "another --out, or delete that folder."
+                f"{out} holds another study, which differs in {differs}: give another --out, or "
+                "delete that folder."
             )
         return
     if any(out.iterdir()):
@@ -244,20 +271,6 @@ def _shift(task: TransferTask) -> str:
         target.close()
 
 
-def _require_same_body(has: Sequence[str], needs: Sequence[str]) -> None:
-    """Refuse a policy whose layout is not that of the source env.
-
-    Raises:
-        SpaceMismatch: If so.
-    """
-    if tuple(has) != tuple(needs):
-        odd = sorted(set(has) ^ set(needs))
-        raise SpaceMismatch(
-            "The policy that was brought along does not belong to the source env: "
-            f"they differ in {', '.join(odd[:5]) or 'the order of their features'}."
-        )
-
-
 def _after(plan: Plan, run: Run) -> tuple[str, ...]:
     """The runs that must have ended before this one."""
     needs_source = run.kind in ("zero-shot", "fine-tune") and not plan.source_policy
@@ -287,11 +300,6 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
     return Study(
         plan=plan,
         command=command,
-        versions={
-            "shapechanger": plan.version,
-            "python": platform.python_version(),
-            **{name: version_of(name) for name in _PACKAGES},
-        },
         machine=f"{platform.system()} {platform.machine()}",
         shift=shift,
         runs=tuple(results),

@@ -11,6 +11,7 @@ import pytest
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import (
     AddLimb,
+    AddSegment,
     Damping,
     Density,
     Edit,
@@ -19,6 +20,7 @@ from shapechanger.morphology import (
     Mass,
     Remove,
     Stiffness,
+    compile_body,
 )
 from tests.morphology.models import ant, built, leg, limb, mass, spec_of
 
@@ -219,3 +221,20 @@ def test_half_of_the_way() -> None:
     assert mass(built(leg(), Mass("shin", to=3.0).partly(0.5)), "shin") == pytest.approx(
         0.5 * (3.0 + mass(built(leg()), "shin"))
     )
+
+
+def test_a_mass_is_set_on_the_body_it_names_after_others_were_added() -> None:
+    """An edit before it changes the numbers of the bodies, not their names."""
+    spec = ant()
+    foot = AddSegment("shank_1", "foot_1", (0.3, 0.3, 0.0))
+    model = compile_body(spec, (foot, Mass("torso", to=0.5), Mass("foot_1", to=0.1)))
+    np.testing.assert_allclose(model.body("torso").mass[0], 0.5)
+    np.testing.assert_allclose(model.body("foot_1").mass[0], 0.1)
+
+
+@pytest.mark.parametrize("value", [1e300, 2e6])
+def test_values_beyond_all_measure_are_refused(value: float) -> None:
+    """No robot has a mass, gear or damping of more than a million."""
+    for kind in (Mass, Gear, Damping):
+        with pytest.raises(MorphologyError, match="cannot be"):
+            kind("*", to=value)

@@ -52,8 +52,8 @@ def test_limbs_start_where_the_trunk_does() -> None:
         built(ant(), StartHeight("aux_1", 1.0))
 
 
-@pytest.mark.parametrize("height", [math.nan, math.inf])
+@pytest.mark.parametrize("height", [math.nan, math.inf, 1e300])
 def test_heights_are_finite(height: float) -> None:
-    """Nothing starts nowhere."""
-    with pytest.raises(MorphologyError, match="A start height must be finite"):
+    """Nothing starts nowhere, or out of sight."""
+    with pytest.raises(MorphologyError, match="A start height is at most 100 m"):
         StartHeight("trunk", height)

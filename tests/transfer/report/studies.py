@@ -128,12 +128,11 @@ def make_study(
         arms=arms,
         seed=7,
         source_policy="ab" * 32 if brought else "",
-        version="0.1.0",
+        versions={"shapechanger": "0.1.0", "numpy": "2.4.6"},
     )
     return Study(
         plan=plan,
         command=command,
-        versions={"shapechanger": "0.1.0", "numpy": "2.4.0"},
         machine="Linux x86_64",
         shift=shift,
         runs=tuple(run for kind in wanted for run in results(kind, drawn[kind], terms)),

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Damping", "Density", "Friction", "Gear", "Mass", "Stiffness"]
 
+# Beyond this, in any unit here, a value is a typing mistake, and MuJoCo's numbers overflow.
+_LARGEST_VALUE: Final = 1e6
+
 _FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
 
 
@@ -44,7 +47,7 @@ class ValueEdit(Edit, frozen=True, tag=None):
             raise MorphologyError(f"{name} takes either scale or to, got {self}.")
         if self.scale is not None:
             require_factor(f"The scale of {name}", self.scale)
-        if self.to is not None and not self._possible(self.to):
+        if self.to is not None and not (self._possible(self.to) and abs(self.to) <= _LARGEST_VALUE):
             raise MorphologyError(f"{name} cannot be {self.to}.")
 
     @staticmethod
@@ -73,9 +76,10 @@ class Mass(ValueEdit, frozen=True):
         """Change every body that fits."""
         bodies = select("body", self.element, limbs_and_trunks(spec))
         # Only the compiler knows the volume of every shape.
-        masses = spec.copy().compile().body_mass if self.to is not None else None
+        compiled = spec.copy().compile() if self.to is not None else None
         for body in bodies:
-            old = 1.0 if masses is None else float(masses[body.id])
+            # By name: an edit before this one may have changed the numbers of the bodies.
+            old = 1.0 if compiled is None else float(compiled.body(body.name).mass[0])
             if old <= 0.0:
                 raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
             scale_mass(body, self.changed(old) / old)

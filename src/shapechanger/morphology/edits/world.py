@@ -16,6 +16,7 @@ __all__ = ["Gravity", "StartHeight"]
 
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
 _LARGEST_GRAVITY: Final = 250.0
+_LARGEST_HEIGHT_M: Final = 100.0
 
 
 class Gravity(Edit, frozen=True):
@@ -57,8 +58,10 @@ class StartHeight(Edit, frozen=True):
 
     def check(self) -> None:
         """Refuse a height that is no number."""
-        if not math.isfinite(self.to):
-            raise MorphologyError(f"A start height must be finite, got {self.to}.")
+        if not abs(self.to) <= _LARGEST_HEIGHT_M:  # Also refuses NaN.
+            raise MorphologyError(
+                f"A start height is at most {_LARGEST_HEIGHT_M:g} m, got {self.to}."
+            )
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Raise or lower every trunk that fits."""

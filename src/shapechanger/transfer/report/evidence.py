@@ -120,7 +120,7 @@ def provenance(study: Study) -> Html:
         ("Seed", text(f"{plan.seed}, which the seeds of all runs are drawn from")),
         ("Machine", text(study.machine)),
         ("Time", text(f"{_duration(wall_s)} for all runs together; some ran side by side")),
-        ("Versions", text(", ".join(f"{name} {v}" for name, v in study.versions.items()))),
+        ("Versions", text(", ".join(f"{name} {v}" for name, v in study.plan.versions.items()))),
     )
     runs = [
         (
