@@ -169,9 +169,7 @@ def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> No
     """A pendulum's policy is no source for an ant."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
     policy = policy_path(finished[1], Run("source", 0))
-    with pytest.raises(
-        SpaceMismatch, match="was trained in shapechanger/Small.*the source is shapechanger/Ant"
-    ):
+    with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
         tiny_plan(task=ants, source_policy=policy)
 
 

@@ -128,7 +128,7 @@ def make_study(
         arms=arms,
         seed=7,
         source_policy="ab" * 32 if brought else "",
-        versions={"shapechanger": "0.1.0", "numpy": "2.4.6"},
+        versions={"shapechanger": "0.1.0", "numpy": "2.4.0"},
     )
     return Study(
         plan=plan,
