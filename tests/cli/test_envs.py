@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import gymnasium as gym
 import imageio.v3 as iio
+import numpy as np
 import pytest
 
 from shapechanger.cli import main
 from shapechanger.envs import CATALOGUE
+from shapechanger.layout import Element, Feature, Layout
 
 
 def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -78,6 +81,29 @@ def test_render_refuses_a_place_that_cannot_be_written(
     assert "Cannot write" in refused(capsys, "envs", "render", "Ant", "--out", out)
 
 
+class Bracketed(gym.Env[np.ndarray, np.ndarray]):
+    """An env whose names look like markup, and like emoji."""
+
+    observation_space = gym.spaces.Box(-1.0, 1.0, (1,))
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,))
+    observation_layout = Layout(
+        [Feature("[/x]", "m", -1.0, 1.0, element=Element("body", "a/b[c]"))],
+    )
+    action_layout = Layout([Feature("[red]a", ":ant:", -1.0, 1.0)])
+    body = ("[/y]",)
+
+
+def test_names_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """Brackets are no markup."""
+    gym.register("Bracketed-v0", Bracketed, disable_env_checker=True)
+    try:
+        text = said(capsys, "envs", "show", "Bracketed-v0")
+    finally:
+        del gym.registry["Bracketed-v0"]
+    for name in ("[/x]", "body a/b[c]", "[red]a", ":ant:", "body: [/y]"):
+        assert name in text
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -100,6 +126,11 @@ def test_render_refuses_a_place_that_cannot_be_written(
         (("render", "CartPole-v1", "--out", "x.png"), "CartPole-v1 offers no picture"),
         (("show", "CartPole-v1"), "publishes no observation_layout"),
         (("show", "CartPole-v1", "--body", "Ant"), "CartPole-v1 takes no body"),
+        (("show", "a:b:c"), "No environment matches 'a:b:c'"),
+        (("show", ":"), "No environment matches ':'"),
+        (("show", ".a:b"), "No environment matches '.a:b'"),
+        (("render", "Ant", "--out", "x.png", "--width", "-5"), "1 to 8192 pixels"),
+        (("render", "Ant", "--out", "x.png", "--width", "100000000"), "1 to 8192 pixels"),
     ],
 )
 def test_nonsense_gets_one_sentence(

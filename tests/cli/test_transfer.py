@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
+from shapechanger.cli import main, pictures
+from shapechanger.errors import OutputError
 
 COMMAND = [sys.executable, "-c", "from shapechanger.cli import main; main()"]
 QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
@@ -61,7 +62,7 @@ def test_a_study_is_one_command(
     assert 'src="http' not in report
     study = json.loads((out / "study.json").read_text())
     assert "InvertedPendulum" in study["command"]
-    assert study["versions"]["shapechanger"]
+    assert study["plan"]["versions"]["shapechanger"]
 
 
 def test_progress_is_plain_lines_without_a_terminal(
@@ -114,7 +115,7 @@ def test_a_study_that_was_killed_goes_on_to_the_same_numbers(
 
 
 def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
-    """Files may be no larger than 20 kB, and a policy is: what had ended is kept."""
+    """Files may be no larger than 20 kB, and a policy is: what is kept is said."""
     done = run(
         *QUICK,
         "--out",
@@ -124,36 +125,70 @@ def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "Cannot write" in done.stderr
     assert "policy.zip" in done.stderr
-    assert "go on with: shapechanger transfer" in done.stderr
+    ended = list((tmp_path / "study" / "runs").glob("*/run.json"))
+    way_on = "are kept" if ended else "No run had ended; begin again with: shapechanger transfer"
+    assert way_on in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_a_policy_is_trained_played_and_brought_along(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Training writes what play and transfer take; TensorBoard gets its logs."""
-    policy, film = str(tmp_path / "policy.zip"), tmp_path / "film.mp4"
-    logs = tmp_path / "logs"
-    main(
-        [
-            "train",
-            "InvertedPendulum",
-            "--steps",
-            "3072",
-            "--out",
-            policy,
-            "--tensorboard",
-            str(logs),
-        ]
-    )
-    assert "wrote" in capsys.readouterr().out
-    assert list(logs.rglob("events.out.tfevents.*"))
-    out = str(tmp_path / "study")
-    arguments = ["--source-policy", policy, "--steps", "3072", "--seeds", "2", "--out", out]
-    done = run("transfer", "InvertedPendulum", "BigInvertedPendulum", *arguments)
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A policy of the pendulum, with its logs beside it, and what training it printed."""
+    policy = tmp_path_factory.mktemp("trained") / "policy.zip"
+    logs = policy.with_name("logs")
+    files = ["--out", str(policy), "--tensorboard", str(logs)]
+    done = run("train", "InvertedPendulum", "--steps", "3072", *files)
     assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "study" / "runs" / "source-0").exists()
-    assert not film.exists()
+    return policy, done.stdout
+
+
+def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
+    """The file that was asked for, and TensorBoard's."""
+    policy, text = trained
+    assert f"wrote {policy}" in text
+    assert policy.stat().st_size > 0
+    assert list(policy.with_name("logs").rglob("events.out.tfevents.*"))
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("env", ["InvertedPendulum", "BigInvertedPendulum"])
+def test_a_policy_is_played_in_its_body_and_in_another(
+    trained: tuple[Path, str], env: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A film of the policy at work."""
+    film = tmp_path / "film.mp4"
+    main(["play", env, "--policy", str(trained[0]), "--max-steps", "5", "--out", str(film)])
+    assert "episode 0: return" in capsys.readouterr().out
+    assert film.stat().st_size > 0
+
+
+def test_a_policy_is_brought_along(trained: tuple[Path, str], tmp_path: Path) -> None:
+    """A study with it trains no source policies."""
+    out = tmp_path / "study"
+    arguments = ["--source-policy", str(trained[0]), "--steps", "3072", "--seeds", "2"]
+    done = run("transfer", "InvertedPendulum", "BigInvertedPendulum", *arguments, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert (out / "report.html").exists()
+    assert not (out / "runs" / "source-0").exists()
+
+
+def test_another_study_in_the_folder_is_not_counted(
+    quick: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
+    """The folder of one study is refused to another, without a word of runs that had ended."""
+    done = run(*QUICK, "--seed", "1", "--out", str(quick[0]))
+    assert done.returncode == 2
+    assert "holds another study" in done.stderr
+    assert "had ended" not in done.stdout + done.stderr
+
+
+def test_a_study_in_a_file_is_refused_without_a_way_on(tmp_path: Path) -> None:
+    """Nothing is kept where no folder can be."""
+    (tmp_path / "file").touch()
+    done = run(*QUICK, "--out", str(tmp_path / "file"))
+    assert done.returncode == 2
+    assert done.stderr.count("error: Cannot write") == 1
+    assert "ended" not in done.stderr
 
 
 @pytest.mark.gl
@@ -182,6 +217,21 @@ def test_play_makes_a_film_where_there_is_no_screen(
         (["transfer", "Ant", "BigAnt", "--workers", "0"], "at least one worker"),
         (["play", "Ant", "--policy", "none.zip"], "There is no policy file none.zip"),
         (["play", "Ant", "--episodes", "0"], "at least one episode"),
+        (["play", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
+        (["train", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
+        (["transfer", "Ant", "BigAnt", "--seed", "-1"], "A seed is a whole number from 0"),
+        (["transfer", "Ant", "BigAnt", "--quick", "--steps", "0"], "smaller than one evaluation"),
+        (["transfer", "Ant", "BigAnt", "--quick", "--seeds", "0"], "at least 2 seeds"),
+        (["transfer", "Ant", "BigAnt", "--map", "m", "--rule", "a=b"], "leave out --rule"),
+        (["transfer", "Ant", "BigAnt", "--map", "m", "--units", "torque"], "leave out --rule"),
+        (
+            ["transfer", "Ant", "BigAnt", "--arms", "scratch", "fine-tune", "fine-tune"],
+            "--arms names fine-tune more than once",
+        ),
+        (["train", "CartPole-v1"], "publishes no observation_layout"),
+        (["train", "Ant", "--out", "."], "Cannot write .: it is a folder"),
+        (["play", "Ant", "--out", "."], "Cannot write .: it is a folder"),
+        (["play", "Ant", "--out", "film.txt"], "a film ends with one of .avi"),
     ],
 )
 def test_nonsense_gets_one_sentence(
@@ -202,6 +252,48 @@ def test_nonsense_gets_one_sentence(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["train", "Ant", "--tensorboard", "file"],
+        ["train", "Ant", "--out", "file/policy.zip"],
+        ["play", "Ant", "--out", "file/film.mp4"],
+    ],
+)
+def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Nothing has been trained or played by then."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    captured = capsys.readouterr()
+    assert stop.value.code == 2
+    assert captured.err.startswith("error: Cannot write to file")
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_of_what_the_encoder_says_the_first_line_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """FFmpeg adds its command and a page of settings."""
+
+    def fail(*arguments: object, **options: object) -> None:
+        raise OSError("\nNo space left.\n\nFFMPEG COMMAND:\nffmpeg -y")
+
+    monkeypatch.setattr(pictures.iio, "imwrite", fail)
+    film = tmp_path / "film.mp4"
+    with pytest.raises(OutputError) as caught:
+        pictures.write_film([], film, 20.0)
+    assert str(caught.value) == f"Cannot write {film}: No space left."
+
+
 BLOCKED = """
 import sys
 class Blocked:
@@ -220,6 +312,7 @@ main({arguments})
         ("mujoco", "sim", ["envs", "show", "Ant"]),
         ("torch", "learn", ["train", "InvertedPendulum"]),
         ("stable_baselines3", "learn", ["train", "InvertedPendulum"]),
+        ("tensorboard", "learn", ["train", "InvertedPendulum", "--tensorboard", "logs"]),
         ("tyro", "cli", ["envs", "list"]),
         ("rich", "cli", ["envs", "list"]),
         ("imageio", "sim", ["envs", "render", "Ant", "--out", "ant.png"]),

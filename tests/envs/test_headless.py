@@ -119,10 +119,20 @@ def test_a_sentence_says_what_to_install(broken: str) -> None:
     )
 
 
-@pytest.mark.parametrize("choice", ["egl", "osmesa", "glfw", "whatever"])
+@pytest.mark.parametrize("choice", ["egl", "osmesa", "glfw"])
 def test_the_choice_of_the_user_stands(choice: str) -> None:
     """Whoever sets `MUJOCO_GL` knows better."""
     assert _says(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
+
+
+@pytest.mark.parametrize("choice", ["whatever", "disable", "EGL"])
+def test_a_choice_that_does_not_draw_is_refused(choice: str) -> None:
+    """The sentence names those that do."""
+    run = run_python(_CHOOSE, MUJOCO_GL=choice)
+    assert run.stderr.splitlines()[-1] == (
+        f"shapechanger.errors.RenderError: MUJOCO_GL={choice} draws nothing here: set it to one of "
+        "egl, osmesa, glfw, or not at all."
+    )
 
 
 @pytest.mark.parametrize("name", ["DISPLAY", "WAYLAND_DISPLAY"])
@@ -170,6 +180,28 @@ def test_a_window_without_a_screen_is_refused_in_a_sentence() -> None:
             "There is no screen to open a window on: make the env with render_mode='rgb_array', "
             "or run the program under `xvfb-run`."
         )
+
+
+def test_a_display_that_does_not_open_is_refused_in_a_sentence() -> None:
+    """GLFW would end the process at the first window, and MuJoCo speak of its platform library."""
+    window, picture = (
+        _says(_MAKE.format(asks="") + _REFUSED.format(statement=statement), DISPLAY=":77")
+        for statement in (
+            "gym.make('shapechanger/Ant-v1', render_mode='human')",
+            "gym.make('shapechanger/Ant-v1').unwrapped.picture()",
+        )
+    )
+    assert window == picture
+    assert window.startswith("GLFW opens no window on the display :77")
+
+
+@pytest.mark.parametrize(("width", "height"), [(-5, 48), (64, 0), (100_000_000, 48)])
+def test_a_picture_of_no_size_is_refused(width: int, height: int) -> None:
+    """Before anything is made that large."""
+    statement = f"gym.make('shapechanger/Ant-v1').unwrapped.picture({width}, {height})"
+    assert _says(_MAKE.format(asks="") + _REFUSED.format(statement=statement)) == (
+        f"A picture is 1 to 8192 pixels wide and high, got {width} x {height}."
+    )
 
 
 _DRAW = """

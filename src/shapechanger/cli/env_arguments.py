@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import gymnasium as gym
 
 from shapechanger.envs.catalogue import CATALOGUE, find
-from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.envs.headless import require_known_gl
+from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["asked", "default_learner", "env_ref", "opened"]
+__all__ = ["asked", "default_learner", "env_ref", "opened", "require_seed"]
+
+# The largest that PyTorch and NumPy both take.
+_LARGEST_SEED: Final = 2**32 - 1
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
@@ -25,12 +29,14 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
     Raises:
         UnknownName: If no env has this id.
         MorphologyError: If a body is given to an env that takes none.
+        RenderError: If `MUJOCO_GL` keeps every env from being made.
     """
+    require_known_gl()
     try:
         full = find(env_id).id
     except UnknownName:
         # Envs of others count too, as `module:id` or once registered; `make` looks again.
-        if ":" not in env_id and env_id not in gym.registry:
+        if not _has_module(env_id) and env_id not in gym.registry:
             raise
         full = env_id
         if body:
@@ -71,3 +77,20 @@ def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
         yield made
     finally:
         made.close()
+
+
+def require_seed(seed: int) -> None:
+    """Refuse a seed that not everything random takes.
+
+    Raises:
+        StudyError: If it is negative or too large.
+    """
+    if not 0 <= seed <= _LARGEST_SEED:
+        raise StudyError(f"A seed is a whole number from 0 to {_LARGEST_SEED}, got {seed}.")
+
+
+def _has_module(env_id: str) -> bool:
+    """Whether an id is written `module:id`."""
+    module, _, name = env_id.partition(":")
+    named = all(part.isidentifier() for part in module.split("."))
+    return named and bool(name) and ":" not in name

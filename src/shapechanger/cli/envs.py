@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Annotated, Any, cast
 
 import tyro
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import asked, env_ref, opened
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.layout import Layout
@@ -29,7 +30,7 @@ class ListEnvs:
         table = Table("id", "body", box=None, pad_edge=False)
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
-        Console().print(table)
+        plain_console().print(table)
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Show:
         """Print both layouts and what follows from the body."""
         with opened(env_ref(self.env, self.body)) as env:
             observation, action = layouts_of(env)
-            console = Console()
+            console = plain_console()
             console.print(_layout_table("action", action))
             console.print(_layout_table("observation", observation))
             for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
@@ -75,7 +76,7 @@ class Compare:
         ):
             asked(target, "certify_shift")
             certificate = asked(source, "certify_shift")(source, target)
-            Console(soft_wrap=True, highlight=False).print(str(certificate), markup=False)
+            plain_console().print(str(certificate), soft_wrap=True)
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Check:
 
         ref = env_ref(self.env, self.body)
         for question in examine(ref.make):
-            Console().print(f"[green]kept[/green]  {question}")
+            plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class Render:
         with opened(env_ref(self.env, self.body)) as env:
             picture = asked(env, "picture")(self.width, self.height)
             write_picture(picture, self.out)
-        Console().print(f"wrote {self.out}", highlight=False)
+        plain_console().print(f"wrote {self.out}")
 
 
 @dataclass(frozen=True)

@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Final
+from typing import Annotated, Final, NoReturn
 
 from shapechanger.errors import MissingExtra, ShapechangerError
-
-try:
-    import tyro
-    from rich.console import Console
-except ImportError:  # pragma: no cover  # Seen by a process of its own in the tests.
-    sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
-
-from shapechanger.cli.envs import Envs
-from shapechanger.cli.play import Play
-from shapechanger.cli.stopping import Interrupted
-from shapechanger.cli.train import Train
-from shapechanger.cli.transfer import Transfer
-
-__all__ = ["main"]
 
 # What shells give for a program that Ctrl-C has ended (128 plus SIGINT), and for wrong usage.
 _INTERRUPTED: Final = 130
 _WRONG_USAGE: Final = 2
+
+# Ctrl-C may come while all this loads.
+try:
+    import gymnasium as gym
+
+    try:
+        import tyro
+
+        from shapechanger.cli.console import plain_console
+    except ImportError:  # pragma: no cover  # Seen by a process of its own in the tests.
+        sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
+
+    from shapechanger.cli.envs import Envs
+    from shapechanger.cli.play import Play
+    from shapechanger.cli.stopping import Interrupted
+    from shapechanger.cli.train import Train
+    from shapechanger.cli.transfer import Transfer
+except KeyboardInterrupt:  # pragma: no cover  # Seen by a process of its own in the tests.
+    print("Stopped.", file=sys.stderr)
+    sys.exit(_INTERRUPTED)
+
+__all__ = ["main"]
 
 _Command = (
     Annotated[Envs, tyro.conf.subcommand("envs")]
@@ -40,22 +49,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Exits with 0 when it was done, 2 with one sentence on the standard error when it was asked
     wrongly or cannot be done here, and 130 after Ctrl-C.
     """
-    command = tyro.cli(
-        _Command,
-        prog="shapechanger",
-        description="Learn a skill in one body, move it to another, and measure the gain.",
-        args=arguments,
-        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
-    )
-    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    for stream in (sys.stdout, sys.stderr):
+        # Where the encoding lacks a letter, a question mark is better than no answer.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
+        command = tyro.cli(
+            _Command,
+            prog="shapechanger",
+            description="Learn a skill in one body, move it to another, and measure the gain.",
+            args=arguments,
+            config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
+        )
         command.run()
     except ShapechangerError as error:
-        console.print(f"error: {error}")
-        sys.exit(_WRONG_USAGE)
+        _stop(f"error: {error}", _WRONG_USAGE)
+    except gym.error.Error as error:
+        # Of the envs of others, such as one that draws with a package that is not there.
+        _stop(
+            f"error: {(str(error).strip().splitlines() or [type(error).__name__])[0]}", _WRONG_USAGE
+        )
     except Interrupted as stop:
-        console.print(str(stop))
-        sys.exit(_INTERRUPTED)
+        _stop(str(stop), _INTERRUPTED)
     except KeyboardInterrupt:
-        console.print("Stopped.")
-        sys.exit(_INTERRUPTED)
+        _stop("Stopped.", _INTERRUPTED)
+
+
+def _stop(message: str, code: int) -> NoReturn:
+    """Say why, and end."""
+    plain_console(stderr=True).print(message, soft_wrap=True)
+    sys.exit(code)

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.transfer.files import make_folder
 
 try:
     import imageio.v3 as iio
 except ImportError as error:
     raise MissingExtra("imageio", "sim") from error
 
-__all__ = ["write_film", "write_picture"]
+__all__ = ["require_film", "write_film", "write_picture"]
+
+_FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4")
+
+
+def require_film(path: Path) -> None:
+    """Refuse a file that no film can be written to, before there is one.
+
+    Raises:
+        OutputError: If it is a folder, its folder cannot be written, or its name has no ending of
+            a film.
+    """
+    if path.is_dir():
+        raise OutputError(f"Cannot write {path}: it is a folder.")
+    if path.suffix.lower() not in _FILMS:
+        raise OutputError(f"Cannot write {path}: a film ends with one of {', '.join(_FILMS)}.")
+    make_folder(path.parent)
 
 
 def write_picture(picture: NDArray[Any], path: Path) -> None:
@@ -40,4 +57,6 @@ def _write(path: Path, content: Any, **options: Any) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         cast("Any", iio).imwrite(path, content, **options)
     except (OSError, ValueError) as error:
-        raise OutputError(f"Cannot write {path}: {error}.") from error
+        # The encoder adds its command and all that it printed.
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
+        raise OutputError(f"Cannot write {path}: {reason}.") from error

@@ -9,9 +9,9 @@ from typing import Annotated, Any, cast
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from rich.console import Console
 
-from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import env_ref, opened, require_seed
 from shapechanger.envs.headless import has_screen
 from shapechanger.errors import StudyError
 
@@ -40,10 +40,15 @@ class Play:
 
     def run(self) -> None:
         """Play, and say what it was worth."""
+        require_seed(self.seed)
         if self.episodes < 1 or self.max_steps < 1:
             raise StudyError("Playing takes at least one episode of one step.")
         out = self.out or (None if has_screen() else Path("play.mp4"))
-        console = Console(highlight=False)
+        if out is not None:
+            from shapechanger.cli.pictures import require_film
+
+            require_film(out)
+        console = plain_console()
         frames: list[NDArray[Any]] = []
         mode = "human" if out is None else "rgb_array"
         with opened(env_ref(self.env, self.body), render_mode=mode) as env:

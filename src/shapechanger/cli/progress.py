@@ -16,6 +16,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from shapechanger.cli.console import plain_console
+
 __all__ = ["StudyProgress"]
 
 _LINE_EVERY_S: Final = 10.0
@@ -34,7 +36,7 @@ class StudyProgress:
         self._steps = steps
         self._done = dict.fromkeys(steps, 0)
         self._ended: set[str] = set()
-        self._console = console or Console(stderr=True, highlight=False)
+        self._console = console or plain_console(stderr=True)
         self._began = time.monotonic()
         self._last_line = self._began
         self._bar: Progress | None = None

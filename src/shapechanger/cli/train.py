@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
-from shapechanger.cli.env_arguments import default_learner, env_ref
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import default_learner, env_ref, opened, require_seed
 from shapechanger.cli.progress import StudyProgress
 from shapechanger.cli.stopping import Interrupted
+from shapechanger.errors import MissingExtra, OutputError
 
 __all__ = ["Train"]
 
@@ -37,21 +39,31 @@ class Train:
 
     def run(self) -> None:
         """Train, showing the evaluations as they come."""
+        from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.evaluation import Evaluation
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.policy_file import save_policy
         from shapechanger.transfer.settings import learner_settings
         from shapechanger.transfer.training import require_budget, train, use_one_thread
 
+        require_seed(self.seed)
         env = env_ref(self.env, self.body)
         learner = self.learner or default_learner(env)
         settings = learner_settings(learner)
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
         out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
+        # The policy is written last; what would keep it from being written is said first.
+        with opened(env) as made:
+            layouts_of(made)
+        if out.is_dir():
+            raise OutputError(f"Cannot write {out}: it is a folder.")
+        if self.tensorboard is not None:
+            _require_tensorboard()
+            make_folder(self.tensorboard)
         make_folder(out.parent)
         use_one_thread()
-        console = Console(highlight=False)
+        console = plain_console()
 
         def show(result: Evaluation) -> None:
             terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())
@@ -76,3 +88,15 @@ class Train:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         save_policy(policy, out)
         console.print(f"wrote {out}")
+
+
+def _require_tensorboard() -> None:
+    """Refuse to write logs without what writes them.
+
+    Raises:
+        MissingExtra: If it is not installed.
+    """
+    try:
+        import_module("torch.utils.tensorboard")
+    except ImportError as error:
+        raise MissingExtra("tensorboard", "learn") from error

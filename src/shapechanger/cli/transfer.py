@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
 import tyro
-from rich.console import Console
 from rich.table import Table
 
-from shapechanger.cli.env_arguments import default_learner, env_ref, opened
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import default_learner, env_ref, opened, require_seed
 from shapechanger.cli.progress import StudyProgress
 from shapechanger.cli.stopping import Interrupted
-from shapechanger.errors import MapError, OutputError, RenderError
+from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from shapechanger.transfer.plan import Plan
     from shapechanger.transfer.study import Study
 
@@ -82,16 +84,17 @@ class Transfer:
     def run(self) -> None:
         """Do the study, print its table, and write its report."""
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.study import run_study, unfinished
+        from shapechanger.transfer.study import holds, run_study, unfinished
 
+        self._require_sense()
         # The report comes last; if what draws it is missing, say so before the work.
         import_module("shapechanger.transfer.report.curves")
         # A file has no width of its own; a table in it should not be folded.
-        console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
+        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
         plan = self._plan()
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
-        to_do = unfinished(plan, out)
+        to_do = unfinished(plan, out) if holds(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
             console.print(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
         steps = {run.name: _steps(plan, run.kind) for run in to_do}
@@ -106,16 +109,29 @@ class Transfer:
                     command=_command(),
                 )
         except KeyboardInterrupt:
-            raise Interrupted(
-                f"Stopped. Runs that had ended are kept in {out}; go on with: {_command()}"
-            ) from None
+            raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
         except OutputError as error:
-            raise OutputError(
-                f"{error} Runs that had ended are kept in {out}; go on with: {_command()}"
-            ) from error
+            raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
         _print(console, study)
         report = self._report(study, out)
         console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
+
+    def _require_sense(self) -> None:
+        """Refuse options that contradict one another, or of which one would be dropped.
+
+        Raises:
+            StudyError: If a seed or an arm cannot be.
+            MapError: If the body map is given twice.
+        """
+        require_seed(self.seed)
+        twice = sorted({arm for arm in self.arms if self.arms.count(arm) > 1})
+        if twice:
+            raise StudyError(f"--arms names {', '.join(twice)} more than once.")
+        if self.map and (self.rule or self.units != "same"):
+            raise MapError(
+                "The file of --map says all of the body map: leave out --rule and --units, or "
+                "--map."
+            )
 
     def _plan(self) -> Plan:
         """What to do."""
@@ -134,8 +150,8 @@ class Transfer:
             settings = msgspec.structs.replace(
                 settings, eval_every=min(settings.eval_every, settings.whole_updates(shortest // 4))
             )
-            steps = steps or shortest
-            seeds = seeds or _QUICK_SEEDS
+            steps = shortest if steps is None else steps
+            seeds = _QUICK_SEEDS if seeds is None else seeds
         return make_plan(
             task,
             learner,
@@ -209,6 +225,17 @@ def _steps(plan: Plan, kind: str) -> int:
     return {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}.get(
         kind, 1
     )
+
+
+def _way_on(plan: Plan, out: Path) -> str:
+    """What is kept of a study that was cut off, and how to go on; empty if it had not begun."""
+    from shapechanger.transfer.study import holds, unfinished
+
+    if not holds(plan, out):
+        return ""
+    if len(unfinished(plan, out)) == len(plan.runs()):
+        return f"No run had ended; begin again with: {_command()}"
+    return f"Runs that had ended are kept in {out}; go on with: {_command()}"
 
 
 def _command() -> str:

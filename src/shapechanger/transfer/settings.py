@@ -70,7 +70,7 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 # `ppo-balance` was tuned on the three inverted pendulums, which it solves within 24,576 steps.
 # `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
-# return of 2,215, after 1,048,576 steps.
+# return of 2,215, after 1,048,576 steps (benchmarks/results/train-ant.txt).
 LEARNERS: Final[dict[str, LearnerSettings]] = {
     "ppo-balance": LearnerSettings(
         n_envs=16,

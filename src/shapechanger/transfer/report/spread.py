@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from shapechanger.transfer.report.numbers import interval_text
+from shapechanger.transfer.report.numbers import interval_text, number
 
 __all__ = ["CONFIDENCE", "Spread", "spread_text", "t_interval"]
 
@@ -33,10 +33,13 @@ def t_interval(samples: NDArray[np.float64]) -> Spread:
     """Student's t-interval of the mean over seeds, mean ± t(0.95, n - 1) · s / sqrt(n).
 
     Args:
-        samples: One row for each seed, shape (n_seeds, n), n_seeds >= 2.
+        samples: One row for each seed, shape (n_seeds, n). One seed has no interval: both ends are
+            its mean.
     """
     n_seeds = samples.shape[0]
     mean = samples.mean(axis=0)
+    if n_seeds == 1:
+        return Spread(mean, mean, mean)
     error = samples.std(axis=0, ddof=1) / np.sqrt(n_seeds)
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, n_seeds - 1)) * error
     return Spread(mean, mean - half, mean + half)
@@ -48,5 +51,7 @@ def spread_text(values: NDArray[np.float64]) -> str:
     Args:
         values: Shape (n_seeds,).
     """
+    if values.size == 1:
+        return f"{number(float(values[0]))} (no interval)"
     mean, low, high = (float(x[0]) for x in t_interval(values[:, np.newaxis]))
     return interval_text(mean, low, high)

@@ -1,0 +1,97 @@
+"""What the machine, the environment variables and Ctrl-C do to any command."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.envs.drawing import run_python
+
+COMMAND = "from shapechanger.cli import main; main({arguments!r})"
+INTERRUPTED = """
+import sys
+class CtrlC:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, CtrlC())
+"""
+
+
+@pytest.mark.parametrize("name", ["tyro", "shapechanger.cli.train", "mujoco"])
+def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
+    """Exit code 130, no traceback."""
+    code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "show", "Ant"])
+    done = run_python(code)
+    assert done.returncode == 130
+    assert done.stderr == "Stopped.\n"
+
+
+def test_an_encoding_without_the_letters_is_no_error() -> None:
+    """A table in ASCII, with question marks where letters are missing."""
+    arguments = ["envs", "show", "InvertedPendulum"]
+    done = run_python(COMMAND.format(arguments=arguments), PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "hinge/velocity" in done.stdout
+    assert done.stdout.isascii()
+    message = run_python(
+        COMMAND.format(arguments=["envs", "show", "Ä"]), PYTHONIOENCODING="ascii"
+    ).stderr
+    assert message.startswith("error: No environment matches '?'")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Elsewhere there is always a screen.")
+@pytest.mark.parametrize(
+    ("arguments", "variables", "words"),
+    [
+        (["envs", "show", "Ant"], {"MUJOCO_GL": "nonsense"}, "one of egl, osmesa, glfw"),
+        (
+            ["envs", "render", "Ant", "--out", "ant.png"],
+            {"MUJOCO_GL": "disable"},
+            "MUJOCO_GL=disable draws nothing here: set it to one of egl, osmesa, glfw",
+        ),
+        (["play", "Ant", "--out", "a.mp4"], {"MUJOCO_GL": "nonsense"}, "egl, osmesa, glfw"),
+        (
+            ["envs", "render", "Ant", "--out", "ant.png"],
+            {"DISPLAY": ":77"},
+            "GLFW opens no window on the display :77",
+        ),
+        (["play", "Ant"], {"DISPLAY": ":77"}, "GLFW opens no window on the display :77"),
+        (
+            ["envs", "render", "Ant", "--out", "ant.png"],
+            {"MUJOCO_GL": "glfw"},
+            "GLFW opens no window: set DISPLAY",
+        ),
+    ],
+)
+def test_what_cannot_draw_is_one_sentence(
+    arguments: list[str],
+    variables: dict[str, str],
+    words: str,
+    tmp_path: os.PathLike[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither a traceback nor the end of the process by GLFW."""
+    monkeypatch.chdir(tmp_path)
+    done = run_python(COMMAND.format(arguments=arguments), **variables)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert words in done.stderr
+    assert not os.listdir(tmp_path)
+
+
+def test_an_env_of_others_that_cannot_draw_is_one_sentence(tmp_path: os.PathLike[str]) -> None:
+    """Gymnasium's classic control draws with pygame, which we do not bring."""
+    code = (
+        "import sys; sys.modules['pygame'] = None\n"
+        "from shapechanger.cli import main\n"
+        f"main(['play', 'CartPole-v1', '--out', {str(tmp_path) + '/film.mp4'!r}])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: pygame is not installed")
+    assert done.stderr.count("\n") == 1

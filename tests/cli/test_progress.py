@@ -1,0 +1,34 @@
+"""The progress of long work on a terminal."""
+
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from shapechanger.cli.progress import StudyProgress
+
+
+def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
+    """How many runs have ended, how much is done, and how long the rest takes."""
+    screen = io.StringIO()
+    console = Console(force_terminal=True, file=screen, width=120, legacy_windows=False)
+    with StudyProgress({"scratch-0": 100, "scratch-1": 100}, console) as progress:
+        progress("scratch-0", 50, False)
+        progress("scratch-0", 100, True)
+    shown = screen.getvalue()
+    assert "1/2 runs" in shown
+    assert "━" in shown
+    assert "50 %" in shown
+    assert "100/200" in shown
+    assert "left:" in shown
+    assert "\x1b" in shown
+
+
+def test_elsewhere_it_is_lines() -> None:
+    """Without control characters, and with names as they are."""
+    file = io.StringIO()
+    with StudyProgress({"[/x]": 100, "b": 300}, Console(file=file, markup=False)) as progress:
+        progress("[/x]", 100, True)
+    assert file.getvalue().startswith("[/x] ended; 1 of 2 runs, 25 % of the steps")
+    assert "\x1b" not in file.getvalue()
