@@ -103,7 +103,7 @@ def test_a_study_that_was_killed_goes_on_to_the_same_numbers(
     # Ctrl-C reaches every process of the terminal; a kill only the one.
     (os.killpg if how == signal.SIGINT else os.kill)(process.pid, how)
     _, message = process.communicate()
-    assert not (out / "runs" / "scratch-0" / "run.json").exists()
+    assert not (out / "study.json").exists()
     if how == signal.SIGINT:
         assert process.returncode == 130
         assert "go on with: shapechanger transfer" in message

@@ -9,6 +9,13 @@
 
 from __future__ import annotations
 
+from shapechanger.errors import MissingExtra
+
+try:
+    import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]  # Said here, in words.
+except ImportError as error:
+    raise MissingExtra("mujoco", "sim") from error
+
 from shapechanger.morphology.codec import EDITS, Body, as_body, from_json, to_json
 from shapechanger.morphology.edits import (
     AddLimb,
