@@ -287,7 +287,7 @@ def _values(kind: Any, to: st.SearchStrategy[float], **more: Any) -> st.SearchSt
     return st.builds(kind, scale=RATIOS, **fields) | st.builds(kind, to=to, **fields)
 
 
-_ABOVE_ZERO = st.floats(1e-9, 1e9)
+_ABOVE_ZERO = st.floats(1e-9, 1e6)
 _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
     Stretch: st.builds(
         Stretch, _NAMES, RATIOS, st.sampled_from([None, "x", "y", "z"]), amount=_AMOUNTS
@@ -319,7 +319,7 @@ _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
     AddLimb: st.builds(AddLimb, _NAMES, _NAMES, NUMBERS, RATIOS, amount=_AMOUNTS),
     Mass: _values(Mass, _ABOVE_ZERO),
     Density: _values(Density, _ABOVE_ZERO),
-    Gear: _values(Gear, NUMBERS.filter(bool)),
+    Gear: _values(Gear, st.floats(-1e6, 1e6).filter(bool)),
     Damping: _values(Damping, _ABOVE_ZERO),
     Stiffness: _values(Stiffness, _ABOVE_ZERO),
     Friction: _values(
@@ -336,7 +336,7 @@ _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
     ),
     Lock: st.builds(Lock, _NAMES, st.none() | NUMBERS, amount=_AMOUNTS),
     Gravity: st.builds(Gravity, _VECTORS, amount=_AMOUNTS),
-    StartHeight: st.builds(StartHeight, _NAMES, NUMBERS, amount=_AMOUNTS),
+    StartHeight: st.builds(StartHeight, _NAMES, st.floats(-100.0, 100.0), amount=_AMOUNTS),
 }
 
 
