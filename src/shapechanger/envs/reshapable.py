@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Reshapable"]
 
-# How far the camera is from a body that it follows; 4 m for the ant, as in Gymnasium.
+# How far the camera is from a body that it follows; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
 
 
