@@ -68,9 +68,9 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
 
-# `ppo-balance` was tuned on InvertedPendulum and BigInvertedPendulum: within 24,576 steps the latter
-# ends at 1,000 on 5 of 5 seeds (benchmarks/results/demo.json). SmallInvertedPendulum is harder: it
-# reaches 1,000 on both of two seeds tried, and one of them has fallen to 744 at the end.
+# `ppo-balance` was tuned on InvertedPendulum and BigInvertedPendulum: within 24,576 steps the
+# latter ends at 1,000 on 5 of 5 seeds (benchmarks/results/demo.json). SmallInvertedPendulum is
+# harder: both of two seeds tried reach 1,000, and one of them has fallen to 744 at the end.
 # `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
 # return of 2,215, after 1,048,576 steps (benchmarks/results/train-ant.txt).
 LEARNERS: Final[dict[str, LearnerSettings]] = {
