@@ -13,6 +13,11 @@ ShapechangerError
 ├── StudyError (ValueError)         a study that cannot start
 │   ├── ForeignStudy                the output folder belongs to something else
 │   └── CorruptStudy                a file of the study cannot be read
+├── LinkError (ConnectionError)     a robot that cannot be reached, or does not understand
+│   ├── RobotRefused                the robot says no, and why
+│   └── StaleObservation            the newest observation is too old to act on
+├── RobotError (RuntimeError)       the robot's own side: a device that does not answer
+│   └── ProfileError (ValueError)   a profile that contradicts itself, with the line
 ├── OutputError (OSError)           a file or folder that cannot be written
 ├── RenderError (RuntimeError)      no picture can be drawn here
 └── MissingExtra (ImportError)      an optional dependency, and the command that installs it
@@ -34,13 +39,18 @@ __all__ = [
     "EmptyShift",
     "ForeignStudy",
     "LayoutError",
+    "LinkError",
     "MapError",
     "MissingExtra",
     "MorphologyError",
     "OutputError",
+    "ProfileError",
     "RenderError",
+    "RobotError",
+    "RobotRefused",
     "ShapechangerError",
     "SpaceMismatch",
+    "StaleObservation",
     "StudyError",
     "TransplantError",
     "UnknownName",
@@ -114,6 +124,26 @@ class ForeignStudy(StudyError):
 
 class CorruptStudy(StudyError):
     """A file of the study cannot be read."""
+
+
+class LinkError(ShapechangerError, ConnectionError):
+    """A robot that cannot be reached, or that does not understand."""
+
+
+class RobotRefused(LinkError):
+    """The robot says no; the message says why."""
+
+
+class StaleObservation(LinkError):
+    """The newest observation is too old to act on."""
+
+
+class RobotError(ShapechangerError, RuntimeError):
+    """A device of the robot does not answer, or answers nonsense."""
+
+
+class ProfileError(RobotError, ValueError):
+    """A profile that contradicts itself; the message names the file and the line."""
 
 
 class OutputError(ShapechangerError, OSError):

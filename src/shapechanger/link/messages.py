@@ -1,0 +1,375 @@
+"""The messages between a program or a person and a robot, one binary WebSocket message each.
+
+A message is a msgpack map with its kind under `kind`; JPEG bytes travel as they are. Unknown keys
+are ignored, so that a newer minor version can be understood; unknown kinds are refused.
+
+How a connection goes:
+
+```
+robot   Challenge          who I am, which version, a nonce
+client  Hello              which version, who I am, the proof that I hold the key
+robot   Welcome | Refused  what I sense and move; or why not, and the connection ends
+client  Take               may I command? Answered by Lease
+client  Arm                (a person, by default) the outputs may move from now on
+robot   Observation        the newest one, each time the client has credit
+client  Command            what to do, in answer to which observation; gives credit for the next
+```
+
+Times are nanoseconds of the robot's monotonic clock. Two machines' clocks are never subtracted: how
+late a command is follows from the observation that it answers, because the robot knows when it
+sent that one.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from shapechanger.errors import LinkError
+
+__all__ = [
+    "MAX_CLIENT_MESSAGE",
+    "MAX_ROBOT_MESSAGE",
+    "VERSION",
+    "Acknowledge",
+    "Arm",
+    "Challenge",
+    "ClientMessage",
+    "Command",
+    "Disarm",
+    "EmergencyStop",
+    "Event",
+    "Hello",
+    "Lease",
+    "Observation",
+    "Ping",
+    "Pong",
+    "Refused",
+    "Release",
+    "RobotMessage",
+    "Role",
+    "Take",
+    "Welcome",
+    "decode_client_message",
+    "decode_robot_message",
+    "encode",
+]
+
+VERSION: Final = 1
+"""Version of the messages; both sides must have the same."""
+
+MAX_CLIENT_MESSAGE: Final = 64 * 1024
+"""Bytes of the largest message that a robot reads; a larger one is an attack or a bug."""
+
+MAX_ROBOT_MESSAGE: Final = 4 * 1024 * 1024
+"""Bytes of the largest message that a client reads."""
+
+Role = Literal["person", "program"]
+"""Who drives. A person takes the robot from a program at once; never the other way round."""
+
+Pace = Literal["realtime", "lockstep"]
+"""Who keeps the time: the robot and the client each on their own, or the robot waits for a command
+and answers with the observation one control period later."""
+
+_M = TypeVar("_M")
+
+# Names come from people, and end up in logs and on screens.
+_Name = Annotated[str, Meta(max_length=64)]
+_Words = Annotated[str, Meta(max_length=1024)]
+_Sequence = Annotated[int, Meta(ge=0, le=2**53)]
+_Values = Annotated[tuple[float, ...], Meta(max_length=64)]
+
+
+class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_only=True):
+    """Something that is said in one go."""
+
+
+# What a client says.
+
+
+class Hello(_Message, frozen=True):
+    """The first message of a client.
+
+    Attributes:
+        version: Version of the messages that the client speaks.
+        proof: Answer to the challenge, see `shapechanger.link.proof`.
+        name: Who it is, for people to read.
+        role: Who drives.
+        pace: Who keeps the time.
+        frames: Whether observations shall carry pictures.
+    """
+
+    version: int
+    proof: Annotated[bytes, Meta(max_length=64)]
+    name: _Name = ""
+    role: Role = "program"
+    pace: Pace = "realtime"
+    frames: bool = True
+
+
+class Command(_Message, frozen=True):
+    """What the robot shall do until the next command, or until it is too old.
+
+    Attributes:
+        seq: Number of the command; each is larger than the one before.
+        answers: `seq` of the observation that it was decided on.
+        values: One number for each action of the robot, in the order of its action layout.
+        ttl_ms: How long the command may act, counted from its arrival; the robot's own deadline
+            holds where it is shorter.
+        scale: The client's own cap, 0 to 1, times the values; it can only lower what the robot
+            allows.
+    """
+
+    seq: _Sequence
+    answers: _Sequence
+    values: _Values
+    ttl_ms: Annotated[int, Meta(ge=1, le=60_000)] = 1_000
+    scale: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+
+
+class Acknowledge(_Message, frozen=True):
+    """Asks for the next observation without commanding anything.
+
+    Attributes:
+        seq: `seq` of the observation that was received; 0 for none yet.
+    """
+
+    seq: _Sequence = 0
+
+
+class Take(_Message, frozen=True):
+    """Asks to be the one who commands."""
+
+
+class Release(_Message, frozen=True):
+    """Gives the command back; the robot stops and disarms."""
+
+
+class Arm(_Message, frozen=True):
+    """Lets the outputs move, and ends an emergency stop.
+
+    Attributes:
+        emergency: How many emergency stops the sender has seen (`Observation.emergencies`). One
+            that came since is not ended, because the sender did not know of it.
+    """
+
+    emergency: _Sequence = 0
+
+
+class Disarm(_Message, frozen=True):
+    """Keeps the outputs at rest from now on."""
+
+
+class EmergencyStop(_Message, frozen=True):
+    """Stops everything, whoever commands, until a person arms the robot again.
+
+    Attributes:
+        reason: Why, for people to read.
+    """
+
+    reason: _Words = ""
+
+
+class Ping(_Message, frozen=True):
+    """Asks for a `Pong`.
+
+    Attributes:
+        token: Comes back as it is.
+    """
+
+    token: _Sequence = 0
+
+
+ClientMessage = Hello | Command | Acknowledge | Take | Release | Arm | Disarm | EmergencyStop | Ping
+
+
+# What a robot says.
+
+
+class Challenge(_Message, frozen=True):
+    """The first message of a robot.
+
+    Attributes:
+        version: Version of the messages that the robot speaks.
+        nonce: What the proof is made from; new for each connection.
+        robot: Name of the robot.
+    """
+
+    version: int
+    nonce: bytes
+    robot: str
+
+
+class Welcome(_Message, frozen=True):
+    """The client is known; this is what the robot is.
+
+    Attributes:
+        robot: Name of the robot.
+        body: What it is, such as "car".
+        action_layout: JSON of the `Layout` of `Command.values`.
+        state_layout: JSON of the `Layout` of `Observation.state`.
+        image_size: Width and height of the pictures in pixels; None without a camera.
+        control_hz: How many commands a second the robot expects.
+        deadline_ms: How long the newest command acts at most.
+        max_observation_age_ms: How old an observation may be that a command answers.
+        reward: Weights of the task, from the robot's profile, by name.
+        reset: Commands that bring the robot back, from its profile: the values of a step and how
+            many seconds it lasts; empty for none.
+        arming: Who may arm it.
+        clock: Where its time comes from.
+        session: Number of this connection.
+    """
+
+    robot: str
+    body: str
+    action_layout: str
+    state_layout: str
+    image_size: tuple[int, int] | None
+    control_hz: float
+    deadline_ms: int
+    max_observation_age_ms: int
+    reward: dict[str, float]
+    reset: tuple[tuple[tuple[float, ...], float], ...]
+    arming: Literal["person", "anyone"]
+    clock: Literal["real", "twin"]
+    session: int
+
+
+class Refused(_Message, frozen=True):
+    """Something that the robot does not do.
+
+    Attributes:
+        reason: Why, in a sentence.
+        seq: `seq` of the command that is refused; None for anything else.
+        fatal: Whether the connection ends.
+    """
+
+    reason: str
+    seq: int | None = None
+    fatal: bool = False
+
+
+class Observation(_Message, frozen=True):
+    """What the robot senses, and what it did.
+
+    Attributes:
+        seq: Number of the observation; each is larger than the one before.
+        captured_ns: When the picture was taken; when the state was read, without a picture.
+        state_ns: When the state was read.
+        sent_ns: When this left.
+        frame: The picture as JPEG; None where there is none that is newer than the last one sent.
+        frame_seq: Number of the picture; the same number is the same picture. 0 for none yet.
+        state: The numbers of the state layout.
+        sources: Where a quantity comes from: name of the sensor, "estimated" or "absent".
+        action_applied: What the outputs do now, in the order and units of the command, after caps,
+            slew and reflexes.
+        applied_seq: `seq` of the command behind it; None while the robot stands still by itself.
+        applied_ns: When that command reached the outputs.
+        command_ns: When that command arrived.
+        stop_reason: Why the robot does not do what it was told, in words; empty when it does.
+        armed: Whether the outputs may move.
+        emergency: Whether an emergency stop is in force.
+        emergencies: How many emergency stops there were since the robot's start.
+        holder: Name of whoever commands; empty for nobody.
+        mine: Whether that is this client.
+    """
+
+    seq: int
+    captured_ns: int
+    state_ns: int
+    sent_ns: int
+    frame: bytes | None
+    frame_seq: int
+    state: tuple[float, ...]
+    sources: dict[str, str]
+    action_applied: tuple[float, ...]
+    applied_seq: int | None
+    applied_ns: int | None
+    command_ns: int | None
+    stop_reason: str
+    armed: bool
+    emergency: bool
+    emergencies: int
+    holder: str
+    mine: bool
+
+
+class Lease(_Message, frozen=True):
+    """Who commands from now on.
+
+    Attributes:
+        mine: Whether that is this client.
+        holder: Name of whoever commands; empty for nobody.
+        reason: Why it changed, or why it did not, in words.
+    """
+
+    mine: bool
+    holder: str
+    reason: str = ""
+
+
+class Event(_Message, frozen=True):
+    """Something that happened, for people to read.
+
+    Attributes:
+        name: What it was, such as "emergency", "armed", "disarmed" or "bump".
+        text: A sentence.
+        at_ns: When.
+    """
+
+    name: str
+    text: str
+    at_ns: int
+
+
+class Pong(_Message, frozen=True):
+    """The answer to a `Ping`.
+
+    Attributes:
+        token: As it came.
+        now_ns: The robot's time.
+    """
+
+    token: int
+    now_ns: int
+
+
+RobotMessage = Challenge | Welcome | Refused | Observation | Lease | Event | Pong
+
+_ENCODER: Final = msgspec.msgpack.Encoder()
+_CLIENT_DECODER: Final = msgspec.msgpack.Decoder(ClientMessage)
+_ROBOT_DECODER: Final = msgspec.msgpack.Decoder(RobotMessage)
+
+
+def encode(message: ClientMessage | RobotMessage) -> bytes:
+    """A message as bytes."""
+    return _ENCODER.encode(message)
+
+
+def decode_client_message(data: bytes) -> ClientMessage:
+    """What a client said.
+
+    Raises:
+        LinkError: If these bytes are too many or no message of a client.
+    """
+    return _decoded(_CLIENT_DECODER, data, MAX_CLIENT_MESSAGE)
+
+
+def decode_robot_message(data: bytes) -> RobotMessage:
+    """What a robot said.
+
+    Raises:
+        LinkError: If these bytes are too many or no message of a robot.
+    """
+    return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
+
+
+def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _M:
+    if len(data) > limit:
+        raise LinkError(f"A message of {len(data)} bytes is larger than the {limit} allowed.")
+    try:
+        return decoder.decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise LinkError(f"This is no message: {error}.") from error

@@ -1,0 +1,54 @@
+"""What every sensor driver does, and where each is found."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Final, Protocol
+
+from shapechanger.errors import UnknownName
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["SENSOR_DRIVERS", "SensorDriver", "open_sensor"]
+
+SENSOR_DRIVERS: Final = {
+    "encoder": "shapechanger.robot.drivers.encoder",
+    "switch": "shapechanger.robot.drivers.switch",
+    "hcsr04": "shapechanger.robot.drivers.hcsr04",
+    "mpu6050": "shapechanger.robot.drivers.mpu6050",
+    "ina219": "shapechanger.robot.drivers.ina219",
+    "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature",
+}
+"""Module of each sensor driver, by its name in a profile; each has `open_driver(plan, hardware)`."""
+
+
+class SensorDriver(Protocol):
+    """One sensor. It never blocks longer than a few milliseconds, and has no thread of its own."""
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """What it measures now, by name and in SI units, as in `GuardState.quantities`.
+
+        Args:
+            now_ns: The time.
+            direction: Sign of the propulsion, for a sensor that cannot tell forward from backward.
+
+        Raises:
+            RobotError: If the sensor does not answer.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the pins."""
+        ...
+
+
+def open_sensor(plan: SensorPlan, hardware: Hardware) -> SensorDriver:
+    """Open a sensor.
+
+    Raises:
+        UnknownName: If there is no such driver.
+        RobotError: If the device does not answer.
+    """
+    if plan.driver not in SENSOR_DRIVERS:
+        raise UnknownName("sensor driver", plan.driver, SENSOR_DRIVERS)
+    return importlib.import_module(SENSOR_DRIVERS[plan.driver]).open_driver(plan, hardware)

@@ -1,0 +1,39 @@
+"""Started by path, in isolated mode, as `python -I start.py PROGRAM ARGUMENTS`.
+
+The guard and its supervisor must be small, and must not fail because of something that they do not
+need. So the package `shapechanger` is put in place here without running its `__init__`, which
+would load Gymnasium and NumPy; below it, modules are imported as everywhere.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from pathlib import Path
+from typing import Final
+
+__all__ = ["PROGRAMS", "run"]
+
+PROGRAMS: Final = {
+    "guard": "shapechanger.robot.guard.process",
+    "supervise": "shapechanger.robot.guard.supervisor",
+}
+"""Which module's `main` each program is."""
+
+
+def _put_package_in_place() -> None:
+    package = types.ModuleType("shapechanger")
+    package.__path__ = [str(Path(__file__).resolve().parents[2])]
+    sys.modules["shapechanger"] = package
+
+
+def run(program: str, arguments: list[str]) -> None:
+    """Run a program of the robot without the rest of the package."""
+    if "shapechanger" not in sys.modules:
+        _put_package_in_place()
+    importlib.import_module(PROGRAMS[program]).main(arguments)
+
+
+if __name__ == "__main__":
+    run(sys.argv[1], sys.argv[2:])

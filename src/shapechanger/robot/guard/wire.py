@@ -1,0 +1,140 @@
+"""What the daemon and the guard say to each other: one JSON object a datagram.
+
+They are on one machine, connected by a pair of sockets (`SOCK_SEQPACKET`, which keeps messages
+apart), and share one monotonic clock. The guard loads nothing but the standard library, hence JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Final, Literal, cast
+
+__all__ = ["MAX_DATAGRAM", "GuardState", "Order", "decode_order", "decode_state", "encode"]
+
+MAX_DATAGRAM: Final = 16 * 1024
+"""Bytes of the largest datagram."""
+
+_KINDS: Final = ("command", "arm", "disarm", "emergency", "end")
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What the daemon asks of the guard.
+
+    Attributes:
+        kind: "command" moves; "arm" lets commands move, and ends an emergency stop; "disarm" ends
+            that; "emergency" stops until armed again; "end" ends the guard.
+        session: Number of the lease that it belongs to; commands of an older one are refused.
+        seq: Number of a command; each is larger than the one before in its session.
+        issued_ns: When the daemon received it.
+        ttl_ms: How long a command acts at most, counted from `issued_ns`.
+        frame_ns: When the newest picture was taken; None without a camera or a picture.
+        values: One number for each action.
+        emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
+            is not ended.
+        reason: Why, in words, for "disarm" and "emergency".
+    """
+
+    kind: Literal["command", "arm", "disarm", "emergency", "end"]
+    session: int = 0
+    seq: int = 0
+    issued_ns: int = 0
+    ttl_ms: int = 0
+    frame_ns: int | None = None
+    values: tuple[float, ...] = ()
+    emergency: int = 0
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class GuardState:
+    """What the guard does and senses.
+
+    Attributes:
+        at_ns: When.
+        armed: Whether commands move anything.
+        emergency: Whether an emergency stop is in force.
+        emergencies: How many there were since the guard started; see `Order.emergency`.
+        stop_reason: Why it does not do what it was told, in words; empty when it does.
+        applied: What the outputs do, one number for each action.
+        applied_session: Session of the command behind it.
+        applied_seq: Its number; None while the robot stands still by itself.
+        applied_ns: When it reached the outputs.
+        refused: Why the newest command was refused, in words; empty for none since the last state.
+        refused_seq: Its number.
+        outputs: Value of each output by name, -1 to 1.
+        quantities: What was sensed, by name and in SI units: "speed" m/s signed, "distance" m,
+            "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
+            "stall" 0 or 1, "collision" 0 or 1; without those that nothing measures.
+        sources: Where a quantity comes from: name of a sensor, or "estimated".
+        bumps: How many bumps there were since the guard started.
+    """
+
+    at_ns: int
+    armed: bool
+    emergency: bool
+    emergencies: int
+    stop_reason: str
+    applied: tuple[float, ...]
+    applied_session: int
+    applied_seq: int | None
+    applied_ns: int | None
+    refused: str
+    refused_seq: int | None
+    outputs: dict[str, float]
+    quantities: dict[str, float]
+    sources: dict[str, str]
+    bumps: int
+
+
+def encode(said: Order | GuardState) -> bytes:
+    """One datagram."""
+    return json.dumps(asdict(said), allow_nan=False, separators=(",", ":")).encode()
+
+
+def decode_order(data: bytes) -> Order:
+    """What the daemon asked.
+
+    Raises:
+        ValueError: If this is no order, or one of its numbers is none.
+    """
+    fields = _fields(data)
+    try:
+        fields["values"] = tuple(fields.get("values", ()))
+        order = Order(**fields)
+    except TypeError as error:
+        raise ValueError(f"This is no order: {error}.") from error
+    numbers = (order.session, order.seq, order.issued_ns, order.ttl_ms, order.emergency)
+    if order.kind not in _KINDS or not all(type(number) is int for number in numbers):
+        raise ValueError("This is no order.")
+    if not (order.frame_ns is None or type(order.frame_ns) is int):
+        raise ValueError("frame_ns is no whole number.")
+    if not all(type(v) in (int, float) and math.isfinite(v) for v in order.values):
+        raise ValueError("A value is no finite number.")
+    return order
+
+
+def decode_state(data: bytes) -> GuardState:
+    """What the guard does.
+
+    Raises:
+        ValueError: If this is no state.
+    """
+    fields = _fields(data)
+    try:
+        fields["applied"] = tuple(fields["applied"])
+        return GuardState(**fields)
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"This is no state: {error}.") from error
+
+
+def _fields(data: bytes) -> dict[str, Any]:
+    try:
+        fields: object = json.loads(data)
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise ValueError(f"This is no JSON: {error}.") from error
+    if not isinstance(fields, dict):
+        raise ValueError("This is no JSON object.")
+    return cast("dict[str, Any]", fields)
