@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, Final, cast
 
@@ -119,7 +119,8 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
         terms = [
             float(value)
             for name, value in info.items()
-            if name.startswith("reward_") or name.endswith("_penalty")
+            if (name.startswith("reward_") or name.endswith("_penalty"))
+            and not isinstance(value, Mapping)  # Such as all terms in one, or what they rest on.
         ]
         _require(bool(terms), "info reports no reward terms.")
         _require(

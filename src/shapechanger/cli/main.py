@@ -26,6 +26,7 @@ try:
 
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.play import Play
+    from shapechanger.cli.robot import Robot
     from shapechanger.cli.stopping import Interrupted
     from shapechanger.cli.train import Train
     from shapechanger.cli.transfer import Transfer
@@ -40,6 +41,7 @@ _Command = (
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Play, tyro.conf.subcommand("play")]
     | Annotated[Transfer, tyro.conf.subcommand("transfer")]
+    | Annotated[Robot, tyro.conf.subcommand("robot")]
 )
 
 

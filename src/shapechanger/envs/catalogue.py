@@ -9,9 +9,12 @@ import msgspec
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["CATALOGUE", "NAMESPACE", "Entry", "find", "register_all"]
+__all__ = ["CATALOGUE", "NAMESPACE", "REMOTE_VEHICLE", "Entry", "find", "register_all"]
 
 NAMESPACE: Final = "shapechanger"
+
+REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
+"""Id of the env of a robot on the network; its body is whatever answers, so it is no `Entry`."""
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -137,6 +140,12 @@ def register_all() -> None:
                 max_episode_steps=_EPISODE_STEPS,
                 kwargs={"body": entry.body} if entry.body else {},
             )
+    if REMOTE_VEHICLE not in gym.registry:
+        gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+            REMOTE_VEHICLE,
+            "shapechanger.remote.vehicle:RemoteVehicleEnv",
+            nondeterministic=True,  # A seed cannot tell a real robot where to stand.
+        )
 
 
 def find(env_id: str) -> Entry:

@@ -158,11 +158,14 @@ class RealHardware:
         return self._clock
 
     def pin_factory(self) -> Any:
-        """The factory of gpiozero over lgpio, whatever the environment says."""
-        if self._pin_factory is None:
-            from gpiozero.pins.lgpio import LGPIOFactory
+        """The factory of gpiozero over lgpio, whatever the environment says.
 
-            self._pin_factory = LGPIOFactory()
+        Its pins are low as soon as they are told so; see `lgpio_pins`.
+        """
+        if self._pin_factory is None:
+            from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
+
+            self._pin_factory = LowAtOnceFactory()
         return self._pin_factory
 
     def i2c(self, bus: int) -> I2cBus:

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
+from shapechanger.tasks.drive import DriveReward
 
-__all__: Final[list[str]] = []
+__all__ = ["DriveReward"]

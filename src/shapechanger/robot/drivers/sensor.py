@@ -19,7 +19,7 @@ SENSOR_DRIVERS: Final = {
     "ina219": "shapechanger.robot.drivers.ina219",
     "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature",
 }
-"""Module of each sensor driver, by its name in a profile; each has `open_driver(plan, hardware)`."""
+"""Module of each sensor driver, by name; each has `open_driver(plan, hardware)`."""
 
 
 class SensorDriver(Protocol):

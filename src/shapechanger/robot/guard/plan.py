@@ -146,6 +146,8 @@ class GuardPlan:
             enable line of the motors; None without one.
         stop_pin: BCM pin of an emergency stop button to ground; None without one.
         tick_hz: How often the rules are looked at without anything happening.
+        enable_hold_ms: How long the one-shot holds the enable line after the last toggle of
+            `enable_pin`. The guard does not need it; a twin of the wiring does.
     """
 
     name: str
@@ -157,6 +159,7 @@ class GuardPlan:
     enable_pin: int | None = None
     stop_pin: int | None = None
     tick_hz: float = 100.0
+    enable_hold_ms: int = 100
 
     def to_json(self) -> str:
         """The plan as JSON."""
@@ -176,4 +179,5 @@ class GuardPlan:
             enable_pin=data["enable_pin"],
             stop_pin=data["stop_pin"],
             tick_hz=data["tick_hz"],
+            enable_hold_ms=data["enable_hold_ms"],
         )

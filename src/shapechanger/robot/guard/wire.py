@@ -28,7 +28,8 @@ class Order:
             that; "emergency" stops until armed again; "end" ends the guard.
         session: Number of the lease that it belongs to; commands of an older one are refused.
         seq: Number of a command; each is larger than the one before in its session.
-        issued_ns: When the daemon received it.
+        issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
+            when they are old.
         ttl_ms: How long a command acts at most, counted from `issued_ns`.
         frame_ns: When the newest picture was taken; None without a camera or a picture.
         values: One number for each action.
@@ -111,7 +112,9 @@ def decode_order(data: bytes) -> Order:
         raise ValueError("This is no order.")
     if not (order.frame_ns is None or type(order.frame_ns) is int):
         raise ValueError("frame_ns is no whole number.")
-    if not all(type(v) in (int, float) and math.isfinite(v) for v in order.values):
+    if type(order.reason) is not str:
+        raise ValueError("The reason is no words.")
+    if not all(_is_finite(value) for value in order.values):
         raise ValueError("A value is no finite number.")
     return order
 
@@ -128,6 +131,15 @@ def decode_state(data: bytes) -> GuardState:
         return GuardState(**fields)
     except (KeyError, TypeError) as error:
         raise ValueError(f"This is no state: {error}.") from error
+
+
+def _is_finite(value: object) -> bool:
+    if type(value) not in (int, float):
+        return False
+    try:
+        return math.isfinite(cast("float", value))
+    except OverflowError:  # A whole number that no float can hold.
+        return False
 
 
 def _fields(data: bytes) -> dict[str, Any]:

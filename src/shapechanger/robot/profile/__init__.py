@@ -2,6 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
+from shapechanger.robot.profile.profile import EnablePlan, Profile, ResetStep, RewardPlan
+from shapechanger.robot.profile.read import read_profile
+from shapechanger.robot.profile.starter import write_profile
 
-__all__: Final[list[str]] = []
+__all__ = [
+    "EnablePlan",
+    "Profile",
+    "ResetStep",
+    "RewardPlan",
+    "find_profile",
+    "load_profile",
+    "read_profile",
+    "shipped_profiles",
+    "write_profile",
+]

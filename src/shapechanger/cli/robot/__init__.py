@@ -1,0 +1,41 @@
+"""`shapechanger robot`: what is done on a robot, and from afar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from shapechanger.cli.robot.calibrate import Calibrate
+from shapechanger.cli.robot.doctor import Doctor
+from shapechanger.cli.robot.drive import Drive
+from shapechanger.cli.robot.find import Find, Forget, Remember
+from shapechanger.cli.robot.init import Init
+from shapechanger.cli.robot.safe_pins import SafePins
+from shapechanger.cli.robot.selftest import Selftest
+from shapechanger.cli.robot.serve import Serve
+
+__all__ = ["Robot"]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Set a robot up, serve it, find it and drive it."""
+
+    command: (
+        Annotated[Init, tyro.conf.subcommand("init")]
+        | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+        | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+        | Annotated[Serve, tyro.conf.subcommand("serve")]
+        | Annotated[Find, tyro.conf.subcommand("find")]
+        | Annotated[Remember, tyro.conf.subcommand("remember")]
+        | Annotated[Forget, tyro.conf.subcommand("forget")]
+        | Annotated[Drive, tyro.conf.subcommand("drive")]
+        | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
+        | Annotated[Selftest, tyro.conf.subcommand("selftest")]
+    )
+
+    def run(self) -> None:
+        """Do what was asked."""
+        self.command.run()

@@ -1,0 +1,99 @@
+"""`shapechanger robot find`, `remember`, `forget`: which robots there are, and which are ours."""
+
+from __future__ import annotations
+
+import getpass
+import os
+import sys
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from shapechanger.cli.console import plain_console
+from shapechanger.errors import LinkError
+
+__all__ = ["Find", "Forget", "Remember"]
+
+_KEY_VARIABLE = "SHAPECHANGER_KEY"
+
+
+@dataclass(frozen=True)
+class Find:
+    """List the robots in this network."""
+
+    seconds: float = 2.0
+    """How long to listen."""
+
+    def run(self) -> None:
+        """Print a table, with the names under which robots are known here."""
+        from shapechanger.link.messages import VERSION
+        from shapechanger.remote.discover import find
+        from shapechanger.remote.known import known_names, recall
+
+        if not 0.0 < self.seconds <= 60.0:
+            raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
+        known = {recall(name).fingerprint: name for name in known_names()}
+        found = find(self.seconds)
+        console = plain_console()
+        if not found:
+            console.print(
+                "No robot answers. A network may block multicast DNS; connecting by address works "
+                "all the same.",
+                soft_wrap=True,
+            )
+            return
+        table = Table("robot", "body", "address", "known as", "", box=None, pad_edge=False)
+        for robot in found:
+            other = "" if robot.version == str(VERSION) else f"speaks version {robot.version}"
+            name = known.get(robot.fingerprint, "")
+            table.add_row(robot.name, robot.body, str(robot.address), name, other)
+        console.print(table)
+
+
+@dataclass(frozen=True)
+class Remember:
+    """Write down how to reach a robot, so that its name is enough from now on."""
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    """What to call it."""
+    address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
+    """Where it is, as HOST or HOST:PORT."""
+    fingerprint: str
+    """SHA-256 of its certificate, as the robot shows it; "insecure" for no TLS."""
+
+    def run(self) -> None:
+        """Ask for the key, which does not belong on a command line, and write it all down."""
+        from shapechanger.remote.known import KnownRobot, remember
+
+        key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
+        path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
+        plain_console().print(f"wrote {path}", soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class Forget:
+    """Remove a robot from those that are known here."""
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    """What it is called here."""
+
+    def run(self) -> None:
+        """Remove its file."""
+        from shapechanger.remote.known import forget
+
+        forget(self.name)
+
+
+def _asked_key(name: str) -> str:
+    """The key, typed without showing it or read from a pipe."""
+    if sys.stdin.isatty():
+        return getpass.getpass(f"key of {name}: ")
+    key = sys.stdin.readline()
+    if not key.strip():
+        raise LinkError(
+            f"The robot's key is needed: type it, or set {_KEY_VARIABLE}. "
+            "`shapechanger robot init` showed it on the robot."
+        )
+    return key

@@ -1,0 +1,60 @@
+"""`shapechanger robot init`: everything that a new robot needs, in one folder and one go."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+
+__all__ = ["Init"]
+
+
+@dataclass(frozen=True)
+class Init:
+    """Write a profile for a new robot, and make its key and its certificate."""
+
+    kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND")]
+    """What it is like: the name of a profile that comes with Shapechanger, such as car."""
+    name: str = ""
+    """Name of the robot; that of its kind if not given."""
+    out: Path | None = None
+    """The profile to write; NAME.toml if not given."""
+    credentials: Path | None = None
+    """Folder for the key and the certificate, if not the robot's own in the user's
+    configuration."""
+
+    def run(self) -> None:
+        """Write it all, and say how to go on."""
+        from shapechanger.cli.robot.serving import credentials_of
+        from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
+        from shapechanger.remote.known import KnownRobot, remember
+        from shapechanger.robot.profile.starter import write_profile
+        from shapechanger.robot.setup.unit import write_unit
+
+        name = self.name or self.kind
+        profile = write_profile(self.kind, self.out or Path(f"{name}.toml"), name)
+        credentials = credentials_of(name, self.credentials, make=True)
+        unit = write_unit(profile)
+        key = credentials.key_file.read_text().strip()
+        digits = fingerprint_hex(credentials.fingerprint)
+        # So that the same machine can drive it, on a twin above all.
+        remember(KnownRobot(name, "127.0.0.1", key, digits))
+        console = plain_console()
+        console.print(
+            f"wrote {profile}: look at its pins before anything moves\n"
+            f"wrote {unit}: for systemd, see docs/hardware.md\n"
+            f"key and certificate in {credentials.key_file.parent}\n\n"
+            f"key          {key}\n"
+            f"fingerprint  {fingerprint_short(credentials.fingerprint)}\n\n"
+            f"Next: shapechanger robot doctor {profile}\n"
+            f"      shapechanger robot serve {profile}   (with --twin: without any hardware)\n"
+            "On the workstation, with the key from above:\n"
+            f"      shapechanger robot remember {name} {socket.gethostname()}.local "
+            f"--fingerprint {digits}",
+            soft_wrap=True,
+        )

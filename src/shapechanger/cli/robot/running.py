@@ -1,0 +1,188 @@
+"""A robot that is served in processes of its own, for as long as somebody needs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal, Self
+
+from shapechanger.errors import RobotError
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.known import KnownRobot
+from shapechanger.robot.daemon.credentials import make_credentials
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.operator import Operator
+
+__all__ = ["RunningRobot", "run_robot"]
+
+_READY_S: Final = 60.0
+_END_S: Final = 10.0
+_LOOK_S: Final = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class _Ready:
+    """What the daemon says once it can be reached."""
+
+    port: int
+    fingerprint: str
+
+
+class RunningRobot:
+    """A robot that is served on this machine; it ends with `close`.
+
+    Attributes:
+        folder: Where its files are: the twin's ledger and socket, the key and what it said.
+        supervisor: Its supervisor.
+    """
+
+    def __init__(self, folder: Path, supervisor: subprocess.Popen[bytes]) -> None:
+        self.folder = folder
+        self.supervisor = supervisor
+        self._ready = self._await_ready()
+
+    def __enter__(self) -> Self:
+        """The robot itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def port(self) -> int:
+        """Where it listens, on 127.0.0.1."""
+        return self._ready.port
+
+    @property
+    def ledger_path(self) -> Path:
+        """The twin's ledger."""
+        return self.folder / "ledger.jsonl"
+
+    @property
+    def known(self) -> KnownRobot:
+        """What it takes to reach it."""
+        return self.known_at(f"127.0.0.1:{self.port}")
+
+    def known_at(self, address: str) -> KnownRobot:
+        """The same robot behind another address, such as that of a proxy."""
+        key = (self.folder / "credentials" / "key").read_text().strip()
+        return KnownRobot("robot", address, key, self._ready.fingerprint or "insecure")
+
+    def client(self, **options: Any) -> RobotClient:
+        """A connection to it; options as `RobotClient.connect` takes them."""
+        return RobotClient.connect(self.known, **options)
+
+    def operator(self) -> Operator:
+        """Somebody who stands beside its twin."""
+        return Operator(str(self.folder / "board.socket"))
+
+    def pid_of(self, program: Literal["guard", "daemon"]) -> int:
+        """The process that runs a program of the robot.
+
+        Raises:
+            RobotError: If there is none at the moment.
+        """
+        parent = self.supervisor.pid
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+        for pid in children:
+            arguments = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+            if any(a.decode().endswith((program, f"robot.{program}")) for a in arguments):
+                return int(pid)
+        raise RobotError(f"The robot's {program} does not run at the moment.")
+
+    def said(self) -> str:
+        """What its processes said so far, for people to read."""
+        return (self.folder / "log.txt").read_text(errors="replace")
+
+    def await_restart(self, timeout_s: float = _READY_S) -> None:
+        """Wait until its daemon can be reached again after a restart.
+
+        Raises:
+            RobotError: If that does not happen.
+        """
+        self._ready = self._await_ready(timeout_s)
+
+    def forget_ready(self) -> None:
+        """Take away what the daemon said, before something that makes it start again."""
+        (self.folder / "ready.json").unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """End it; its outputs are at rest then."""
+        if self.supervisor.poll() is None:
+            self.supervisor.send_signal(signal.SIGCONT)
+            self.supervisor.terminate()
+        try:
+            self.supervisor.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self.supervisor.kill()
+            self.supervisor.wait()
+
+    def _await_ready(self, timeout_s: float = _READY_S) -> _Ready:
+        path = self.folder / "ready.json"
+        until_s = time.monotonic() + timeout_s
+        while not path.exists():
+            if self.supervisor.poll() is not None or time.monotonic() > until_s:
+                self.close()
+                raise RobotError(f"The robot did not start: {self.said().strip()}")
+            time.sleep(_LOOK_S)
+        return _Ready(**json.loads(path.read_text()))
+
+
+def run_robot(
+    profile: Profile | Path,
+    *,
+    twin: bool = True,
+    clock: Literal["real", "twin"] = "real",
+    seed: int = 0,
+    folder: Path | None = None,
+    arguments: tuple[str, ...] = (),
+) -> RunningRobot:
+    """Serve a robot on a free port of 127.0.0.1, as `shapechanger robot serve` does.
+
+    Args:
+        profile: The robot, or its file.
+        twin: Whether on its twin.
+        clock: Where a twin's time comes from.
+        seed: Seed of a twin's world.
+        folder: Folder for its files, which must be empty; a new one if not given.
+        arguments: More arguments of `serve`.
+
+    Raises:
+        RobotError: If it does not start.
+    """
+    if not isinstance(profile, Profile):
+        profile = load_profile(profile)
+    folder = folder or Path(tempfile.mkdtemp(prefix="shapechanger-robot-"))
+    make_credentials(folder / "credentials", profile.name)
+    command = [sys.executable, "-c", "from shapechanger.cli import main; main()"]
+    command += ["robot", "serve", str(profile.path), "--port", "0", "--no-announce"]
+    command += ["--credentials", str(folder / "credentials")]
+    command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json"), *arguments]
+    if twin:
+        command += ["--twin", "--clock", clock, "--seed", str(seed)]
+        command += ["--twin-folder", str(folder)]
+    with (folder / "log.txt").open("wb") as log:
+        supervisor = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            # So that Ctrl-C reaches whoever drives first, who then ends the robot.
+            process_group=0 if os.name == "posix" else None,
+        )
+    return RunningRobot(folder, supervisor)

@@ -1,0 +1,108 @@
+"""`shapechanger robot serve`: the robot's own command, on its hardware or on a twin."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+from shapechanger.errors import RobotError
+
+if TYPE_CHECKING:
+    from shapechanger.cli.robot.serving import TwinOptions
+
+__all__ = ["Serve"]
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Serve a robot to programs and people, and keep it safe."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """A profile, such as car.toml, or the name of one that comes with Shapechanger."""
+    twin: bool = False
+    """Run on simulated pins and in a simulated world in place of this machine's pins."""
+    host: str = ""
+    """Address to listen at; all of this machine's if not given, only 127.0.0.1 with --twin or
+    --insecure."""
+    port: int = 5000
+    """Port to listen at; 0 for any that is free."""
+    clock: Literal["real", "twin"] = "real"
+    """With --twin: whether time passes by itself, or only when a program takes a step."""
+    wired_as: str = ""
+    """With --twin: the profile of what is really attached to the pins, if not the one served."""
+    seed: int = 0
+    """With --twin: seed of the world."""
+    twin_folder: Path | None = None
+    """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
+    given."""
+    insecure: bool = False
+    """Speak without TLS. The key is still needed."""
+    credentials: Path | None = None
+    """Folder of the robot's key and certificate, if not the one that `init` made."""
+    arm_by_program: bool = False
+    """Let programs arm the robot. By default a person has to; on a twin anyone may."""
+    announce: bool = True
+    """Let `shapechanger robot find` find it."""
+    ready_file: Path | None = None
+    """File to write the port and the fingerprint into, as JSON, once the robot can be reached."""
+
+    def run(self) -> None:
+        """Become the robot's supervisor; this returns only with an error."""
+        from shapechanger.cli.robot.serving import ServeOptions, serve_plan, start_twin
+        from shapechanger.robot.guard import start
+        from shapechanger.robot.guard.serve_plan import plan_fd
+        from shapechanger.robot.profile.load import find_profile, load_profile
+
+        self._refuse_contradictions()
+        profile = load_profile(find_profile(self.profile))
+        board = start_twin(profile, self._twin_options()) if self.twin else None
+        try:
+            plan = serve_plan(
+                profile,
+                ServeOptions(
+                    host=self.host,
+                    port=self.port,
+                    insecure=self.insecure,
+                    credentials=self.credentials,
+                    arm_by_program=self.arm_by_program,
+                    announce=self.announce,
+                    ready_file=self.ready_file,
+                ),
+                board,
+                self.clock,
+            )
+            if board is not None:
+                plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
+            sys.stdout.flush()
+            if board is not None:
+                board.outlive_exec()
+            # In place of this process, which has loaded much that a supervisor has no use for.
+            program = [plan.python, "-I", start.__file__, "supervise"]
+            os.execv(plan.python, [*program, "--plan-fd", str(plan_fd(plan))])
+        finally:
+            if board is not None:
+                board.close()
+
+    def _refuse_contradictions(self) -> None:
+        """Refuse what has a meaning on a twin only."""
+        asked = {
+            "--clock twin": self.clock == "twin",
+            "--wired-as": bool(self.wired_as),
+            "--twin-folder": self.twin_folder is not None,
+        }
+        for option, given in asked.items():
+            if given and not self.twin:
+                raise RobotError(f"{option} means something with --twin only.")
+
+    def _twin_options(self) -> TwinOptions:
+        from shapechanger.cli.robot.serving import TwinOptions
+
+        folder = self.twin_folder or Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
+        return TwinOptions(folder, self.clock, self.wired_as, self.seed)

@@ -1,0 +1,147 @@
+"""From a profile and the options of a command to the plan that a robot's processes are given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import msgspec
+
+from shapechanger.robot.daemon.credentials import (
+    Credentials,
+    credentials_folder,
+    load_credentials,
+    make_credentials,
+)
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.serve_plan import ServePlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.start import RunningBoard, start_board
+
+__all__ = ["ServeOptions", "TwinOptions", "credentials_of", "serve_plan", "start_twin"]
+
+_EVERYWHERE: Final = "0.0.0.0"
+_HERE: Final = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class TwinOptions:
+    """How a twin stands in for the hardware.
+
+    Attributes:
+        folder: Folder for its socket, its ledger and its pictures' pipe; it must exist.
+        clock: Whether time passes by itself, or only when somebody asks for it.
+        wired_as: Profile of what is really attached; "" for the one that is served.
+        seed: Seed of the world.
+    """
+
+    folder: Path
+    clock: Literal["real", "twin"] = "real"
+    wired_as: str = ""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """How a robot is served.
+
+    Attributes:
+        host: Address to listen at; "" for every one, or only this machine's own on a twin or
+            without TLS.
+        port: Port to listen at; 0 for any that is free.
+        insecure: Whether to speak without TLS.
+        credentials: Folder of the key and the certificate; None for the robot's own.
+        arm_by_program: Whether programs may arm it; on a twin they always may.
+        announce: Whether to let others find it on the network.
+        ready_file: File to write the address into; None for none.
+    """
+
+    host: str = ""
+    port: int = 5000
+    insecure: bool = False
+    credentials: Path | None = None
+    arm_by_program: bool = False
+    announce: bool = True
+    ready_file: Path | None = None
+
+
+def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials:
+    """The credentials of a robot; made first if they may be.
+
+    Raises:
+        RobotError: If there are none, or others may read them.
+        OutputError: If they cannot be written.
+    """
+    folder = folder or credentials_folder(name)
+    return make_credentials(folder, name) if make else load_credentials(folder)
+
+
+def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
+    """Start the twin of a robot's pins, in a process of its own.
+
+    Raises:
+        ProfileError: If what is really attached is no profile.
+        RobotError: If the twin does not start.
+    """
+    wiring: GuardPlan = profile.guard_plan()
+    if options.wired_as:
+        wiring = load_profile(find_profile(options.wired_as)).guard_plan()
+    return start_board(
+        wiring,
+        clock=options.clock,
+        folder=options.folder,
+        camera=profile.camera,
+        seed=options.seed,
+    )
+
+
+def serve_plan(
+    profile: Profile,
+    options: ServeOptions,
+    board: RunningBoard | None = None,
+    clock: Literal["real", "twin"] = "real",
+) -> ServePlan:
+    """What the processes of a robot need.
+
+    Args:
+        profile: The robot.
+        options: How it is served.
+        board: The twin of its pins; None for the pins of this machine.
+        clock: Where its time comes from.
+
+    Raises:
+        RobotError: If it has no credentials, or others may read them, or it would be open to
+            everybody.
+    """
+    credentials = credentials_of(profile.name, options.credentials, make=board is not None)
+    here = board is not None or options.insecure
+    daemon = DaemonPlan(
+        robot=profile.name,
+        body=profile.body,
+        action_layout=profile.action_layout().to_json(),
+        state_layout=profile.state_layout().to_json(),
+        camera=profile.camera,
+        control_hz=profile.control_hz,
+        deadline_ms=profile.limits.deadline_ms,
+        max_observation_age_ms=profile.max_observation_age_ms,
+        reward=profile.reward_weights(),
+        reset=profile.reset_routine(),
+        arming="anyone" if options.arm_by_program or board else profile.arming,
+        host=options.host or (_HERE if here else _EVERYWHERE),
+        port=options.port,
+        certificate="" if options.insecure else str(credentials.certificate),
+        private_key="" if options.insecure else str(credentials.private_key),
+        key_file=str(credentials.key_file),
+        insecure=options.insecure,
+        discovery=options.announce,
+        ready_file=str(options.ready_file.absolute()) if options.ready_file else "",
+    )
+    guard = profile.guard_plan()
+    if board is None:
+        return ServePlan(guard, daemon.to_dict())
+    camera = board.camera_plan(profile.camera) if profile.camera else None
+    daemon = msgspec.structs.replace(daemon, camera=camera, clock=clock)
+    return ServePlan(guard, daemon.to_dict(), board.hardware)

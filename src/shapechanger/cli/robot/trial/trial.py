@@ -1,0 +1,181 @@
+"""One robot on its twin, driven at full throttle and broken again and again."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Final, Self
+
+from shapechanger.cli.robot.running import RunningRobot, run_robot
+from shapechanger.cli.robot.trial.driver import Driver
+from shapechanger.cli.robot.trial.faults import Fault, Scene
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.ledger import read_ledger
+from shapechanger.twin.network import BadNetwork
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.oracle import Command, Interval, propelled, time_to_rest, unauthorised
+from shapechanger.twin.wiring import Wiring
+
+__all__ = ["Trial", "TrialResult", "has"]
+
+_COMMANDS: Final = 8
+# How long after the promise is looked at whether everything stays at rest.
+_STAYS_S: Final = 0.3
+_LOOK_S: Final = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """What one trial came to.
+
+    Attributes:
+        fault: Name of the fault.
+        stopped_ms: From the fault until all that propels is at rest for good; infinite for never.
+        limit_ms: What is promised.
+        drove: Whether it moved before the fault, without which the trial means nothing.
+        unauthorised: When something propelled without a fresh command.
+    """
+
+    fault: str
+    stopped_ms: float
+    limit_ms: float
+    drove: bool
+    unauthorised: tuple[Interval, ...]
+
+    @property
+    def kept(self) -> bool:
+        """Whether the promise was kept."""
+        return self.drove and self.stopped_ms <= self.limit_ms and not self.unauthorised
+
+
+def has(profile: Profile, needs: str) -> bool:
+    """Whether a robot has what a fault needs."""
+    return {
+        "": True,
+        "camera": profile.camera is not None,
+        "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
+        "button": profile.stop_pin is not None,
+    }[needs]
+
+
+class Trial:
+    """A robot that can be tried with one fault after the other.
+
+    Args:
+        profile: The robot.
+        one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
+    """
+
+    def __init__(self, profile: Profile, *, one_shot: bool = True) -> None:
+        self._profile = profile
+        self._plan: GuardPlan = profile.guard_plan()
+        self._wiring = Wiring(self._plan, self._plan.enable_hold_ms if one_shot else None)
+        self._robot: RunningRobot | None = None
+        self._folder: TemporaryDirectory[str] | None = None
+
+    def __enter__(self) -> Self:
+        """The trial itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the robot."""
+        self.close()
+
+    def close(self) -> None:
+        """End the robot, and remove its files."""
+        if self._robot is not None:
+            self._robot.close()
+            self._robot = None
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def run(self, fault: Fault) -> TrialResult:
+        """Drive, let the fault happen, and judge by the ledger.
+
+        Raises:
+            RobotError: If the robot cannot be driven.
+        """
+        robot = self._running()
+        with (
+            robot.operator() as operator,
+            BadNetwork(robot.port) as network,
+        ):
+            operator.place(0)
+            began_ns = time.monotonic_ns()
+            with Driver(robot.known_at(f"127.0.0.1:{network.port}")) as driver:
+                driver.await_commands(_COMMANDS)
+                if fault.then == "starts afresh":
+                    robot.forget_ready()
+                scene = Scene(robot, driver, network, operator)
+                at_ns = fault.make(scene)
+                limit_ms = fault.limit_ms(self._plan.limits)
+                self._await_rest(operator, limit_ms)
+                result = self._judged(fault, began_ns, at_ns, limit_ms, driver.sent)
+                if fault.then != "is gone":
+                    fault.undo(scene)
+        self._recover(fault)
+        return result
+
+    def _running(self) -> RunningRobot:
+        if self._robot is None:
+            self._folder = TemporaryDirectory(prefix="shapechanger-trial-")
+            self._robot = run_robot(self._profile, folder=Path(self._folder.name))
+        return self._robot
+
+    def _recover(self, fault: Fault) -> None:
+        if fault.then == "is gone":
+            self.close()
+        elif fault.then == "starts afresh" and self._robot is not None:
+            self._robot.await_restart()
+
+    def _await_rest(self, operator: Operator, limit_ms: float) -> None:
+        """Wait until the robot has been at rest for a while, or surely breaks its promise."""
+        until_s = time.monotonic() + 10.0 * limit_ms / 1e3
+        rest_since_s = math.inf
+        while time.monotonic() < until_s:
+            outputs = self._wiring.read(operator.levels(), time.monotonic_ns())
+            if all(outputs[name].at_rest for name in self._wiring.propelling):
+                rest_since_s = min(rest_since_s, time.monotonic())
+                if time.monotonic() - rest_since_s >= _STAYS_S:
+                    return
+            else:
+                rest_since_s = math.inf
+            time.sleep(_LOOK_S)
+
+    def _judged(
+        self, fault: Fault, began_ns: int, at_ns: int, limit_ms: float, sent: list[int]
+    ) -> TrialResult:
+        ledger = read_ledger(self.ledger_path)
+        moved = [i for i in propelled(ledger, self._wiring) if i.end_ns > began_ns]
+        deadline_ms = self._plan.limits.deadline_ms
+        commands = [Command(sent_ns, deadline_ms) for sent_ns in sent]
+        # Faults of the guard itself are promised a time of their own.
+        slack_ms = max(20.0, limit_ms - deadline_ms)
+        strangers = unauthorised(ledger, self._wiring, commands, deadline_ms, slack_ms)
+        return TrialResult(
+            fault=fault.name,
+            stopped_ms=1e3 * time_to_rest(ledger, self._wiring, at_ns),
+            limit_ms=limit_ms,
+            drove=any(i.start_ns < at_ns for i in moved),
+            unauthorised=tuple(i for i in strangers if i.end_ns > began_ns),
+        )
+
+    @property
+    def ledger_path(self) -> Path:
+        """The ledger of the robot that runs.
+
+        Raises:
+            RobotError: If none runs.
+        """
+        return self._running().ledger_path

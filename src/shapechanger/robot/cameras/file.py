@@ -1,0 +1,57 @@
+"""A folder of JPEG files in place of a camera, one after the other and again from the start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.cameras.checked import check_jpeg
+from shapechanger.robot.cameras.pace import Pace
+from shapechanger.robot.cameras.turned import turned
+
+__all__ = ["Folder", "open_driver"]
+
+_SUFFIXES: Final = (".jpg", ".jpeg")
+
+
+class Folder:
+    """A camera that sees what is in a folder, in the order of the names; see `Camera`."""
+
+    def __init__(self, plan: CameraPlan) -> None:
+        folder = Path(str(plan.settings["path"])).expanduser()
+        try:
+            self._files = sorted(
+                file for file in folder.iterdir() if file.suffix.lower() in _SUFFIXES
+            )
+        except OSError as error:
+            raise RobotError(f"The folder of pictures cannot be read: {error}.") from error
+        if not self._files:
+            raise RobotError(f"There is no .jpg or .jpeg file in {folder}.")
+        self._plan = plan
+        self._next = 0
+        self._pace = Pace(plan.fps)
+
+    def read(self) -> Frame:
+        """Wait for the next picture; see `Camera.read`. A bad file is named, and then left out."""
+        captured_ns = self._pace.wait()
+        file = self._files[self._next]
+        self._next = (self._next + 1) % len(self._files)
+        try:
+            jpeg = file.read_bytes()
+            check_jpeg(jpeg, self._plan.size)
+        except (OSError, RobotError) as error:
+            raise RobotError(f"{file}: {error}") from error
+        if self._plan.flip:
+            jpeg = turned(jpeg, self._plan.jpeg_quality)
+        return Frame(jpeg, captured_ns)
+
+    def close(self) -> None:
+        """End a `read` that waits."""
+        self._pace.close()
+
+
+def open_driver(plan: CameraPlan) -> Folder:
+    """Open the folder `path`."""
+    return Folder(plan)

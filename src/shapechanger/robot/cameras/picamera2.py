@@ -1,0 +1,107 @@
+"""The Raspberry Pi's camera over picamera2, which comes with the system and not from PyPI.
+
+It was run against a recording fake only, and never on a camera. Names and meanings: picamera2's
+source and manual (The Picamera2 Library, sections 4 and 6).
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, Final
+
+import numpy as np
+import simplejpeg
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+
+__all__ = ["PiCamera", "open_driver"]
+
+_SILENT_S: Final = 2.0  # Some camera stacks stop without a word (picamera2#1004); this one says so.
+
+# The name is that of a word in memory: "BGR888" is red, green, blue byte by byte, as we want it.
+_FORMAT: Final = "BGR888"
+
+
+class PiCamera:
+    """A camera on the Pi's own connector; see `Camera`."""
+
+    def __init__(self, plan: CameraPlan, camera: Any, transform: Any) -> None:
+        self._plan = plan
+        self._camera = camera
+        self._lock = threading.Lock()  # `close` waits until a `read` has its picture.
+        self._closed = False
+        period_us = round(1e6 / plan.fps)
+        try:
+            camera.configure(
+                camera.create_video_configuration(
+                    main={"size": plan.size, "format": _FORMAT},
+                    transform=transform,
+                    # Never the picture from before the call (picamera2#787).
+                    queue=False,
+                    controls={"FrameDurationLimits": (period_us, period_us)},
+                )
+            )
+            camera.start()
+        except RuntimeError as error:
+            camera.close()
+            raise RobotError(f"The Pi's camera does not start: {error}.") from error
+
+    def read(self) -> Frame:
+        """Wait for the next picture; see `Camera.read`."""
+        with self._lock:
+            if self._closed:
+                raise RobotError("The camera is closed.")
+            try:
+                request = self._camera.capture_request(wait=_SILENT_S)
+            except (TimeoutError, RuntimeError) as error:
+                raise RobotError(
+                    f"The Pi's camera has given nothing for {_SILENT_S:g} s; is its cable in?"
+                ) from error
+            try:
+                image = np.ascontiguousarray(request.make_array("main"))
+                # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
+                captured_ns = int(request.get_metadata()["SensorTimestamp"])
+            finally:
+                request.release()
+        width, height = self._plan.size
+        if image.shape != (height, width, 3):
+            raise RobotError(
+                f"The Pi's camera gave a picture of {image.shape[1]} by {image.shape[0]} pixels; "
+                f"the profile says {width} by {height}."
+            )
+        quality = self._plan.jpeg_quality
+        return Frame(simplejpeg.encode_jpeg(image, quality, colorsubsampling="420"), captured_ns)
+
+    def close(self) -> None:
+        """Stop the camera; a `read` that waits gets its picture first, or its error."""
+        with self._lock:
+            if not self._closed:
+                self._closed = True
+                self._camera.stop()
+                self._camera.close()
+
+
+def open_driver(plan: CameraPlan) -> PiCamera:
+    """Open camera `number`, counted from 0.
+
+    Raises:
+        RobotError: If picamera2 is not installed, or there is no such camera.
+    """
+    try:
+        from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
+        from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
+    except ImportError as error:
+        raise RobotError(
+            "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a virtual "
+            "environment made with `python3 -m venv --system-site-packages` by the system's Python."
+        ) from error
+    turn = int(plan.flip)
+    try:
+        camera = Picamera2(int(plan.settings["number"]))
+    except (RuntimeError, IndexError) as error:
+        raise RobotError(
+            f"There is no camera {plan.settings['number']}: {error}. `rpicam-hello --list-cameras` "
+            "lists what the system sees."
+        ) from error
+    return PiCamera(plan, camera, Transform(hflip=turn, vflip=turn))

@@ -1,0 +1,118 @@
+"""A stream of JPEG pictures from a named pipe, a file or a program, such as rpicam-vid or ffmpeg.
+
+Where a picture says in a comment segment when it was taken (`captured_ns=`, monotonic), that is its
+time; otherwise it is when its last byte arrived, which hides the delay of the source.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import stat
+import subprocess
+import time
+from typing import Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.cameras.checked import check_jpeg
+from shapechanger.robot.cameras.interruption import Interruption
+from shapechanger.robot.cameras.jpeg_stream import JpegSplitter, captured_ns_of
+from shapechanger.robot.cameras.turned import turned
+
+__all__ = ["Pipe", "open_driver"]
+
+_CHUNK: Final = 64 * 1024  # Bytes; as many as a pipe of Linux holds.
+_PROGRAM_ENDS_S: Final = 2.0
+
+
+class Pipe:
+    """A camera at the other end of a pipe; see `Camera`.
+
+    Of several pictures that have arrived, the newest is given, except from a file.
+    """
+
+    def __init__(self, plan: CameraPlan) -> None:
+        self._plan = plan
+        self._path = str(plan.settings["path"])
+        self._program: subprocess.Popen[bytes] | None = None
+        self._splitter = JpegSplitter()
+        self._interruption = Interruption()
+        self._fd: int | None = None
+        try:
+            self._fd = self._open()
+        except OSError as error:
+            raise RobotError(f"The stream cannot be opened: {error}.") from error
+        self._live = not stat.S_ISREG(os.fstat(self._fd).st_mode)
+
+    def read(self) -> Frame:
+        """Wait for the next picture; see `Camera.read`. After garbage the next call goes on."""
+        jpeg: bytes | None = self._splitter.next()
+        while jpeg is None:
+            self._feed()
+            jpeg = self._splitter.next()
+        arrived_ns = time.monotonic_ns()
+        while self._live and (newer := self._splitter.next()) is not None:
+            jpeg = newer
+        check_jpeg(jpeg, self._plan.size)
+        captured_ns = captured_ns_of(jpeg)
+        if self._plan.flip:
+            jpeg = turned(jpeg, self._plan.jpeg_quality)
+        return Frame(jpeg, arrived_ns if captured_ns is None else captured_ns)
+
+    def close(self) -> None:
+        """End a `read` that waits, and the program."""
+        self._interruption.set()
+        if self._program is not None and self._program.poll() is None:
+            self._program.terminate()
+            try:
+                self._program.wait(_PROGRAM_ENDS_S)
+            except subprocess.TimeoutExpired:
+                self._program.kill()
+                self._program.wait()
+
+    def __del__(self) -> None:
+        # Not in `close`: a `read` in another thread may still wait on it.
+        if self._fd is not None:
+            os.close(self._fd)
+
+    def _open(self) -> int:
+        if self._path.startswith("|"):
+            fd, its_end = os.pipe()
+            try:
+                self._program = subprocess.Popen(
+                    shlex.split(self._path[1:]), stdin=subprocess.DEVNULL, stdout=its_end
+                )
+            except OSError:
+                os.close(fd)
+                raise
+            finally:
+                os.close(its_end)
+            return fd
+        # A named pipe would otherwise wait for its writer here.
+        return os.open(os.path.expanduser(self._path), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+
+    def _feed(self) -> None:
+        if self._fd is None:
+            self._fd = self._open()
+        self._interruption.wait(self._fd)
+        try:
+            data = os.read(self._fd, _CHUNK)
+        except BlockingIOError:
+            return  # Somebody else has read it; a named pipe may have several readers.
+        if not data:
+            self._start_again()
+            raise RobotError(f"The stream of {self._path} has ended.")
+        self._splitter.feed(data)
+
+    def _start_again(self) -> None:
+        # The next read opens the pipe afresh and waits for its next writer.
+        self._splitter = JpegSplitter()
+        if self._program is None and self._live and self._fd is not None:
+            os.close(self._fd)
+            self._fd = None
+
+
+def open_driver(plan: CameraPlan) -> Pipe:
+    """Open the stream `path`: a named pipe, a file or, after a `|`, a program and its arguments."""
+    return Pipe(plan)

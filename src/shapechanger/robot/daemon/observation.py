@@ -1,0 +1,115 @@
+"""What a client is told of the robot, from what the guard and the camera said last."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Observation
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.lease import Holder
+from shapechanger.robot.guard.wire import GuardState
+
+__all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
+
+ABSENT: Final = "absent"
+"""Source of a quantity that nothing measures; its number is NaN, never an invented 0."""
+
+_APPLIED: Final = "/applied"
+
+
+@dataclass(frozen=True, slots=True)
+class NumberedFrame:
+    """A picture that was found good, with its number; the same number is the same picture."""
+
+    seq: int
+    frame: Frame
+
+
+class StateReader:
+    """Puts the quantities of the guard in the order of the state layout.
+
+    Args:
+        state_layout: What the state holds.
+        action_layout: What a command holds.
+    """
+
+    def __init__(self, state_layout: Layout, action_layout: Layout) -> None:
+        self._features = state_layout.features
+        self._places = {name: i for i, name in enumerate(action_layout.names)}
+
+    def values(self, state: GuardState | None) -> tuple[float, ...]:
+        """The numbers of the state layout; NaN for each that is not known."""
+        return tuple(
+            self._value(feature.name, state)
+            for feature in self._features
+            for _ in range(feature.size)
+        )
+
+    def sources(self, state: GuardState | None) -> dict[str, str]:
+        """Where each quantity comes from."""
+        named = [f.name for f in self._features if not f.name.endswith(_APPLIED)]
+        known = {} if state is None else state.sources
+        return {name: ABSENT for name in named if name not in known} | known
+
+    def _value(self, name: str, state: GuardState | None) -> float:
+        if state is None:
+            return math.nan
+        place = self._places.get(name.removesuffix(_APPLIED)) if name.endswith(_APPLIED) else None
+        if place is not None and place < len(state.applied):
+            return state.applied[place]
+        return state.quantities.get(name, math.nan)
+
+
+def build_observation(
+    *,
+    seq: int,
+    now_ns: int,
+    reader: StateReader,
+    state: GuardState | None,
+    newest: NumberedFrame | None,
+    frame_sent: int | None,
+    lease: int,
+    command_ns: int | None,
+    holder: Holder | None,
+    mine: bool,
+) -> Observation:
+    """Put an observation together.
+
+    Args:
+        seq: Its number.
+        now_ns: The robot's time.
+        reader: Knows the layouts.
+        state: What the guard said last; None for nothing yet.
+        newest: The newest good picture; None for none yet.
+        frame_sent: Number of the last picture that this client was sent; None if it wants none.
+        lease: Number of the lease in force. A command of an older one is not this driver's.
+        command_ns: When the command behind `state.applied` arrived.
+        holder: Who commands.
+        mine: Whether that is the client.
+    """
+    state_ns = now_ns if state is None else state.at_ns
+    is_new = newest is not None and frame_sent is not None and newest.seq != frame_sent
+    drives = state is not None and state.applied_session == lease and state.applied_seq is not None
+    return Observation(
+        seq=seq,
+        captured_ns=state_ns if newest is None else newest.frame.captured_ns,
+        state_ns=state_ns,
+        sent_ns=now_ns,
+        frame=newest.frame.jpeg if newest is not None and is_new else None,
+        frame_seq=0 if newest is None else newest.seq,
+        state=reader.values(state),
+        sources=reader.sources(state),
+        action_applied=() if state is None else state.applied,
+        applied_seq=state.applied_seq if state is not None and drives else None,
+        applied_ns=state.applied_ns if state is not None and drives else None,
+        command_ns=command_ns if drives else None,
+        stop_reason="The guard has said nothing yet." if state is None else state.stop_reason,
+        armed=state is not None and state.armed,
+        emergency=state is not None and state.emergency,
+        emergencies=0 if state is None else state.emergencies,
+        holder="" if holder is None else holder.name,
+        mine=mine,
+    )

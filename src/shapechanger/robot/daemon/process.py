@@ -1,0 +1,209 @@
+"""The daemon's process: puts its parts together, and ends with the guard or the supervisor."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import signal
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import ShapechangerError
+from shapechanger.link.address import Address, is_loopback
+from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
+from shapechanger.link.mailbox import Latest
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.daemon.cockpit import Cockpit
+from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
+from shapechanger.robot.daemon.discovery import Announcement
+from shapechanger.robot.daemon.frames import FrameChecks, FrameReader
+from shapechanger.robot.daemon.guard_port import GuardPort
+from shapechanger.robot.daemon.log import start_log
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.server import Server
+from shapechanger.robot.daemon.session import Door
+from shapechanger.robot.daemon.timekeeper import Timekeeper
+from shapechanger.robot.guard.channel import Heartbeat
+from shapechanger.robot.guard.serve_plan import read_plan_fd
+from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.hardware import Clock, connect
+
+__all__ = ["Daemon", "main"]
+
+_log = logging.getLogger(__name__)
+
+_BEAT_S: Final = 0.05  # The supervisor wants one each 100 ms.
+
+
+class Daemon:
+    """A robot's daemon, from its start to its end.
+
+    Args:
+        plan: What it needs to know.
+        clock: Where time comes from.
+        guard_fd: Socket to the guard; this object owns it.
+        heartbeat_fd: Socket to the supervisor; None without one. This object owns it.
+        ready_fd: Where to tell the port once it is known; None for nowhere.
+    """
+
+    def __init__(
+        self,
+        plan: DaemonPlan,
+        clock: Clock,
+        guard_fd: int,
+        heartbeat_fd: int | None = None,
+        ready_fd: int | None = None,
+    ) -> None:
+        self._plan = plan
+        self._clock = clock
+        self._ended = asyncio.Event()
+        self._why = ""
+        self._port = GuardPort(
+            guard_fd,
+            on_state=self._on_state,
+            on_lost=lambda: self.end("The guard is gone."),
+        )
+        self._cockpit = Cockpit(plan, clock.now_ns, self._port.send)
+        self._heartbeat = None if heartbeat_fd is None else Heartbeat(heartbeat_fd, _BEAT_S)
+        self._ready_fd = ready_fd
+
+    async def run(self) -> str:
+        """Serve until told to end.
+
+        Returns:
+            Why it ended, in words; empty if it was asked to.
+
+        Raises:
+            RobotError: If it cannot begin.
+        """
+        plan, loop = self._plan, asyncio.get_running_loop()
+        check_exposure(plan)
+        key = read_key(Path(plan.key_file)) if plan.key_file else b""
+        tls, fingerprint = None, b""
+        if plan.certificate:
+            tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
+        time = Timekeeper(self._clock, self._cockpit, self._port.drain)
+        server = Server(self._cockpit, time, Door(key, fingerprint), tls)
+        beating = asyncio.create_task(self._beat())
+        self._port.attach(loop)
+        camera = None if plan.camera is None else self._camera(plan.camera, loop)
+        announcement = None
+        try:
+            port = await server.start()
+            self._say_ready(port, fingerprint)
+            if plan.discovery and not is_loopback(plan.host):
+                announcement = Announcement(plan, port, fingerprint)
+                await announcement.start()
+            await self._ended.wait()
+        finally:
+            # The guard stops first: it sees the end of this socket.
+            self._port.close()
+            if camera is not None:
+                await asyncio.to_thread(camera.close)
+            await server.close()
+            if announcement is not None:
+                await announcement.close()
+            beating.cancel()
+            await asyncio.gather(beating, return_exceptions=True)
+            if self._heartbeat is not None:
+                self._heartbeat.close()
+        return self._why
+
+    def end(self, why: str = "") -> None:
+        """Stop serving."""
+        self._why = self._why or why
+        self._ended.set()
+
+    def _on_state(self, state: GuardState) -> None:
+        self._cockpit.on_state(state)
+
+    async def _beat(self) -> None:
+        """Show the supervisor that the event loop turns."""
+        while self._heartbeat is not None:
+            self._heartbeat.beat()
+            if self._heartbeat.lost:
+                self.end("The supervisor is gone.")
+                return
+            await asyncio.sleep(_BEAT_S)
+
+    def _camera(self, plan: CameraPlan, loop: asyncio.AbstractEventLoop) -> FrameReader:
+        """Start to read the camera; of what piles up while the loop is busy, the newest counts."""
+        newest: Latest[Frame] = Latest()
+
+        def collect() -> None:
+            frame = newest.take()
+            if frame is not None:
+                self._cockpit.on_frame(frame)
+
+        def call(work: Callable[[], None]) -> None:
+            with contextlib.suppress(RuntimeError):  # The loop has ended, and the thread not yet.
+                loop.call_soon_threadsafe(work)
+
+        def deliver(frame: Frame) -> None:
+            newest.put(frame)
+            call(collect)
+
+        def report(text: str) -> None:
+            _log.warning("Camera: %s", text)
+            call(lambda: self._cockpit.event("camera", text))
+
+        now_ns = self._clock.now_ns if self._plan.clock == "real" else None
+        reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)
+        reader.start()
+        return reader
+
+    def _say_ready(self, port: int, fingerprint: bytes) -> None:
+        """Tell people, and whoever started this, where the robot is."""
+        plan = self._plan
+        secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
+        _log.info("%s listens at %s, %s.", plan.robot, Address(plan.host, port), secured)
+        ready = {"port": port, "fingerprint": fingerprint_hex(fingerprint)}
+        line = json.dumps(ready).encode() + b"\n"
+        try:
+            if self._ready_fd is not None:
+                os.write(self._ready_fd, line)
+                os.close(self._ready_fd)
+            if plan.ready_file:
+                partial = Path(f"{plan.ready_file}.partial")
+                partial.write_bytes(line)
+                partial.replace(plan.ready_file)
+        except OSError as error:
+            # Nobody is told, and the robot serves all the same.
+            _log.warning("The port cannot be told: %s", error)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the daemon; the exit status."""
+    parser = argparse.ArgumentParser(prog="shapechanger.robot.daemon", description=__doc__)
+    parser.add_argument("--plan-fd", type=int, required=True)
+    parser.add_argument("--guard-fd", type=int, required=True)
+    parser.add_argument("--heartbeat-fd", type=int)
+    parser.add_argument("--ready-fd", type=int)
+    asked = parser.parse_args(arguments)
+    serve_plan = read_plan_fd(asked.plan_fd)
+    os.close(asked.plan_fd)
+    log = start_log("daemon")
+    try:
+        plan = DaemonPlan.from_dict(serve_plan.daemon)
+        source, argument = serve_plan.hardware
+        clock = connect(source, argument).clock
+        why = asyncio.run(_run(plan, clock, asked))
+    except ShapechangerError as error:
+        why = str(error)
+    if why:
+        _log.error("%s", why)
+    log.stop()
+    return 1 if why else 0
+
+
+async def _run(plan: DaemonPlan, clock: Clock, asked: argparse.Namespace) -> str:
+    daemon = Daemon(plan, clock, asked.guard_fd, asked.heartbeat_fd, asked.ready_fd)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, daemon.end)
+    return await daemon.run()

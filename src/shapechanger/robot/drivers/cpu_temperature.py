@@ -1,0 +1,50 @@
+"""The temperature of the computer itself, as the kernel tells it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import text
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["CpuTemperature", "open_driver"]
+
+_PERIOD_NS: Final = 1_000_000_000
+
+
+class CpuTemperature:
+    """The temperature in a file of the kernel; see `SensorDriver`."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path = path
+        self._name = name
+        self._read_ns: int | None = None
+        self._celsius = self._measure()
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """The "temperature" in degrees Celsius, measured once a second."""
+        if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
+            self._celsius = self._measure()
+            self._read_ns = now_ns
+        return {"temperature": self._celsius}
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _measure(self) -> float:
+        with in_words(self._name):
+            written = self._path.read_text()
+        try:
+            # Thousandths of a degree: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
+            return int(written) / 1000.0
+        except ValueError as error:
+            raise RobotError(f"{self._name} says {written!r} at {self._path}.") from error
+
+
+def open_driver(plan: SensorPlan, hardware: Hardware) -> CpuTemperature:
+    """Open the file; its `path` is the one setting."""
+    return CpuTemperature(Path(text(plan.settings, "path")), f"Sensor {plan.name!r}")

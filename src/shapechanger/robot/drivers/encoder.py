@@ -1,0 +1,136 @@
+"""Wheel encoders: speed from the times of their edges."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from typing import Any, Final
+
+from shapechanger.robot.drivers.edges import EdgeInput
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["Encoder", "open_driver"]
+
+# How long without an edge until the wheel stands.
+_STANDS_AFTER_S: Final = 0.5
+
+# Four edges a count, so that the unequal lengths of a count's four quarters even out.
+_EDGES_PER_COUNT: Final = 4
+
+# Step of the position from one state of (a, b) to the next, forward when a leads: 00, 10, 11, 01.
+# Missing: no change, or two at once, which says nothing about the direction.
+_STEPS: Final = {
+    (0b00, 0b10): 1,
+    (0b10, 0b11): 1,
+    (0b11, 0b01): 1,
+    (0b01, 0b00): 1,
+    (0b10, 0b00): -1,
+    (0b11, 0b10): -1,
+    (0b01, 0b11): -1,
+    (0b00, 0b01): -1,
+}
+
+
+class Encoder:
+    """An encoder with one channel or two; see `SensorDriver`.
+
+    With two channels (quadrature) it knows the direction, and each edge is a quarter of a count.
+    With one, rising edges are counts, and the direction is that of the propulsion.
+    """
+
+    def __init__(self, a: int, b: int | None, count_m: float, factory: Any, name: str) -> None:
+        self._name = name
+        self._two_channels = b is not None
+        self._edge_m = count_m / _EDGES_PER_COUNT if self._two_channels else count_m
+        self._lock = threading.Lock()  # lgpio calls back from a thread of its own.
+        self._state = 0
+        self._edges: deque[tuple[float, int]] = deque(
+            maxlen=_EDGES_PER_COUNT + 1 if self._two_channels else 2
+        )
+        self._count = 0
+        self._count_read = 0
+        self._last_edge_ns = 0
+        self._speed = 0.0
+        self._sign = 1.0
+        self._inputs = [EdgeInput(a, "up", factory, self._a_changed)]
+        if b is not None:
+            self._inputs.append(EdgeInput(b, "up", factory, self._b_changed))
+        with self._lock:
+            levels = [one.level for one in self._inputs]
+            self._state = levels[0] << 1 | levels[-1] if self._two_channels else levels[0]
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """The "speed" in m/s, positive forward."""
+        with self._lock:
+            edges, count = list(self._edges), self._count
+        if direction != 0.0:
+            self._sign = math.copysign(1.0, direction)
+        if count != self._count_read:
+            self._count_read, self._last_edge_ns = count, now_ns
+            self._speed = self._speed_from(edges)
+        else:
+            # The next edge has not come yet, so the wheel turns at most this fast.
+            since_s = (now_ns - self._last_edge_ns) / 1e9
+            if since_s > _STANDS_AFTER_S:
+                self._speed = 0.0
+            elif since_s > 0.0:
+                most = self._edge_m / since_s
+                self._speed = min(max(self._speed, -most), most)
+        return {"speed": self._speed if self._two_channels else self._speed * self._sign}
+
+    def close(self) -> None:
+        """Let go of the pins."""
+        for one in self._inputs:
+            one.close()
+
+    def _speed_from(self, edges: list[tuple[float, int]]) -> float:
+        if len(edges) < 2 or edges[-1][0] <= edges[0][0]:
+            return 0.0
+        moved_m = sum(step for _, step in edges[1:]) * self._edge_m
+        return moved_m / (edges[-1][0] - edges[0][0])
+
+    def _a_changed(self, at_s: float, level: int) -> None:
+        if self._two_channels:
+            with self._lock:
+                self._enter(at_s, (self._state & 0b01) | level << 1)
+        elif level == 1:
+            with self._lock:
+                self._add(at_s, 1)
+
+    def _b_changed(self, at_s: float, level: int) -> None:
+        with self._lock:
+            self._enter(at_s, (self._state & 0b10) | level)
+
+    def _enter(self, at_s: float, state: int) -> None:
+        step = _STEPS.get((self._state, state))
+        self._state = state
+        if step is not None:
+            self._add(at_s, step)
+
+    def _add(self, at_s: float, step: int) -> None:
+        # What was before a turn back, or a stop, says nothing about the speed now.
+        if self._edges:
+            before_s, before_step = self._edges[-1]
+            if step != before_step or at_s - before_s > _STANDS_AFTER_S:
+                self._edges.clear()
+        self._edges.append((at_s, step))
+        self._count += 1
+
+
+def open_driver(plan: SensorPlan, hardware: Hardware) -> Encoder:
+    """Open the encoder.
+
+    The settings are the BCM pins `a` and `b` (-1 for none), `counts_per_turn` (rising edges of one
+    channel for a turn of the wheel) and `wheel_m` (circumference).
+    """
+    settings = plan.settings
+    b = whole(settings, "b")
+    count_m = number(settings, "wheel_m") / number(settings, "counts_per_turn")
+    name = f"Sensor {plan.name!r}"
+    with in_words(name):
+        factory = hardware.pin_factory()
+        return Encoder(whole(settings, "a"), None if b < 0 else b, count_m, factory, name)

@@ -1,0 +1,115 @@
+"""A speed controller (ESC): a motor that understands servo pulses, with habits of its own."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+from shapechanger.errors import UnknownName
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
+from shapechanger.robot.drivers.settings import number, text
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["Esc", "open_driver"]
+
+_REVERSES: Final = ("direct", "double", "none")
+
+
+class Esc:
+    """A speed controller; see `OutputDriver`.
+
+    It obeys only after it has seen neutral for a while, so nothing else is sent until then. A car's
+    controller brakes at the first pulse below neutral, and reverses at the second one: `reverse`
+    "double" sends brake, neutral and reverse in a row. A pulse at neutral or above is sent at once.
+    """
+
+    def __init__(
+        self,
+        channel: PulseChannel,
+        pulses: PulseRange,
+        reverse: Literal["direct", "double", "none"],
+        arm_s: float,
+        brake_s: float,
+        name: str,
+    ) -> None:
+        self._channel = channel
+        self._pulses = pulses
+        self._reverse = reverse
+        self._arm_ns = round(arm_s * 1e9)
+        self._brake_ns = round(brake_s * 1e9)
+        self._name = name
+        self._neutral_since_ns: int | None = None
+        self._backward_since_ns: int | None = None
+        self._reverses = False
+        self._send(0.0)
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Drive, and say how much; see `OutputDriver.write`."""
+        if self._neutral_since_ns is None:
+            self._neutral_since_ns = now_ns
+        if now_ns - self._neutral_since_ns < self._arm_ns:
+            return self._send(0.0)
+        if value < 0.0:
+            return self._backward(value, now_ns)
+        self._backward_since_ns = None
+        if value > 0.0:
+            self._reverses = False  # It has gone forward, so it will brake first.
+        return self._send(value)
+
+    def release(self) -> None:
+        """No pulse; the controller must see neutral again before it obeys."""
+        with in_words(self._name):
+            self._channel.release()
+        self._neutral_since_ns = self._backward_since_ns = None
+        self._reverses = False
+
+    def close(self) -> None:
+        """No pulse, and let go of the channel."""
+        with in_words(self._name):
+            self._channel.close()
+
+    def _backward(self, value: float, now_ns: int) -> float:
+        if self._reverse == "none":
+            return self._send(0.0)
+        if self._reverse == "direct" or self._reverses:
+            return self._send(value)
+        if self._backward_since_ns is None:
+            self._backward_since_ns = now_ns
+        since_ns = now_ns - self._backward_since_ns
+        if since_ns < self._brake_ns:
+            self._send(value)
+            return 0.0  # It brakes, and does not go backward.
+        if since_ns < 2 * self._brake_ns:
+            return self._send(0.0)
+        self._reverses = True
+        return self._send(value)
+
+    def _send(self, value: float) -> float:
+        with in_words(self._name):
+            width_us = self._channel.write_us(self._pulses.width_us(value))
+        # Neutral is neutral, also where a step of the pulses is a little beside it.
+        return self._pulses.value(width_us) if value else 0.0
+
+
+def open_driver(plan: OutputPlan, hardware: Hardware) -> Esc:
+    """Open the controller; it gets neutral.
+
+    The settings are those of `open_pulse_channel`, `backward_us`, `neutral_us` and `forward_us` (at
+    -1, 0 and 1), `arm_s` (neutral before it obeys), `reverse` ("direct", "double" or "none") and
+    `brake_ms` (how long "double" brakes, and then waits at neutral).
+
+    Raises:
+        UnknownName: If there is no such kind of reverse.
+    """
+    settings = plan.settings
+    name = f"Output {plan.name!r}"
+    reverse = text(settings, "reverse")
+    if reverse not in _REVERSES:
+        raise UnknownName("kind of reverse", reverse, _REVERSES)
+    keys = ("backward_us", "neutral_us", "forward_us")
+    pulses = PulseRange(*(number(settings, key) for key in keys))
+    with in_words(name):
+        channel = open_pulse_channel(settings, hardware)
+    arm_s, brake_s = number(settings, "arm_s"), number(settings, "brake_ms") / 1e3
+    return Esc(channel, pulses, reverse, arm_s, brake_s, name)

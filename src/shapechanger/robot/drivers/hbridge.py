@@ -1,0 +1,85 @@
+"""A motor on an H-bridge with two inputs, such as L298N, DRV8833 or TB6612FNG.
+
+One input turns it forward, the other one backward, each by its share of time (PWM). Some boards
+have a third input that enables both.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gpiozero import DigitalOutputDevice, Motor
+
+from shapechanger.robot.drivers.duty import Duty
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["HBridge", "open_driver"]
+
+
+class HBridge:
+    """A motor that goes forward and backward; see `OutputDriver`.
+
+    Never both inputs are on: `Motor` turns the one off before it turns the other one on, and on a
+    Pi `LowAtOncePin` makes that off take effect at once.
+    """
+
+    def __init__(
+        self, motor: Motor, enable: DigitalOutputDevice | None, duty: Duty, name: str
+    ) -> None:
+        self._motor = motor
+        self._enable = enable
+        self._duty = duty
+        self._name = name
+        self._written: float | None = None
+        self.write(0.0, 0)
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Turn the motor, and say how fast; see `OutputDriver.write`."""
+        drive = math.copysign(self._duty.of(value), value)
+        if drive != self._written:
+            with in_words(self._name):
+                self._motor.value = drive
+                if self._enable is not None:
+                    self._enable.on()
+            self._written = drive
+        return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
+
+    def release(self) -> None:
+        """Both inputs low and the bridge disabled: the motor runs out."""
+        with in_words(self._name):
+            self._motor.stop()
+            if self._enable is not None:
+                self._enable.off()
+        self._written = None
+
+    def close(self) -> None:
+        """Both inputs low; see `LowAtOncePin.close` for what the pins do then."""
+        if not self._motor.closed:
+            self.release()
+            self._motor.close()
+            if self._enable is not None:
+                self._enable.close()
+
+
+def open_driver(plan: OutputPlan, hardware: Hardware) -> HBridge:
+    """Open the motor; it stands.
+
+    The settings are the BCM pins `forward`, `backward` and `enable` (-1 for none), `pwm_hz`,
+    `start` and `full` (see `Duty`).
+    """
+    settings = plan.settings
+    forward, backward = whole(settings, "forward"), whole(settings, "backward")
+    enable = whole(settings, "enable")
+    name = f"Output {plan.name!r} on GPIO{forward} and GPIO{backward}"
+    with in_words(name):
+        factory = hardware.pin_factory()
+        # Ours and not that of `Motor`, which would be on before anything is written.
+        enabling = None if enable < 0 else DigitalOutputDevice(enable, pin_factory=factory)
+        motor = Motor(forward, backward, pin_factory=factory)
+        for device in (motor.forward_device, motor.backward_device):
+            device.frequency = whole(settings, "pwm_hz")
+    duty = Duty(number(settings, "start"), number(settings, "full"))
+    return HBridge(motor, enabling, duty, name)

@@ -1,0 +1,101 @@
+"""The distance sensor HC-SR04: an echo as long as the sound travels.
+
+Times and ranges: ElecFreaks, HC-SR04 ultrasonic ranging module, user guide. Its echo has 5 V; a Pi
+takes 3.3 V, so a divider is needed.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any, Final
+
+from gpiozero import DigitalOutputDevice
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.edges import EdgeInput
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["Hcsr04", "open_driver"]
+
+_TRIGGER_S: Final = 10e-6  # A pulse of 10 us starts a ping.
+_CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
+_SILENT_NS: Final = 1_000_000_000
+_SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
+
+
+class Hcsr04:
+    """A distance sensor; see `SensorDriver`. It never waits for an echo: the next read has it."""
+
+    def __init__(self, trigger: int, echo: int, max_m: float, factory: Any, name: str) -> None:
+        self._name = name
+        self._max_m = max_m
+        self._ticks_diff = factory.ticks_diff
+        self._lock = threading.Lock()  # lgpio calls back from a thread of its own.
+        self._rise: float | None = None
+        self._echo_s: float | None = None
+        self._distance_m: float | None = None
+        self._pinged_ns: int | None = None
+        self._heard_ns: int | None = None
+        self._trigger = DigitalOutputDevice(trigger, pin_factory=factory)
+        self._echo = EdgeInput(echo, "down", factory, self._changed)
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """The "distance" in m, at most `max_m`; nothing before the first echo.
+
+        Raises:
+            RobotError: If no echo has come for a second.
+        """
+        with self._lock:
+            echo_s, self._echo_s = self._echo_s, None
+        if echo_s is not None:
+            self._distance_m = min(echo_s * _SOUND_M_PER_S / 2.0, self._max_m)
+        if echo_s is not None or self._heard_ns is None:
+            self._heard_ns = now_ns
+        if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
+            self._pinged_ns = now_ns
+            self._ping()
+        if now_ns - self._heard_ns > _SILENT_NS:
+            self._distance_m = None
+            raise RobotError(f"{self._name} gives no echo: is it wired, and does it have 5 V?")
+        return {} if self._distance_m is None else {"distance": self._distance_m}
+
+    def close(self) -> None:
+        """Let go of the pins."""
+        self._trigger.close()
+        self._echo.close()
+
+    def _ping(self) -> None:
+        with in_words(self._name):
+            self._trigger.on()
+            time.sleep(_TRIGGER_S)
+            self._trigger.off()
+
+    def _changed(self, at_s: float, level: int) -> None:
+        with self._lock:
+            if level:
+                self._rise = at_s
+            elif self._rise is not None:
+                self._echo_s = self._ticks_diff(at_s, self._rise)
+                self._rise = None
+
+
+def open_driver(plan: SensorPlan, hardware: Hardware) -> Hcsr04:
+    """Open the sensor.
+
+    The settings are the BCM pins `trigger` and `echo`, and `max_m`: what it says when nothing is
+    near.
+    """
+    settings = plan.settings
+    name = f"Sensor {plan.name!r}"
+    with in_words(name):
+        return Hcsr04(
+            whole(settings, "trigger"),
+            whole(settings, "echo"),
+            number(settings, "max_m"),
+            hardware.pin_factory(),
+            name,
+        )

@@ -1,0 +1,56 @@
+"""The voltage sensor INA219 over I2C.
+
+Registers: Texas Instruments, INA219 data sheet, SBOS448G, section 8.6.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import whole
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware, I2cBus
+
+__all__ = ["Ina219", "open_driver"]
+
+_CONFIGURATION: Final = 0x00
+_BUS_VOLTAGE: Final = 0x02
+_CONTINUOUS_32_V: Final = (0x39, 0x9F)  # The value at power-up: 0x399F.
+_V_PER_STEP: Final = 0.004
+_STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
+_PERIOD_NS: Final = 100_000_000  # A battery is slow; the bus has better things to do.
+
+
+class Ina219:
+    """A voltage sensor; see `SensorDriver`."""
+
+    def __init__(self, bus: I2cBus, address: int, name: str) -> None:
+        self._bus = bus
+        self._address = address
+        self._name = name
+        self._read_ns: int | None = None
+        self._volts = 0.0
+        with in_words(name):
+            bus.write_i2c_block_data(address, _CONFIGURATION, _CONTINUOUS_32_V)
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """The voltage of the "battery" in V, measured ten times a second."""
+        if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
+            with in_words(self._name):
+                high, low = self._bus.read_i2c_block_data(self._address, _BUS_VOLTAGE, 2)
+            self._volts = ((high << 8 | low) >> _STATUS_BITS) * _V_PER_STEP
+            self._read_ns = now_ns
+        return {"battery": self._volts}
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._bus.close()
+
+
+def open_driver(plan: SensorPlan, hardware: Hardware) -> Ina219:
+    """Open the sensor; the settings are `bus` and `address`."""
+    bus, address = whole(plan.settings, "bus"), whole(plan.settings, "address")
+    name = f"Sensor {plan.name!r} at 0x{address:02x} on I2C bus {bus}"
+    with in_words(name):
+        return Ina219(hardware.i2c(bus), address, name)

@@ -1,0 +1,89 @@
+"""The pins of a Raspberry Pi over lgpio, made to be low at once, and to stay low.
+
+What lgpio does by itself, from the source of its transmitting thread (lg 0.2.2, `lgPthTx.c` and
+`xSetAsPwm` in `lgGpio.c`):
+
+* A new duty cycle, 0 too, acts from the next cycle on: up to 20 ms late at 50 Hz. The cycles of two
+  pins begin at different times, so both inputs of an H-bridge could be high for a while.
+* Ending PWM (`tx_pwm` with 0 Hz) forgets the pin without writing it: it keeps the level of that
+  moment.
+
+After a duty of 0 was asked for, the thread never writes a 1 again. So writing a plain 0 after it
+makes the pin low at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import lgpio
+from gpiozero.pins.lgpio import LGPIOFactory, LGPIOPin
+
+__all__ = ["LowAtOnceFactory", "LowAtOncePin", "open_gpio_chip"]
+
+_MOST_CHIPS: Final = 32
+
+
+class LowAtOncePin(LGPIOPin):
+    """A pin that is low as soon as it is told so."""
+
+    def close(self) -> None:
+        """Leave an output an output, at its level; one with PWM goes low first.
+
+        gpiozero would make it an input, which floats where no resistor pulls it. An output is
+        freed when the chip is closed; the kernel then keeps its level, or, with
+        `dtparam=strict_gpiod`, makes it an input.
+        """
+        if self.factory._handle is None or self.function != "output":
+            super().close()
+        elif self._pwm is not None:
+            self.frequency = None
+
+    def output_with_state(self, state: bool) -> None:
+        """Become an output at this level; gpiozero's would be low for a moment first."""
+        lgpio.gpio_claim_output(self.factory._handle, self._number, int(state))
+        self.state = state
+
+    def _set_state(self, value: float) -> None:
+        super()._set_state(value)
+        if value == 0:
+            self._write_low()
+
+    def _set_frequency(self, value: float | None) -> None:
+        super()._set_frequency(value)
+        if value is None or value == 0:
+            self._write_low()
+
+    def _write_low(self) -> None:
+        lgpio.gpio_write(self.factory._handle, self._number, 0)
+
+
+class LowAtOnceFactory(LGPIOFactory):
+    """The factory of such pins."""
+
+    def __init__(self, chip: int | None = None) -> None:
+        super().__init__(chip)
+        self.pin_class: Any = LowAtOncePin
+
+
+def open_gpio_chip() -> int:
+    """A handle of the chip that the header's pins are on.
+
+    Its number differs between models and kernels; its label does not: pinctrl-bcm2835,
+    pinctrl-bcm2711 or pinctrl-rp1.
+
+    Raises:
+        OSError: If there is none.
+    """
+    for chip in range(_MOST_CHIPS):
+        try:
+            handle = lgpio.gpiochip_open(chip)
+        except lgpio.error:
+            continue
+        _, _, _, label = lgpio.gpio_get_chip_info(handle)
+        if label.startswith("pinctrl-"):
+            return handle
+        lgpio.gpiochip_close(handle)
+    raise OSError(
+        "no gpiochip of a Raspberry Pi's header can be opened; its user must be in the group gpio"
+    )

@@ -1,0 +1,98 @@
+"""The motion sensor MPU-6050 over I2C.
+
+Registers: InvenSense, MPU-6000 and MPU-6050 register map and descriptions, RM-MPU-6000A, rev. 4.2.
+It is mounted with x forward, y left and z up.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.settings import whole
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware, I2cBus
+
+__all__ = ["Mpu6050", "open_driver"]
+
+_CONFIG: Final = 0x1A
+_GYRO_CONFIG: Final = 0x1B
+_ACCEL_CONFIG: Final = 0x1C
+_ACCEL_XOUT_H: Final = (
+    0x3B  # Seven big-endian numbers: acceleration x y z, temperature, rate x y z.
+)
+_PWR_MGMT_1: Final = 0x6B
+_WHO_AM_I: Final = 0x75
+
+_IDENTITY: Final = 0x68  # Of an MPU-6050, at both of its addresses.
+_LOW_PASS_44_HZ: Final = 3  # CONFIG, DLPF_CFG.
+_RANGE_500_DEG_PER_S: Final = 1 << 3  # GYRO_CONFIG, FS_SEL.
+_RANGE_4_G: Final = 1 << 3  # ACCEL_CONFIG, AFS_SEL.
+_AWAKE: Final = 1  # PWR_MGMT_1: not asleep, clock from the gyroscope of x.
+
+_M_PER_S2: Final = 9.80665 / 8192.0  # 8192 LSB/g at 4 g.
+_RAD_PER_S: Final = math.radians(1.0) / 65.5  # 65.5 LSB/(deg/s) at 500 deg/s.
+
+# A gyroscope at rest says up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"). So
+# while the robot is not told to move, what it says slowly becomes its zero.
+_MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
+_ZERO_SHARE: Final = 0.02
+
+
+class Mpu6050:
+    """A motion sensor; see `SensorDriver`."""
+
+    def __init__(self, bus: I2cBus, address: int, name: str) -> None:
+        self._bus = bus
+        self._address = address
+        self._name = name
+        self._zero_rad_per_s: float | None = None
+        with in_words(name):
+            identity = bus.read_byte_data(address, _WHO_AM_I)
+            if identity != _IDENTITY:
+                raise RobotError(
+                    f"{name} is no MPU-6050: it calls itself 0x{identity:02x}, "
+                    f"not 0x{_IDENTITY:02x}."
+                )
+            bus.write_byte_data(address, _PWR_MGMT_1, _AWAKE)
+            bus.write_byte_data(address, _CONFIG, _LOW_PASS_44_HZ)
+            bus.write_byte_data(address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
+            bus.write_byte_data(address, _ACCEL_CONFIG, _RANGE_4_G)
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Acceleration forward and left in m/s2, and yaw rate to the left in rad/s.
+
+        Gravity is part of the acceleration.
+
+        Raises:
+            RobotError: If it does not answer, or sleeps, as after a loss of power.
+        """
+        with in_words(self._name):
+            data = self._bus.read_i2c_block_data(self._address, _ACCEL_XOUT_H, 14)
+        x, y, z, _, _, _, yaw = struct.unpack(">7h", bytes(data))
+        if x == y == z == 0:  # Not even gravity.
+            raise RobotError(f"{self._name} sleeps: it has lost its power for a moment.")
+        rate = yaw * _RAD_PER_S
+        if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
+            zero = rate if self._zero_rad_per_s is None else self._zero_rad_per_s
+            self._zero_rad_per_s = zero + (rate - zero) * _ZERO_SHARE
+        return {
+            "acceleration_x": x * _M_PER_S2,
+            "acceleration_y": y * _M_PER_S2,
+            "yaw_rate": rate - (self._zero_rad_per_s or 0.0),
+        }
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._bus.close()
+
+
+def open_driver(plan: SensorPlan, hardware: Hardware) -> Mpu6050:
+    """Open the sensor; the settings are `bus` and `address`."""
+    bus, address = whole(plan.settings, "bus"), whole(plan.settings, "address")
+    name = f"Sensor {plan.name!r} at 0x{address:02x} on I2C bus {bus}"
+    with in_words(name):
+        return Mpu6050(hardware.i2c(bus), address, name)

@@ -1,0 +1,138 @@
+"""Pulses for servos and speed controllers: how wide for which value, and what sends them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.settings import text, whole
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["PulseChannel", "PulseRange", "open_pulse_channel"]
+
+
+@dataclass(frozen=True, slots=True)
+class PulseRange:
+    """The widths of the pulses at -1, 0 and 1, with straight lines between them.
+
+    Attributes:
+        low_us: Width at -1: left, or backward.
+        middle_us: Width at 0: centre, or neutral.
+        high_us: Width at 1: right, or forward. Smaller than `low_us` where a servo is mounted the
+            other way round.
+    """
+
+    low_us: float
+    middle_us: float
+    high_us: float
+
+    def __post_init__(self) -> None:
+        if (self.low_us - self.middle_us) * (self.high_us - self.middle_us) >= 0.0:
+            raise RobotError(
+                f"A middle of {self.middle_us} us must lie between {self.low_us} us and "
+                f"{self.high_us} us."
+            )
+
+    def width_us(self, value: float) -> float:
+        """The width for a value; beyond -1 to 1 it stays at the ends."""
+        end_us = self.high_us if value > 0.0 else self.low_us
+        return self.middle_us + (end_us - self.middle_us) * min(abs(value), 1.0)
+
+    def value(self, width_us: float) -> float:
+        """The value that a width stands for."""
+        up = (width_us - self.middle_us) / (self.high_us - self.middle_us)
+        if up >= 0.0:
+            return up
+        return -(width_us - self.middle_us) / (self.low_us - self.middle_us)
+
+
+class PulseChannel(Protocol):
+    """What sends the pulses of one servo."""
+
+    def write_us(self, width_us: float) -> float:
+        """Send pulses of this width from now on, and say which width they really have."""
+        ...
+
+    def release(self) -> None:
+        """Send none."""
+        ...
+
+    def close(self) -> None:
+        """Send none, and let go."""
+        ...
+
+
+class _PinChannel:
+    """Pulses on a pin, see `ServoPins`."""
+
+    def __init__(self, settings: Mapping[str, object], hardware: Hardware) -> None:
+        self._pin = whole(settings, "pin")
+        self._hz = whole(settings, "hz")
+        self._pins = hardware.servo_pins()
+        self._width_us: int | None = None
+
+    def write_us(self, width_us: float) -> float:
+        self._send(round(width_us))
+        return float(round(width_us))
+
+    def release(self) -> None:
+        self._send(0)
+
+    def close(self) -> None:
+        self._send(0)
+        self._pins.close()
+
+    def _send(self, width_us: int) -> None:
+        if width_us != self._width_us:
+            self._pins.pulse(self._pin, width_us, self._hz)
+            self._width_us = width_us
+
+
+def _on_pca9685(settings: Mapping[str, object], hardware: Hardware) -> PulseChannel:
+    from shapechanger.robot.drivers.pca9685 import open_channel
+
+    return open_channel(settings, hardware)
+
+
+def _on_pin(settings: Mapping[str, object], hardware: Hardware) -> PulseChannel:
+    return _PinChannel(settings, hardware)
+
+
+def _on_sysfs(settings: Mapping[str, object], hardware: Hardware) -> PulseChannel:
+    from shapechanger.robot.drivers.sysfs_pwm import SysfsPwm
+
+    return SysfsPwm(whole(settings, "chip"), whole(settings, "channel"), whole(settings, "hz"))
+
+
+_SENDERS: Final[dict[str, Callable[[Mapping[str, object], Hardware], PulseChannel]]] = {
+    "pca9685": _on_pca9685,
+    "lgpio": _on_pin,
+    "sysfs": _on_sysfs,
+}
+
+
+def open_pulse_channel(settings: Mapping[str, object], hardware: Hardware) -> PulseChannel:
+    """Open what sends the pulses; it sends none yet.
+
+    Args:
+        settings: `over` says by what: "pca9685" (with `bus`, `address`, `channel` and
+            `output_enable`, a BCM pin or -1), "lgpio" (with `pin`) or "sysfs" (with `chip` and
+            `channel`); `hz` how often.
+        hardware: Where the buses and pins are.
+
+    Raises:
+        UnknownName: If there is no such way.
+        RobotError: If pulses of gpiozero are wanted: over lgpio they have steps of 200 us, and
+            1.5 ms, where most controllers stand, becomes 1.4 ms (gpiozero#1209).
+    """
+    over = text(settings, "over")
+    if over == "gpiozero":
+        raise RobotError(
+            "gpiozero over lgpio makes servo pulses in steps of 200 us, and 1.4 ms out of 1.5 ms "
+            "(gpiozero#1209): take over = 'lgpio', 'pca9685' or 'sysfs'."
+        )
+    if over not in _SENDERS:
+        raise UnknownName("way to send pulses", over, _SENDERS)
+    return _SENDERS[over](settings, hardware)

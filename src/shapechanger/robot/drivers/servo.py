@@ -1,0 +1,64 @@
+"""A servo: a position for each pulse width."""
+
+from __future__ import annotations
+
+import math
+
+from shapechanger.robot.drivers.in_words import in_words
+from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
+from shapechanger.robot.drivers.settings import number
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["Servo", "open_driver"]
+
+
+class Servo:
+    """A servo; see `OutputDriver`. Until it is first told a position it gets no pulse."""
+
+    def __init__(
+        self, channel: PulseChannel, pulses: PulseRange, speed_per_s: float, name: str
+    ) -> None:
+        self._channel = channel
+        self._pulses = pulses
+        self._speed_per_s = speed_per_s
+        self._name = name
+        self._value: float | None = None
+        self._written_ns = 0
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Go to a position, no faster than it may; see `OutputDriver.write`."""
+        value = min(max(value, -1.0), 1.0)
+        if self._value is not None and math.isfinite(self._speed_per_s):
+            most = self._speed_per_s * (now_ns - self._written_ns) / 1e9
+            value = min(max(value, self._value - most), self._value + most)
+        with in_words(self._name):
+            width_us = self._channel.write_us(self._pulses.width_us(value))
+        self._value, self._written_ns = value, now_ns
+        return self._pulses.value(width_us)
+
+    def release(self) -> None:
+        """No pulse: most servos let go then."""
+        with in_words(self._name):
+            self._channel.release()
+        self._value = None
+
+    def close(self) -> None:
+        """No pulse, and let go of the channel."""
+        with in_words(self._name):
+            self._channel.close()
+
+
+def open_driver(plan: OutputPlan, hardware: Hardware) -> Servo:
+    """Open the servo; it gets no pulse yet.
+
+    The settings are those of `open_pulse_channel`, `left_us`, `centre_us` and `right_us` (at -1, 0
+    and 1), and `travel_deg_per_s`: how fast it is moved from one end to the other, where the whole
+    travel of a servo counts as 180 degrees; infinite for as fast as it can.
+    """
+    settings = plan.settings
+    name = f"Output {plan.name!r}"
+    pulses = PulseRange(*(number(settings, key) for key in ("left_us", "centre_us", "right_us")))
+    with in_words(name):
+        channel = open_pulse_channel(settings, hardware)
+    return Servo(channel, pulses, number(settings, "travel_deg_per_s") / 90.0, name)

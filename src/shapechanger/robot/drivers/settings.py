@@ -1,0 +1,42 @@
+"""Reads the settings of a driver out of its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar, cast
+
+from shapechanger.errors import RobotError
+
+__all__ = ["number", "text", "whole", "wholes"]
+
+_T = TypeVar("_T")
+
+
+def whole(settings: Mapping[str, object], key: str) -> int:
+    """A whole number, such as a pin."""
+    return _of_type(settings, key, int, "a whole number")
+
+
+def number(settings: Mapping[str, object], key: str) -> float:
+    """Any number, such as a length."""
+    if isinstance(value := settings.get(key), int) and not isinstance(value, bool):
+        return float(value)
+    return _of_type(settings, key, float, "a number")
+
+
+def text(settings: Mapping[str, object], key: str) -> str:
+    """A word."""
+    return _of_type(settings, key, str, "a word")
+
+
+def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
+    """Several whole numbers, such as pins."""
+    values = cast("list[object]", _of_type(settings, key, list, "a list of whole numbers"))
+    return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
+
+
+def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: str) -> _T:
+    value = settings.get(key)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise RobotError(f"The setting {key!r} must be {words}, not {value!r}.")
+    return value

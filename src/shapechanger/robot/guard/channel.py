@@ -1,0 +1,128 @@
+"""The guard's end of the sockets to daemon and supervisor; nothing here ever blocks."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+
+from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+
+__all__ = ["DaemonChannel", "Heartbeat"]
+
+# A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
+# same, should it send as fast as it is read.
+_MOST_ORDERS_A_ROUND = 1024
+
+
+class DaemonChannel:
+    """Orders in, states out.
+
+    Attributes:
+        lost: Whether the daemon is gone.
+
+    Args:
+        fd: Descriptor of the socket; this object owns it.
+    """
+
+    def __init__(self, fd: int) -> None:
+        self._socket = socket.socket(fileno=fd)
+        self._socket.setblocking(False)
+        self._socket.set_inheritable(False)
+        self.lost = False
+
+    def fileno(self) -> int:
+        """The descriptor, to wait for."""
+        return self._socket.fileno()
+
+    def orders(self) -> tuple[list[Order], list[str]]:
+        """All orders that have arrived, and why others were none, in words."""
+        orders: list[Order] = []
+        malformed: list[str] = []
+        for _ in range(_MOST_ORDERS_A_ROUND):
+            try:
+                data, _, flags, _ = self._socket.recvmsg(MAX_DATAGRAM)
+            except BlockingIOError:
+                break
+            except ConnectionResetError:
+                data, flags = b"", 0
+            if not data:  # The end, or an empty datagram, which nobody sends.
+                self.lost = True
+                break
+            try:
+                if flags & socket.MSG_TRUNC:
+                    raise ValueError(f"A datagram is larger than {MAX_DATAGRAM} bytes.")
+                orders.append(decode_order(data))
+            except ValueError as error:
+                malformed.append(str(error))
+        return orders, malformed
+
+    def send(self, state: GuardState) -> bool:
+        """Send a state; one for which there is no room is dropped.
+
+        Returns:
+            Whether it was sent.
+        """
+        try:
+            self._socket.send(encode(state))
+        except BlockingIOError:
+            return False
+        except (BrokenPipeError, ConnectionResetError):
+            self.lost = True
+            return False
+        return True
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class Heartbeat:
+    """Shows the supervisor that this process lives, and notices when the supervisor does not.
+
+    Args:
+        fd: Descriptor of the socket; this object owns it.
+        period_s: Real seconds between two beats.
+    """
+
+    def __init__(self, fd: int, period_s: float) -> None:
+        self._socket = socket.socket(fileno=fd)
+        self._socket.setblocking(False)
+        self._socket.set_inheritable(False)
+        self._poll = select.poll()
+        self._poll.register(fd, select.POLLIN)
+        self._period_ns = round(period_s * 1e9)
+        self._beaten_ns = 0
+        self.lost = False
+        """Whether the supervisor is gone."""
+
+    def fileno(self) -> int:
+        """The descriptor, to wait for."""
+        return self._socket.fileno()
+
+    def beat(self) -> None:
+        """Send a beat if one is due, and look whether the supervisor is there."""
+        if self._poll.poll(0):  # It never says anything; so this is the end.
+            self.lost = True
+        now_ns = time.monotonic_ns()
+        if self.lost or now_ns - self._beaten_ns < self._period_ns:
+            return
+        self._beaten_ns = now_ns
+        try:
+            # A supervisor that does not read is no reason to stop; its socket is then full.
+            with contextlib.suppress(BlockingIOError):
+                self._socket.send(b".")
+        except (BrokenPipeError, ConnectionResetError):
+            self.lost = True
+
+    def leave(self) -> int:
+        """Beat no more, and leave the socket open until the process is gone.
+
+        Its end tells the supervisor that the process is gone; told too early, it would kill one
+        that is about to end by itself.
+
+        Returns:
+            The descriptor.
+        """
+        return self._socket.detach()

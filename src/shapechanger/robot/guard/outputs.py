@@ -1,0 +1,101 @@
+"""All outputs of a robot as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+
+from shapechanger.robot.drivers.output import OutputDriver, open_output
+from shapechanger.robot.guard.mix import output_values
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.hardware import Hardware
+
+__all__ = ["Outputs", "drives_first"]
+
+
+def drives_first(plan: GuardPlan) -> GuardPlan:
+    """The robot with the outputs that propel it first: a slow servo must not delay their stop."""
+    propelling = {action.name for action in plan.actions if action.propels}
+    outputs = sorted(plan.outputs, key=lambda output: propelling.isdisjoint(output.mix))
+    return replace(plan, outputs=tuple(outputs))
+
+
+class Outputs:
+    """Opens all outputs at rest, writes to them, and puts each to rest whatever the others do.
+
+    Attributes:
+        values: The value that each output really has, by name.
+
+    Args:
+        plan: The robot.
+        hardware: Where the outputs are.
+
+    Raises:
+        RobotError: If an output does not answer; those opened before are closed.
+    """
+
+    def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
+        self._plan = plan = drives_first(plan)
+        self._rest = tuple(action.rest for action in plan.actions)
+        self._drivers: list[tuple[OutputPlan, OutputDriver]] = []
+        self._released = False
+        self.values = {output.name: 0.0 for output in plan.outputs}
+        with ExitStack() as undo:
+            for output in plan.outputs:
+                driver = open_output(output, hardware)
+                undo.callback(driver.close)
+                self._drivers.append((output, driver))
+            undo.pop_all()
+
+    def write(self, actions: Sequence[float], now_ns: int) -> None:
+        """Move all outputs, also those that have their value: some controllers need time."""
+        values = output_values(self._plan, actions)
+        for (output, driver), value in zip(self._drivers, values, strict=True):
+            self.values[output.name] = driver.write(value, now_ns)
+        self._released = False
+
+    def release(self) -> None:
+        """Let all outputs go, once."""
+        if self._released:
+            return
+        for output, driver in self._drivers:
+            driver.release()
+            self.values[output.name] = 0.0
+        self._released = True
+
+    def rest(self, now_ns: int) -> list[str]:
+        """Put every output to rest, also after one of them failed.
+
+        Returns:
+            What failed, in words.
+        """
+        failures: list[str] = []
+        values = output_values(self._plan, self._rest)
+        for (output, driver), value in zip(self._drivers, values, strict=True):
+            try:
+                self.values[output.name] = driver.write(value, now_ns)
+            except Exception as error:  # Whatever it is, the next output must rest too.
+                failures.append(_words(output, error))
+        self._released = False
+        return failures
+
+    def close(self, now_ns: int) -> list[str]:
+        """Put every output to rest and close it.
+
+        Returns:
+            What failed, in words.
+        """
+        # What was let go must not be gripped once more.
+        failures = [] if self._released else self.rest(now_ns)
+        for output, driver in self._drivers:
+            try:
+                driver.close()
+            except Exception as error:  # As above.
+                failures.append(_words(output, error))
+        self._drivers.clear()
+        return failures
+
+
+def _words(output: OutputPlan, error: Exception) -> str:
+    return f"Output {output.name}: {str(error) or type(error).__name__}"

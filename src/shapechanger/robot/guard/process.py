@@ -1,0 +1,256 @@
+"""The guard: the one process that owns the outputs of a robot.
+
+It trusts nobody. The daemon asks, `shapechanger.robot.guard.rules.Rules` decides, and this loop
+writes. It ends, with all outputs at rest, when it is told to (SIGTERM or the order "end"), when the
+supervisor is gone, and when anything goes wrong in it. A daemon that is gone disarms it.
+
+Exit codes: 0 when it was told to end or the supervisor is gone, 1 when something went wrong.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import signal
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard.arguments import descriptors
+from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
+from shapechanger.robot.guard.log import log_to_stderr
+from shapechanger.robot.guard.outputs import Outputs
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.priority import run_promptly
+from shapechanger.robot.guard.rules import Decision, Rules
+from shapechanger.robot.guard.sensors import Sensors
+from shapechanger.robot.guard.serve_plan import read_plan_fd
+from shapechanger.robot.guard.switches import Switches
+from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.hardware import Hardware, connect
+
+__all__ = ["BEAT_S", "Guard", "main"]
+
+BEAT_S: Final = 0.01
+"""Real seconds between two heartbeats; the supervisor expects one every 25 ms."""
+
+_WAIT_S: Final = 0.01  # Real seconds of one wait at most, while a twin's time stands still.
+_STATE_EVERY_NS: Final = 20_000_000  # 50 states a second at least.
+
+
+class Guard:
+    """The loop of the guard.
+
+    Args:
+        plan: The robot.
+        hardware: Its pins, buses and time.
+        daemon: Where orders come from.
+        heartbeat: How the supervisor knows that this lives.
+        log: Where to say what happens.
+    """
+
+    def __init__(
+        self,
+        plan: GuardPlan,
+        hardware: Hardware,
+        daemon: DaemonChannel,
+        heartbeat: Heartbeat,
+        log: logging.Logger,
+    ) -> None:
+        self._clock = hardware.clock
+        self._daemon = daemon
+        self._heartbeat = heartbeat
+        self._log = log
+        self._period_ns = round(1e9 / plan.tick_hz)
+        now_ns = self._clock.now_ns()
+        with contextlib.ExitStack() as undo:
+            # Outputs first: until they are open, whatever their pins did goes on.
+            self._outputs = Outputs(plan, hardware)
+            undo.callback(self._close_outputs)
+            self._switches = Switches(plan, hardware)
+            undo.callback(self._switches.close)
+            self._sensors = Sensors(plan, hardware)
+            undo.callback(self._sensors.close)
+            self._opened = undo.pop_all()
+        self._rules = Rules(plan, now_ns)
+        self._next_tick_ns = now_ns
+        self._healthy = True
+        self._failures: dict[str, str] = {}
+        self._malformed = 0
+        self._refused: tuple[str, int | None] = ("", None)
+        self._applied: tuple[int, int | None] = (0, None)
+        self._applied_ns: int | None = None
+        self._sent: GuardState | None = None
+        self._said = ""
+        self.is_safe = True
+        """Whether all outputs obeyed when they were closed."""
+        self.ended = ""
+        """Why it ends, in words; empty while it does not."""
+
+    def run(self) -> None:
+        """Guard until told to end."""
+        until_ns = self._clock.now_ns()
+        while not self.ended:
+            fds = [self._heartbeat.fileno()]
+            if not self._daemon.lost:  # The end of a stream can be read for ever.
+                fds.append(self._daemon.fileno())
+            has_something = self._clock.wait(fds, until_ns, _WAIT_S)
+            self._heartbeat.beat()
+            if self._heartbeat.lost:
+                self.ended = "the supervisor is gone"
+            elif has_something:
+                until_ns = self._round(self._clock.now_ns())
+
+    def close(self) -> None:
+        """Put all outputs to rest and let go of everything."""
+        self._opened.close()
+
+    def _close_outputs(self) -> None:
+        for failure in self._outputs.close(self._clock.now_ns()):
+            self.is_safe = False
+            self._log.error("%s", failure)
+
+    def _round(self, now_ns: int) -> int:
+        """Do what there is to do, and say when there is something to do again."""
+        self._obey()
+        if is_tick := now_ns >= self._next_tick_ns:
+            self._next_tick_ns = max(self._next_tick_ns, now_ns - self._period_ns)
+            self._next_tick_ns += self._period_ns
+            self._sense(now_ns)
+        decision = self._apply(now_ns)
+        if is_tick and self._healthy:
+            self._switches.toggle()
+        self._report(decision, now_ns)
+        return min(self._next_tick_ns, self._rules.next_wake_ns(now_ns))
+
+    def _obey(self) -> None:
+        orders, malformed = self._daemon.orders()
+        for order in orders:
+            if refusal := self._rules.offer(order, self._clock.now_ns()):
+                self._refused = (refusal, order.seq if order.kind == "command" else None)
+            if order.kind == "end":
+                self.ended = "the daemon ended it"
+        if malformed:
+            self._malformed += len(malformed)
+            self._refused = (malformed[-1], None)
+            self._log.warning("%d datagrams were no orders: %s", self._malformed, malformed[-1])
+        if self._daemon.lost:
+            self._rules.disarm("the daemon is gone.")
+
+    def _sense(self, now_ns: int) -> None:
+        self._rules.press(self._switches.pressed)
+        sensing = self._sensors.read(now_ns, self._rules.direction)
+        self._rules.sense(sensing, now_ns)
+        for name in sensing.failures.keys() - self._failures.keys():
+            self._log.warning("Sensor %s fails: %s", name, sensing.failures[name])
+        for name in self._failures.keys() - sensing.failures.keys():
+            self._log.info("Sensor %s answers again.", name)
+        self._failures = dict(sensing.failures)
+
+    def _apply(self, now_ns: int) -> Decision:
+        decision = self._rules.tick(now_ns)
+        if not self._healthy:
+            return self._recover(decision, now_ns)
+        try:
+            if decision.release:
+                self._outputs.release()
+            else:
+                self._outputs.write(decision.actions, now_ns)
+        except Exception as error:  # Whatever a driver raises: everything else must rest.
+            self._healthy = False
+            self._rules.fail(str(error) or type(error).__name__, now_ns)
+            return self._recover(decision, now_ns)
+        if self._applied != (decision.session, decision.seq):
+            self._applied = (decision.session, decision.seq)
+            self._applied_ns = None if decision.seq is None else self._clock.now_ns()
+        return decision
+
+    def _recover(self, decision: Decision, now_ns: int) -> Decision:
+        """Put all outputs to rest, again and again until each of them obeys."""
+        failures = self._outputs.rest(now_ns)
+        self._healthy = not failures
+        if failures and not self._rules.arming.emergency:
+            self._rules.fail(" ".join(failures), now_ns)
+        self._applied, self._applied_ns = (0, None), None
+        return self._rules.tick(now_ns) if decision.seq is not None else decision
+
+    def _report(self, decision: Decision, now_ns: int) -> None:
+        arming, senses = self._rules.arming, self._rules.senses
+        refused, refused_seq = self._refused
+        session, seq = self._applied
+        state = GuardState(
+            at_ns=now_ns,
+            armed=arming.armed,
+            emergency=arming.emergency,
+            emergencies=arming.emergencies,
+            stop_reason=decision.stop_reason,
+            applied=decision.actions,
+            applied_session=session,
+            applied_seq=seq,
+            applied_ns=self._applied_ns,
+            refused=refused,
+            refused_seq=refused_seq,
+            outputs=dict(self._outputs.values),
+            quantities=senses.quantities,
+            sources=senses.sources,
+            bumps=self._rules.bumps,
+        )
+        self._say(arming.reason or "Armed.")
+        sent = self._sent
+        # The next tick would be too late for some of them.
+        if sent is not None and now_ns + self._period_ns - sent.at_ns <= _STATE_EVERY_NS:
+            is_news = state != replace(sent, at_ns=now_ns)
+        else:
+            is_news = True
+        if is_news and not self._daemon.lost and self._daemon.send(state):
+            self._sent = replace(state, refused="", refused_seq=None)
+            self._refused = ("", None)
+
+    def _say(self, fact: str) -> None:
+        if fact != self._said:
+            self._log.info("%s", fact)
+            self._said = fact
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Run the guard; the arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`."""
+    log = log_to_stderr("guard")
+    try:
+        _guard(arguments, log)
+    except Exception as error:
+        log.critical("ends, for %s: %s", type(error).__name__, error)
+        sys.exit(1)
+
+
+def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
+    fds = descriptors(arguments, ("--plan-fd", "--daemon-fd", "--heartbeat-fd"))
+    told: list[str] = []
+    guard: Guard | None = None
+
+    def end(number: int, _: object) -> None:
+        told.append(f"told to by {signal.Signals(number).name}")
+        if guard is not None:
+            guard.ended = told[0]
+
+    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGINT, end)
+    with contextlib.ExitStack() as opened:
+        daemon = DaemonChannel(fds["--daemon-fd"])
+        opened.callback(daemon.close)
+        heartbeat = Heartbeat(fds["--heartbeat-fd"], BEAT_S)
+        opened.callback(heartbeat.leave)
+        plan = read_plan_fd(fds["--plan-fd"])
+        hardware = connect(*plan.hardware)
+        opened.callback(hardware.close)
+        guard = Guard(plan.guard, hardware, daemon, heartbeat, log)
+        opened.callback(guard.close)
+        if told:  # While it was being set up.
+            guard.ended = told[0]
+        run_promptly()
+        log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))
+        guard.run()
+        log.info("ends: %s.", guard.ended)
+    if not guard.is_safe:
+        raise RobotError("not all outputs are at rest")

@@ -1,0 +1,268 @@
+"""Everything that decides whether and how the outputs move, with the time handed in.
+
+Nothing here knows a pin, a socket or a clock, so that each rule can be tried at any moment. The
+process around it (`shapechanger.robot.guard.process`) hands in orders and what was sensed, and
+writes what `Rules.tick` decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard.arming import Arming
+from shapechanger.robot.guard.freshness import FUTURE_NS, Freshness
+from shapechanger.robot.guard.plan import GuardPlan, StopPlan
+from shapechanger.robot.guard.propulsion import Propulsion
+from shapechanger.robot.guard.reflexes import Bump, Health, Stall
+from shapechanger.robot.guard.senses import Senses, Sensing
+from shapechanger.robot.guard.shaping import aimed, slewed
+from shapechanger.robot.guard.stopping import Stopping
+from shapechanger.robot.guard.wire import Order
+
+__all__ = ["ARM_WITHIN_NS", "Decision", "Rules"]
+
+ARM_WITHIN_NS = 1_000_000_000
+"""Age from which on an order to arm is refused, ns: nobody looks at the robot any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What the outputs do from now on.
+
+    Attributes:
+        actions: One number for each action.
+        release: Whether the outputs let go instead.
+        stop_reason: Why the robot does not do what it was told, in words; empty when it does.
+        session: Session of the command behind it.
+        seq: Its number; None while the robot stands still by itself.
+    """
+
+    actions: tuple[float, ...]
+    release: bool
+    stop_reason: str
+    session: int
+    seq: int | None
+
+
+class Rules:
+    """The rules of one robot.
+
+    Attributes:
+        arming: Whether commands may move anything.
+        senses: What is sensed, and what follows from it.
+
+    Args:
+        plan: The robot.
+        now_ns: The time.
+
+    Raises:
+        RobotError: If an action rests outside its own caps.
+    """
+
+    def __init__(self, plan: GuardPlan, now_ns: int) -> None:
+        for action in plan.actions:
+            if not action.low <= action.rest <= action.high:
+                raise RobotError(
+                    f"Action {action.name!r} rests at {action.rest:g}, outside its caps "
+                    f"{action.low:g} to {action.high:g}."
+                )
+        self.arming = Arming()
+        self.senses = Senses()
+        self._plan = plan
+        self._period_ns = round(1e9 / plan.tick_hz)
+        self._stale_ns = plan.limits.camera_stale_ms * 1_000_000
+        self._freshness = Freshness(plan.limits.deadline_ms)
+        self._propulsion = Propulsion(plan.actions)
+        self._bump = Bump(plan.limits.bump_hold_ms)
+        self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
+        self._health = Health(plan)
+        self._is_near = False
+        self._is_pressed = False
+        self._command: Order | None = None
+        self._expiry_ns = 0
+        self._frame_ns: int | None = None
+        self._ticked_ns = now_ns
+        self._applied = tuple(action.rest for action in plan.actions)
+        # A guard starts at the end of a stop.
+        self._stopping: Stopping | None = self._rest_at_once(now_ns)
+
+    @property
+    def applied(self) -> tuple[float, ...]:
+        """What was decided last, one number for each action."""
+        return self._applied
+
+    @property
+    def direction(self) -> float:
+        """Sign of the propulsion: 1 forward, -1 backward, 0 neither."""
+        push = self._propulsion.push(self._applied)
+        return float((push > 0.0) - (push < 0.0))
+
+    @property
+    def bumps(self) -> int:
+        """How many bumps there were."""
+        return self._bump.count
+
+    def offer(self, order: Order, now_ns: int) -> str:
+        """Take in an order.
+
+        Returns:
+            Why it is refused, in words; empty when it is not.
+        """
+        self._see_frame(order, now_ns)
+        match order.kind:
+            case "command":
+                return self._offer_command(order, now_ns)
+            case "arm":
+                return self._arm(order, now_ns)
+            case "disarm":
+                self.disarm(order.reason)
+            case "emergency":
+                self.stop(order.reason)
+            case "end":
+                self.disarm("the guard ends.")
+        return ""
+
+    def disarm(self, reason: str) -> None:
+        """Keep everything at rest until armed again."""
+        self._command = None
+        self.arming.disarm(reason)
+
+    def stop(self, reason: str) -> None:
+        """Emergency stop."""
+        self._command = None
+        self.arming.stop(reason)
+
+    def fail(self, reason: str, now_ns: int) -> None:
+        """An output does not obey: an emergency stop without any hold or ramp."""
+        self.stop(reason)
+        self._stopping = self._rest_at_once(now_ns)
+
+    def press(self, pressed: bool) -> None:
+        """Take in whether the emergency button is pressed."""
+        if pressed and not self._is_pressed:
+            self.stop("the button was pressed.")
+        self._is_pressed = pressed
+
+    def sense(self, sensing: Sensing, now_ns: int) -> None:
+        """Take in what the sensors say."""
+        quantities = sensing.quantities
+        limit_m = self._plan.limits.stop_distance_m
+        self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m
+        self._bump.sense(quantities, now_ns)
+        self._stall.sense(quantities, self._propulsion.push(self._applied), now_ns)
+        self._health.sense(sensing, now_ns)
+        self.senses.complete(
+            sensing,
+            speed=self._propulsion.speed(self._applied),
+            stalled=self._stall.way != 0,
+            watches_stall=self._stall.watches,
+        )
+
+    def tick(self, now_ns: int) -> Decision:
+        """Decide what the outputs do from now on."""
+        # A pause of the process is no leave to jump.
+        elapsed_ns = min(now_ns - self._ticked_ns, 2 * self._period_ns)
+        self._ticked_ns = now_ns
+        command = self._command
+        if command is not None and now_ns >= self._expiry_ns:
+            command = self._command = None
+        reason = self.arming.reason or self._health.reason or self._blindness(now_ns)
+        if reason or command is None:
+            return self._stand(reason or "No fresh command.", now_ns)
+        return self._follow(command, elapsed_ns / 1e9, now_ns)
+
+    def next_wake_ns(self, now_ns: int) -> int:
+        """When `tick` must be asked again even if nothing happens."""
+        times = [now_ns + self._period_ns]
+        if self._command is not None:
+            times.append(self._expiry_ns)
+        if self._stale_ns and self._frame_ns is not None:
+            times.append(self._frame_ns + self._stale_ns)
+        if self._bump.until_ns is not None:
+            times.append(self._bump.until_ns)
+        if self._stopping is not None and (end_ns := self._stopping.next_ns(now_ns)) is not None:
+            times.append(end_ns)
+        return min(time_ns for time_ns in times if time_ns > now_ns)
+
+    def _offer_command(self, order: Order, now_ns: int) -> str:
+        if refusal := self._freshness.refusal(order, now_ns):
+            return refusal
+        wanted, given = len(self._plan.actions), len(order.values)
+        if given != wanted:
+            return f"Command {order.seq} has {given} values; this robot has {wanted} actions."
+        if not self.arming.armed:
+            return f"Command {order.seq} is refused. {self.arming.reason}"
+        self._command = order
+        self._expiry_ns = self._freshness.expiry_ns(order, now_ns)
+        return ""
+
+    def _arm(self, order: Order, now_ns: int) -> str:
+        if self._is_pressed:
+            return "Not armed: the emergency button is pressed."
+        age_ns = now_ns - order.issued_ns
+        if age_ns >= ARM_WITHIN_NS:
+            return f"Not armed: the order to arm is {age_ns / 1e9:.1f} s old."
+        if refusal := self.arming.arm(order.emergency):
+            return refusal
+        self._command = None  # What was said before does not move anything now.
+        self._health.rearm()
+        return ""
+
+    def _see_frame(self, order: Order, now_ns: int) -> None:
+        frame_ns = order.frame_ns
+        if frame_ns is not None and frame_ns <= now_ns + FUTURE_NS:
+            self._frame_ns = max(min(frame_ns, now_ns), self._frame_ns or 0)
+
+    def _blindness(self, now_ns: int) -> str:
+        if not self._stale_ns:
+            return ""
+        if self._frame_ns is None:
+            return "Blind: no picture yet."
+        if now_ns - self._frame_ns >= self._stale_ns:
+            return f"Blind: no picture for {self._plan.limits.camera_stale_ms} ms."
+        return ""
+
+    def _stand(self, reason: str, now_ns: int) -> Decision:
+        if self._stopping is None:
+            plan = self._plan
+            self._stopping = Stopping(plan.stop, plan.actions, self._applied, now_ns)
+        self._stall.ask(0.0)
+        self._applied = self._stopping.values(now_ns)
+        return Decision(self._applied, self._stopping.releases(now_ns), reason, 0, None)
+
+    def _follow(self, command: Order, elapsed_s: float, now_ns: int) -> Decision:
+        self._stopping = None
+        actions = self._plan.actions
+        aims = [aimed(a, value) for a, value in zip(actions, command.values, strict=True)]
+        self._stall.ask(self._propulsion.push(aims))
+        reason = self._hold_back(aims, now_ns)
+        self._applied = tuple(
+            slewed(a, now, aim, elapsed_s)
+            for a, now, aim in zip(actions, self._applied, aims, strict=True)
+        )
+        return Decision(self._applied, False, reason, command.session, command.seq)
+
+    def _hold_back(self, aims: list[float], now_ns: int) -> str:
+        """Drop from what is aimed at what a reflex does not allow, and say why."""
+        forward: list[str] = []
+        if self._bump.blocks(now_ns):
+            forward.append("Not forward: the bumper touched something.")
+        if self._is_near:
+            forward.append("Not forward: something is near.")
+        if self._stall.way > 0:
+            forward.append("Not forward: it pushes and does not move.")
+        backward = ["Not backward: it pushes and does not move."] if self._stall.way < 0 else []
+        reasons: list[str] = []
+        for i in self._propulsion.forward:
+            rest = self._plan.actions[i].rest
+            for words, drops in ((forward, aims[i] > rest), (backward, aims[i] < rest)):
+                if words and drops:
+                    aims[i] = rest
+                    reasons += words
+        return " ".join(dict.fromkeys(reasons))
+
+    def _rest_at_once(self, now_ns: int) -> Stopping:
+        actions = self._plan.actions
+        plan = StopPlan(then=self._plan.stop.then)
+        return Stopping(plan, actions, [a.rest for a in actions], now_ns)

@@ -1,0 +1,95 @@
+"""What the processes of a robot are started with, handed on as an open file.
+
+The command line checks a profile once, turns it into this plan and starts the supervisor with it.
+The file has no name, so that nothing is left behind and nobody can change it on the way, and lies
+in memory, so that a full disk does not keep a robot from starting.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shapechanger.robot.guard import start
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.hardware import REAL
+
+__all__ = ["ServePlan", "plan_fd", "read_plan_fd", "supervisor_command"]
+
+
+@dataclass(frozen=True, slots=True)
+class ServePlan:
+    """Everything that supervisor, guard and daemon need.
+
+    Attributes:
+        guard: What the guard needs.
+        daemon: What the daemon needs, as JSON; the supervisor hands it on unseen.
+        hardware: Where the hardware comes from, and the argument for it; see
+            `shapechanger.robot.hardware.connect`.
+        python: The interpreter that runs the processes.
+        patience_ms: How long the guard may show no sign of life at least before it is killed; the
+            guard's deadline where that is longer. 0 on a robot. On a twin's own clock time stands
+            still while a world is drawn, and a guard that waits for it is not dead.
+    """
+
+    guard: GuardPlan
+    daemon: dict[str, Any]
+    hardware: tuple[str, str] = (REAL, "")
+    python: str = sys.executable
+    patience_ms: int = 0
+
+    @property
+    def guard_silence_ms(self) -> int:
+        """How long the guard may show no sign of life before it is killed."""
+        return max(self.patience_ms, self.guard.limits.deadline_ms)
+
+    def to_json(self) -> str:
+        """The plan as JSON."""
+        fields = {
+            "guard": json.loads(self.guard.to_json()),
+            "daemon": self.daemon,
+            "hardware": list(self.hardware),
+            "python": self.python,
+            "patience_ms": self.patience_ms,
+        }
+        return json.dumps(fields)
+
+    @classmethod
+    def from_json(cls, text: str) -> ServePlan:
+        """Read what `to_json` wrote; for nothing else, since it checks nothing."""
+        data: dict[str, Any] = json.loads(text)
+        source, argument = data["hardware"]
+        return cls(
+            guard=GuardPlan.from_json(json.dumps(data["guard"])),
+            daemon=data["daemon"],
+            hardware=(source, argument),
+            python=data["python"],
+            patience_ms=data["patience_ms"],
+        )
+
+
+def plan_fd(plan: ServePlan) -> int:
+    """An open file with the plan, which child processes inherit; close it when they have it."""
+    fd = os.memfd_create("serve-plan", 0)  # Without MFD_CLOEXEC, so that `exec` keeps it open.
+    left = memoryview(plan.to_json().encode())
+    while left:
+        left = left[os.write(fd, left) :]
+    return fd
+
+
+def supervisor_command(plan: ServePlan, fd: int) -> list[str]:
+    """What to run, or to become, with the plan open as `fd`."""
+    script = str(Path(start.__file__).resolve())
+    return [plan.python, "-I", script, "supervise", "--plan-fd", str(fd)]
+
+
+def read_plan_fd(fd: int) -> ServePlan:
+    """Read the plan; several processes may read the same file, since its position is not used."""
+    data = b""
+    while part := os.pread(fd, 1 << 16, len(data)):
+        data += part
+    return ServePlan.from_json(data.decode())

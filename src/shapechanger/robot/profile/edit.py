@@ -1,0 +1,91 @@
+"""Changes values in the file of a profile; its comments, order and blank lines stay."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import tomlkit
+from tomlkit.items import Item
+
+from shapechanger.errors import OutputError, UnknownName
+from shapechanger.robot.profile.load import profile_text
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.profile.read import read_profile
+
+__all__ = ["rewrite"]
+
+
+def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
+    """Change values, or add keys to tables that exist, all at once or not at all.
+
+    Args:
+        path: The file; where it is a link, the file that it leads to is changed.
+        changes: New values by dotted name, such as `output.steering.centre_us`.
+
+    Returns:
+        The profile as it is now.
+
+    Raises:
+        ProfileError: If the file is no profile, or would be none any more.
+        UnknownName: If a table is not in the file.
+        OutputError: If the file cannot be written; it is then as it was.
+    """
+    target = Path(path).resolve()
+    before = profile_text(target)
+    read_profile(before, target)
+    document: Any = tomlkit.parse(before)
+    for dotted, value in changes.items():
+        *tables, key = dotted.split(".")
+        table: Any = document
+        for name in tables:
+            known = [k for k, v in table.items() if isinstance(v, dict)]
+            if name not in known:
+                raise UnknownName(f"table of {target.name}", name, known)
+            table = table[name]
+        table[key] = _item(value, table, key)
+    text: str = tomlkit.dumps(document)
+    profile = read_profile(text, target)
+    _replace(target, text)
+    return profile
+
+
+def _item(value: Any, table: Any, key: str) -> Any:
+    """A value as tomlkit writes it; a table stays on one line, with the comment behind it."""
+    if not isinstance(value, dict):
+        return value
+    inline = tomlkit.inline_table()
+    for name, entry in cast("dict[str, Any]", value).items():
+        inline.append(name, entry)
+    if isinstance(before := table.get(key), Item):
+        inline.trivia.comment_ws = before.trivia.comment_ws
+        inline.trivia.comment = before.trivia.comment
+    return inline
+
+
+def _replace(target: Path, text: str) -> None:
+    """Write a file so that at each instant, also if the power fails, it is the old or the new."""
+    written: Path | None = None
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=target.parent, prefix=f".{target.name}.", delete=False
+        ) as file:
+            written = Path(file.name)
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        shutil.copymode(target, written)
+        written.replace(target)
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        if written is not None:
+            written.unlink(missing_ok=True)
+        raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error

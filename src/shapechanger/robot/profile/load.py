@@ -1,0 +1,73 @@
+"""Finds and reads the file of a profile."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import ProfileError, UnknownName
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.profile.read import read_profile
+
+__all__ = ["find_profile", "load_profile", "profile_text", "shipped_profiles"]
+
+_SHIPPED: Final = Path(__file__).parent / "shipped"
+_SUFFIX: Final = ".toml"
+_LARGEST: Final = 1024 * 1024  # Bytes; a longer file is something else.
+
+
+def shipped_profiles() -> dict[str, Path]:
+    """The profiles that come with the package: their names and files."""
+    return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{_SUFFIX}"), key=lambda p: p.stem)}
+
+
+def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
+    """The file of a shipped profile by its name, such as "car", or a path as it is.
+
+    Raises:
+        UnknownName: If it is neither the name of a shipped profile nor looks like a path.
+    """
+    text = os.fspath(name_or_path)
+    path = Path(text)
+    if path.suffix == _SUFFIX or path.name != text:
+        return path
+    shipped = shipped_profiles()
+    if text not in shipped:
+        raise UnknownName("profile", text, shipped)
+    return shipped[text]
+
+
+def load_profile(path: str | os.PathLike[str]) -> Profile:
+    """The profile in a file.
+
+    Raises:
+        ProfileError: If the file cannot be read, or is no profile.
+    """
+    return read_profile(profile_text(path), Path(path))
+
+
+def profile_text(path: str | os.PathLike[str]) -> str:
+    """The text of a profile.
+
+    Raises:
+        ProfileError: If the file is not there, cannot be read, or is no text.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise ProfileError(f"There is no file {os.fspath(path)}.") from None
+    except IsADirectoryError:
+        raise ProfileError(f"{os.fspath(path)} is a folder, not a profile.") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path.
+        reason = getattr(error, "strerror", None) or error
+        raise ProfileError(f"{os.fspath(path)} cannot be read: {reason}.") from error
+    if len(data) > _LARGEST:
+        raise ProfileError(f"{os.fspath(path)} is longer than a profile can be, 1 MiB.")
+    try:
+        # As tomllib does for a file; a text editor of Windows may put a mark at the start.
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ProfileError(f"{os.fspath(path)}, line {line}: this is no UTF-8 text.") from None

@@ -1,0 +1,52 @@
+"""Writes a first profile for a new robot, from one that is shipped."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import OutputError, UnknownName
+from shapechanger.robot.profile.load import profile_text, shipped_profiles
+from shapechanger.robot.profile.read import read_profile
+
+__all__ = ["write_profile"]
+
+_NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)
+
+
+def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> Path:
+    """Copy a shipped profile under a new name; folders that are missing are made.
+
+    Args:
+        kind: Name of the shipped profile, such as "car".
+        path: The file to write; it must not exist.
+        robot_name: Name of the new robot.
+
+    Returns:
+        The file.
+
+    Raises:
+        UnknownName: If no shipped profile has this name.
+        ProfileError: If the robot's name cannot be one.
+        OutputError: If the file exists, or cannot be written.
+    """
+    shipped = shipped_profiles()
+    if kind not in shipped:
+        raise UnknownName("kind of robot", kind, shipped)
+    # A text of JSON is a text of TOML too.
+    name_line = f"name = {json.dumps(robot_name, ensure_ascii=False)}"
+    text = _NAME_LINE.sub(lambda _: name_line, profile_text(shipped[kind]), count=1)
+    target = Path(path)
+    read_profile(text, target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise OutputError(f"Cannot write {target}: it exists.") from None
+    except OSError as error:
+        raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error
+    return target

@@ -1,0 +1,144 @@
+"""Who uses which pin, channel and address; nothing may be used twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
+from shapechanger.robot.profile.keys import NO_PIN, Key
+from shapechanger.robot.profile.lines import Place
+from shapechanger.robot.profile.mistake import Source, called
+from shapechanger.robot.profile.pins import I2C_PINS
+from shapechanger.robot.profile.schema import OUTPUT_SETTINGS, OVER_SETTINGS, SENSOR_SETTINGS
+
+__all__ = ["Wiring"]
+
+_Settings = Mapping[str, Any]
+_OF_A_CHIP: Final = ("hz", "output_enable")  # A PCA9685 has one of each for its 16 channels.
+
+
+@dataclass(frozen=True, slots=True)
+class _User:
+    """Who uses something.
+
+    Attributes:
+        place: The key that says so.
+        group: Users of one group may share it; empty for a user who shares it with nobody.
+    """
+
+    place: Place
+    group: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.place[-1]} of {called(self.place[:-1])}"
+
+
+class Wiring:
+    """What is used so far.
+
+    Args:
+        source: Where the profile was read.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._users: dict[str, _User] = {}
+
+    def take_pin(self, pin: int, place: Place) -> None:
+        """Use a pin for one thing.
+
+        Raises:
+            ProfileError: If it is used already.
+        """
+        self._take(f"GPIO{pin}", _User(place))
+
+    def take_outputs(self, outputs: Iterable[OutputPlan]) -> tuple[OutputPlan, ...]:
+        """Use the pins and channels of outputs.
+
+        Returns:
+            The outputs; what one says of its PCA9685 is said for all on the chip.
+
+        Raises:
+            ProfileError: If something is used twice, or if two outputs say different things of
+                their chip.
+        """
+        taken = tuple(outputs)
+        chips: dict[str, dict[str, Any]] = {}
+        for output in taken:
+            self._take_output(output, chips)
+        return tuple(
+            replace(output, settings={**output.settings, **chips[chip]})
+            if (chip := _chip_of(output.settings))
+            else output
+            for output in taken
+        )
+
+    def take_sensor(self, sensor: SensorPlan) -> None:
+        """Use the pins or the address of a sensor.
+
+        Raises:
+            ProfileError: If something is used already.
+        """
+        place: Place = ("sensor", sensor.name)
+        self._take_pins(sensor.settings, place, SENSOR_SETTINGS[sensor.driver])
+        if "bus" in sensor.settings:
+            self._take_bus(sensor.settings, (*place, "address"), group="")
+
+    def _take_output(self, output: OutputPlan, chips: dict[str, dict[str, Any]]) -> None:
+        settings: dict[str, Any] = {**output.settings}
+        place: Place = ("output", output.name)
+        over = settings.get("over")
+        self._take_pins(settings, place, OUTPUT_SETTINGS[output.driver])
+        if over == "lgpio":
+            self._take_pins(settings, place, OVER_SETTINGS["lgpio"])
+        elif over == "sysfs":
+            what = f"channel {settings['channel']} of PWM chip {settings['chip']}"
+            self._take(what, _User((*place, "channel")))
+        if chip := _chip_of(settings):
+            self._take(f"channel {settings['channel']} of {chip}", _User((*place, "channel")))
+            self._take_bus(settings, (*place, "address"), group=chip)
+            if settings["output_enable"] != NO_PIN:
+                user = _User((*place, "output_enable"), group=chip)
+                self._take(f"GPIO{settings['output_enable']}", user)
+            self._agree(settings, place, chip, chips.setdefault(chip, {}))
+
+    def _agree(self, settings: _Settings, place: Place, chip: str, said: dict[str, Any]) -> None:
+        for name in _OF_A_CHIP:
+            before = said.setdefault(name, settings[name])
+            if before == NO_PIN:
+                said[name] = settings[name]
+            elif settings[name] not in (before, NO_PIN):
+                words = f"{chip} has one {name} for all its channels, {before} or {settings[name]}"
+                raise self._source.mistake((*place, name), words)
+
+    def _take_bus(self, settings: _Settings, place: Place, group: str) -> None:
+        bus, address = settings["bus"], settings["address"]
+        self._take(f"address {address:#x} of I2C bus {bus}", _User(place, group))
+        for pin in I2C_PINS.get(bus, ()):
+            user = _User((*place[:-1], "bus"), group=f"I2C bus {bus}")
+            self._take(f"GPIO{pin}, a wire of I2C bus {bus},", user, key=f"GPIO{pin}")
+
+    def _take_pins(self, settings: _Settings, place: Place, keys: Iterable[Key]) -> None:
+        for key in keys:
+            if key.kind == "pins":
+                for pin in settings[key.name]:
+                    self.take_pin(pin, (*place, key.name))
+            elif key.kind == "pin" and settings[key.name] != NO_PIN:
+                self.take_pin(settings[key.name], (*place, key.name))
+
+    def _take(self, what: str, user: _User, key: str = "") -> None:
+        before = self._users.setdefault(key or what, user)
+        if before is user or (user.group and user.group == before.group):
+            return
+        line = self._source.line(before.place)
+        words = f"{what} is used twice: by {before} (line {line}) and by {user}"
+        raise self._source.mistake(user.place, words)
+
+
+def _chip_of(settings: _Settings) -> str:
+    """The PCA9685 of an output, in words; empty for none."""
+    if settings.get("over") != "pca9685":
+        return ""
+    return f"the PCA9685 at {settings['address']:#x} of I2C bus {settings['bus']}"

@@ -1,0 +1,163 @@
+"""The twin's board, a process of its own: pins, chips, ledger, world and time.
+
+It is started before the robot and outlives the robot's processes, as hardware does. It ends on
+SIGTERM, or when whoever holds the other end of `--owner-fd` has ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from types import FrameType
+
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.twin import wire
+from shapechanger.twin.camera import FrontCameraPipe
+from shapechanger.twin.connection import Connection
+from shapechanger.twin.ledger import LedgerWriter
+from shapechanger.twin.operating import Operating
+from shapechanger.twin.pin_board import PinBoard, chips_of
+from shapechanger.twin.surroundings import Surroundings
+from shapechanger.twin.switchboard import OwnerGone, Switchboard
+from shapechanger.twin.timekeeper import MachineTime, TwinTime
+from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.world.driving import DrivingWorld
+
+__all__ = ["Board", "main"]
+
+_log = logging.getLogger(__name__)
+
+
+class Board:
+    """All parts of the board, put together.
+
+    Args:
+        wiring: What is attached.
+        world: Where the vehicle is.
+        time: Who moves time.
+        ledger: Where changes go.
+        camera: The front camera; None without one.
+        listening: The socket for clients.
+        owner_fd: Descriptor whose end ends the board; None for none.
+        seed: Of everything that is random.
+    """
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        world: DrivingWorld,
+        time: MachineTime | TwinTime,
+        ledger: LedgerWriter,
+        camera: FrontCameraPipe | None,
+        listening: socket.socket,
+        owner_fd: int | None,
+        seed: int,
+    ) -> None:
+        self._world = world
+        self._time = time
+        self._ledger = ledger
+        self._camera = camera
+        self._surroundings = Surroundings(wiring, world, time.now_ns())
+        sensors = self._surroundings.sensors
+        self._pins = PinBoard(wiring, chips_of(wiring.plan, world.inputs), ledger, seed)
+        self._pins.on_output = sensors.output_changed
+        self._operating = Operating(world, sensors, self._pins, camera, ledger, time.now_ns)
+        self._switchboard = Switchboard(
+            listening, owner_fd, self._pins, sensors.levels, time.clock, time.now_ns, self._operate
+        )
+
+    def run(self) -> None:
+        """Run until the owner is gone."""
+        try:
+            self._time.run(self._switchboard, self._camera, self._go_on, self._take_picture)
+        except OwnerGone:
+            _log.info("the owner is gone, so this board ends")
+        finally:
+            self._switchboard.close()
+            self._ledger.close()
+            if self._camera is not None:
+                self._camera.close()
+
+    def _go_on(self, now_ns: int) -> None:
+        edges = self._surroundings.advance(now_ns, self._pins.levels)
+        for edge in edges:
+            self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
+        self._switchboard.tell_edges(edges)
+
+    def _take_picture(self, now_ns: int) -> None:
+        if self._camera is not None:
+            self._camera.take(self._world, now_ns)
+
+    def _operate(self, connection: Connection, message: wire.Message) -> wire.Message | None:
+        if message["op"] == "wait":
+            self._time.wait(connection, message["until"])
+            return None
+        if message["op"] == "sleep":
+            self._time.sleep(connection, message["id"], message["ns"])
+            return None
+        return self._operating.do(message)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    sys.exit(0)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a board as the command line says."""
+    parser = argparse.ArgumentParser(description="The simulated board of a robot.")
+    parser.add_argument("--plan-fd", type=int, required=True, help="descriptor of the GuardPlan")
+    parser.add_argument("--socket", required=True, help="where to listen")
+    parser.add_argument("--ledger", required=True, help="file to write")
+    parser.add_argument("--clock", choices=("real", "twin"), required=True)
+    parser.add_argument("--owner-fd", type=int, help="descriptor whose end ends this process")
+    parser.add_argument("--fifo", help="where pictures go")
+    parser.add_argument("--size", default="160x120", help="of the pictures")
+    parser.add_argument("--fps", type=float, default=20.0)
+    parser.add_argument("--quality", type=int, default=80)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--one-shot-ms", type=float, help="of the enable line; none without it")
+    given = parser.parse_args(arguments)
+
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
+    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
+    with os.fdopen(given.plan_fd, encoding="utf-8") as file:
+        plan = GuardPlan.from_json(file.read())
+
+    time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
+    width, height = (int(number) for number in given.size.split("x"))
+    camera = None
+    if given.fifo is not None:
+        camera = FrontCameraPipe(
+            given.fifo,
+            given.fps,
+            given.quality,
+            latest_only=given.clock == "real",
+            start_ns=time.now_ns(),
+            seed=given.seed,
+        )
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listening.bind(given.socket)
+    board = Board(
+        Wiring(plan, given.one_shot_ms),
+        DrivingWorld({output.part for output in plan.outputs}, (width, height), given.seed),
+        time,
+        LedgerWriter(given.ledger),
+        camera,
+        listening,
+        given.owner_fd,
+        given.seed,
+    )
+    listening.listen()
+    if given.owner_fd is not None:
+        os.write(given.owner_fd, b"r")  # Ready.
+    board.run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""The front camera: pictures of the world as JPEG into a pipe."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import random
+from typing import Final, Literal, get_args
+
+import numpy as np
+import simplejpeg
+
+from shapechanger.robot.cameras.barcode import draw_barcode
+from shapechanger.twin.world.world import World
+
+__all__ = ["CAMERA_FAULTS", "CameraFault", "FrontCameraPipe", "with_capture_time"]
+
+CameraFault = Literal["", "off", "freeze", "garbage", "short"]
+"""What a broken camera does: nothing, the same picture again, noise, or the half of a picture."""
+
+CAMERA_FAULTS: Final[tuple[CameraFault, ...]] = get_args(CameraFault)
+
+_START_OF_IMAGE: Final = b"\xff\xd8"
+_COMMENT: Final = b"\xff\xfe"
+_PIPE_BYTES: Final = 1 << 20  # The most that Linux gives without privileges.
+_FIONREAD: Final = 0x541B
+
+
+def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
+    """The JPEG with a comment segment that says when the picture was taken."""
+    words = b"captured_ns=%d" % captured_ns
+    segment = _COMMENT + (len(words) + 2).to_bytes(2, "big") + words
+    return _START_OF_IMAGE + segment + jpeg[len(_START_OF_IMAGE) :]
+
+
+class FrontCameraPipe:
+    """Takes pictures and writes them into a FIFO, without ever waiting for a reader.
+
+    Args:
+        path: The FIFO.
+        fps: Pictures a second.
+        quality: Of the JPEG, 1 to 100.
+        latest_only: Whether a picture is dropped while the one before has not been read. Otherwise
+            pictures are only dropped when the pipe is full or has no reader.
+        seed: Of the noise of a broken camera.
+
+    Attributes:
+        fault: How it is broken.
+        next_ns: When the next picture is due.
+        newest_ns: When the newest picture was taken that is in the pipe, or was.
+    """
+
+    def __init__(
+        self, path: str, fps: float, quality: int, *, latest_only: bool, start_ns: int, seed: int
+    ) -> None:
+        self._path = path
+        self._quality = quality
+        self._latest_only = latest_only
+        self._start_ns = start_ns
+        self._period_ns = 1e9 / fps
+        self._taken = 0
+        self._fd: int | None = None
+        self._rest = b""
+        self._rest_ns: int | None = None
+        self._last = b""
+        self._last_ns: int | None = None
+        self._noise = random.Random(f"camera {seed}")
+        self.fault: CameraFault = ""
+        self.next_ns = start_ns
+        self.newest_ns: int | None = None
+
+    def take(self, world: World, now_ns: int) -> None:
+        """Take the picture that is due; one that comes too late for its turn is left out."""
+        while self.next_ns <= now_ns:
+            self._taken += 1
+            self.next_ns = self._start_ns + round(self._taken * self._period_ns)
+        if self.fault == "off" or not self._ready():
+            return
+        if self.fault == "freeze" and self._last:
+            self._write(self._last, self._last_ns)
+            return
+        jpeg = self.draw(world, now_ns)
+        self._last, self._last_ns = jpeg, now_ns
+        if self.fault == "garbage":
+            self._write(self._noise.randbytes(len(jpeg)), None)
+        elif self.fault == "short":
+            self._write(jpeg[: len(jpeg) // 2], None)
+        else:
+            self._write(jpeg, now_ns)
+
+    def draw(self, world: World, now_ns: int) -> bytes:
+        """The picture of now as JPEG, with its time in a comment and in a barcode."""
+        picture = np.ascontiguousarray(world.picture())
+        draw_barcode(picture, now_ns)
+        jpeg = simplejpeg.encode_jpeg(picture, self._quality, "RGB", "444")
+        return with_capture_time(jpeg, now_ns)
+
+    def close(self) -> None:
+        """Close the pipe."""
+        if self._fd is not None:
+            os.close(self._fd)
+            self._fd = None
+
+    def find_reader(self) -> bool:
+        """Open the pipe if somebody reads it; who opens it to read waits for that."""
+        if self._fd is None:
+            try:
+                self._fd = os.open(self._path, os.O_WRONLY | os.O_NONBLOCK)
+            except OSError as error:
+                if error.errno == errno.ENXIO:  # Nobody reads.
+                    return False
+                raise
+            fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
+            self._rest = b""
+        return True
+
+    def _ready(self) -> bool:
+        """Whether somebody wants a picture."""
+        if not self.find_reader():
+            return False
+        if self._rest:
+            self._write(self._rest, self._rest_ns)
+        return not self._rest and not (self._latest_only and self._unread())
+
+    def _unread(self) -> int:
+        """Bytes in the pipe."""
+        if self._fd is None:
+            return 0
+        waiting = fcntl.ioctl(self._fd, _FIONREAD, b"\0\0\0\0")
+        return int.from_bytes(waiting, "little")
+
+    def _write(self, data: bytes, captured_ns: int | None) -> None:
+        """Write what fits; the rest of a picture comes first the next time."""
+        if self._fd is None:
+            return
+        try:
+            written = os.write(self._fd, data)
+        except BlockingIOError:
+            return  # A picture of which nothing fits is dropped, a rest waits on.
+        except BrokenPipeError:
+            os.close(self._fd)
+            self._fd = None
+            self._rest = b""
+            return
+        self._rest, self._rest_ns = data[written:], captured_ns
+        if not self._rest and captured_ns is not None:
+            self.newest_ns = captured_ns

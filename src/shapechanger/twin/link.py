@@ -1,0 +1,142 @@
+"""A process's connection to the twin's board."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from shapechanger.errors import RobotError
+from shapechanger.twin import wire
+
+__all__ = ["Edge", "Link"]
+
+Edge = Callable[[int, int, int], None]
+"""Called with a pin, its new level and the time."""
+
+
+class Link:
+    """One connection, for one thread.
+
+    Attributes:
+        clock: Where the run's time comes from, "real" or "twin".
+        now_ns: The newest twin time that the board has told; when the clock is real, the time of
+            the connection.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Whom `dispatch` tells of edges.
+    """
+
+    def __init__(self, path: str, role: str) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            self._socket.connect(path)
+        except OSError as error:
+            self._socket.close()
+            raise RobotError(f"No twin's board answers at {path}: {error.strerror}.") from error
+        self._asked = 0
+        self._edges: deque[tuple[int, int, int]] = deque()
+        self._grants: deque[int] = deque()
+        self._replies: dict[int, wire.Message] = {}
+        self.levels: dict[int, int] = {}
+        self.on_edge: Edge | None = None
+        answer = self.ask(op="hello", role=role, pid=os.getpid())
+        self.clock: str = answer["clock"]
+        self.now_ns: int = answer["t"]
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed here."""
+        return self._socket.fileno() < 0
+
+    def fileno(self) -> int:
+        """The descriptor, to wait for."""
+        return self._socket.fileno()
+
+    def post(self, **message: Any) -> None:
+        """Say something that needs no answer.
+
+        Raises:
+            RobotError: If the board is gone.
+        """
+        try:
+            self._socket.send(wire.encode(message))
+        except OSError as error:
+            raise RobotError("The twin's board is gone.") from error
+
+    def ask(self, **message: Any) -> wire.Message:
+        """Say something and wait for the answer.
+
+        Raises:
+            RobotError: If the board refuses, or is gone.
+            OSError: If a chip does not answer, as smbus2 raises it.
+        """
+        self._asked += 1
+        self.post(id=self._asked, **message)
+        while self._asked not in self._replies:
+            self._receive(0)
+        answer = self._replies.pop(self._asked)
+        if "error" in answer:
+            raise RobotError(answer["error"])
+        if "errno" in answer:
+            raise OSError(answer["errno"], os.strerror(answer["errno"]))
+        return answer
+
+    def drain(self) -> None:
+        """Take in everything that has arrived, without waiting."""
+        while self._receive(socket.MSG_DONTWAIT):
+            pass
+
+    def dispatch(self) -> None:
+        """Tell `on_edge` of all edges that have arrived."""
+        while self._edges:
+            edge = self._edges.popleft()
+            if self.on_edge is not None:
+                self.on_edge(*edge)
+
+    def granted(self, at_most_s: float) -> bool:
+        """Wait for a grant of time, which is then `now_ns`; dispatch the edges before it."""
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        while not self._grants:
+            if not poll.poll(max(0.0, at_most_s * 1e3)):
+                self.dispatch()
+                return False
+            self.drain()
+        self.now_ns = self._grants.popleft()
+        self.dispatch()
+        return True
+
+    def close(self) -> None:
+        """Say goodbye."""
+        if not self.closed:
+            try:
+                self._socket.send(wire.encode({"op": "bye"}))
+            except OSError:
+                pass  # The board left first: nobody is there to be told.
+            finally:
+                self._socket.close()
+
+    def _receive(self, flags: int) -> bool:
+        """Take in one message; False if there is none."""
+        try:
+            data = self._socket.recv(wire.MAX_MESSAGE, flags)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise RobotError("The twin's board is gone.") from error
+        if not data:
+            raise RobotError("The twin's board is gone.")
+        message = wire.decode(data)
+        op = message["op"]
+        if op == "grant":
+            self._grants.append(message["t"])
+        elif op == "inputs":
+            for pin, level, at_ns in message["edges"]:
+                self.levels[pin] = level
+                self._edges.append((pin, level, at_ns))
+        else:
+            self._replies[message["id"]] = message
+        return True

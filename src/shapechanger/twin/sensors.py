@@ -1,0 +1,186 @@
+"""What is attached to the board's inputs: encoders, bumpers, distance sensors, a stop button."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import Final, NamedTuple, Protocol
+
+from shapechanger.robot.drivers.settings import number, text, whole, wholes
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.twin.world.world import Readings, World
+
+__all__ = ["Edge", "PinSensors"]
+
+# HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
+# as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
+_PING_NS: Final = 450_000
+_NO_ECHO_NS: Final = 38_000_000
+_NEAREST_M: Final = 0.02
+_FARTHEST_M: Final = 4.0
+_SOUND_M_PER_S: Final = 343.2
+
+
+class Edge(NamedTuple):
+    """A change of an input.
+
+    Attributes:
+        t: When, in nanoseconds.
+        pin: BCM number.
+        level: What it is from then on.
+    """
+
+    t: int
+    pin: int
+    level: int
+
+
+class _Sensor(Protocol):
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]: ...
+
+
+class _Encoder:
+    """A wheel encoder; forward, channel a leads."""
+
+    def __init__(self, plan: SensorPlan) -> None:
+        self._pins = (whole(plan.settings, "a"), whole(plan.settings, "b"))
+        self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
+        count_m = number(plan.settings, "wheel_m") / number(plan.settings, "counts_per_turn")
+        self._edge_m = count_m / len(self._states)
+        self._travelled = 0.0
+        self._position = 0
+
+    def levels(self) -> dict[int, int]:
+        state = self._states[self._position % len(self._states)]
+        return dict(zip(self._pins, state, strict=False))  # A single channel has no second pin.
+
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        before, self._travelled = self._travelled, seen.travelled_m
+        found: list[Edge] = []
+        target = math.floor(seen.travelled_m / self._edge_m)
+        step = 1 if target > self._position else -1
+        while self._position != target:
+            boundary = max(self._position, self._position + step) * self._edge_m
+            share = (boundary - before) / (seen.travelled_m - before or 1.0)
+            t = start_ns + round(min(max(share, 0.0), 1.0) * (end_ns - start_ns))
+            old = self.levels()
+            self._position += step
+            found.extend(
+                Edge(t, pin, level) for pin, level in self.levels().items() if old[pin] != level
+            )
+        return found
+
+
+class _Bumper:
+    """Switches to ground (pull "up") or to 3.3 V, all pressed at once."""
+
+    def __init__(self, plan: SensorPlan) -> None:
+        self._pins = wholes(plan.settings, "pins")
+        self._open = int(text(plan.settings, "pull") == "up")
+        self._pressed = False
+        self.held = False
+
+    def levels(self) -> dict[int, int]:
+        return dict.fromkeys(self._pins, self._open ^ self._pressed)
+
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        pressed = seen.bumped or self.held
+        if pressed == self._pressed:
+            return []
+        self._pressed = pressed
+        return [Edge(end_ns, pin, level) for pin, level in self.levels().items()]
+
+
+class _Distance:
+    """An HC-SR04."""
+
+    def __init__(self, plan: SensorPlan, world: World) -> None:
+        self.trigger = whole(plan.settings, "trigger")
+        self._echo = whole(plan.settings, "echo")
+        self._world = world
+        self._busy_until_ns = 0
+        self.said: float | None = None
+        self.dead = False
+
+    def levels(self) -> dict[int, int]:
+        return {self._echo: 0}
+
+    def ping(self, t: int) -> list[Edge]:
+        if self.dead or t < self._busy_until_ns:
+            return []
+        distance = self._world.distance_m() if self.said is None else self.said
+        echo_ns = _NO_ECHO_NS
+        if distance <= _FARTHEST_M:
+            echo_ns = round(2e9 * max(distance, _NEAREST_M) / _SOUND_M_PER_S)
+        self._busy_until_ns = t + _PING_NS + echo_ns
+        return [Edge(t + _PING_NS, self._echo, 1), Edge(self._busy_until_ns, self._echo, 0)]
+
+
+class PinSensors:
+    """All sensors on pins.
+
+    Args:
+        plan: What is wired.
+        world: What they sense.
+
+    Attributes:
+        levels: Level of each pin that a sensor drives.
+    """
+
+    def __init__(self, plan: GuardPlan, world: World) -> None:
+        self._encoders = [_Encoder(one) for one in plan.sensors if one.driver == "encoder"]
+        self._bumpers = [_Bumper(one) for one in plan.sensors if one.driver == "switch"]
+        self._distances = [_Distance(one, world) for one in plan.sensors if one.driver == "hcsr04"]
+        self._sensors: list[_Sensor] = [*self._encoders, *self._bumpers]
+        self._stop_pin = plan.stop_pin
+        self._due: list[Edge] = []
+        self.levels: dict[int, int] = {}
+        for sensor in (*self._encoders, *self._bumpers, *self._distances):
+            self.levels.update(sensor.levels())
+        if self._stop_pin is not None:
+            self.levels[self._stop_pin] = 1  # A button to ground, with a pull-up.
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next edge comes that is known already."""
+        return self._due[0].t if self._due else None
+
+    def advance(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        """The edges between two times, in order.
+
+        Args:
+            start_ns: When the last call ended.
+            end_ns: Now.
+            seen: What the world shows now.
+        """
+        found: list[Edge] = []
+        for sensor in self._sensors:
+            found += sensor.edges(start_ns, end_ns, seen)
+        while self._due and self._due[0].t <= end_ns:
+            found.append(heapq.heappop(self._due))
+        found.sort()
+        for edge in found:
+            self.levels[edge.pin] = edge.level
+        return found
+
+    def output_changed(self, t: int, pin: int, level: float) -> None:
+        """An output pin has changed; a distance sensor pings when its trigger falls."""
+        for sensor in self._distances:
+            if sensor.trigger == pin and level == 0.0:
+                for edge in sensor.ping(t):
+                    heapq.heappush(self._due, edge)
+
+    def press_stop(self, down: bool, t: int) -> None:
+        """Press the stop button, or let it go."""
+        if self._stop_pin is not None:
+            heapq.heappush(self._due, Edge(t, self._stop_pin, int(not down)))
+
+    def hold_bumpers(self, down: bool) -> None:
+        """Press all bumpers from outside the world, or let them go."""
+        for bumper in self._bumpers:
+            bumper.held = down
+
+    def say_distance(self, distance_m: float | None, dead: bool = False) -> None:
+        """Let distance sensors say this instead of the truth, or nothing at all."""
+        for sensor in self._distances:
+            sensor.said, sensor.dead = distance_m, dead

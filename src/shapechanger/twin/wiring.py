@@ -1,0 +1,206 @@
+"""What is attached to the pins: from their levels to the value of each output.
+
+This is the way back from what the drivers do. It is made from the plan of what is really wired,
+which by default is the plan that is served: with two pins swapped in the served profile only, the
+wrong motor turns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.duty import Duty
+from shapechanger.robot.drivers.settings import number, text, whole
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.twin.levels import Channel, Levels, Pulse
+
+__all__ = ["ESC_DEAD_BAND_US", "ONE_SHOT_MS", "WiredOutput", "Wiring"]
+
+ONE_SHOT_MS: Final = 100.0
+"""How long the one-shot of the enable line holds the motors' power after an edge."""
+
+ESC_DEAD_BAND_US: Final = 20.0
+"""Pulses nearer to neutral do not move a hobby speed controller; makers state 10 to 50."""
+
+# Outputs whose power goes through the one-shot: motors, not steering servos or joints.
+_POWERED: Final = ("hbridge", "phase_enable", "esc")
+
+
+class WiredOutput(NamedTuple):
+    """What an output does.
+
+    Attributes:
+        value: From -1 to 1, as its driver was told; None for a servo without pulses, which has no
+            torque.
+        at_rest: Whether it is where a stop leads to. A motor with any duty above 0 is not.
+    """
+
+    value: float | None
+    at_rest: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Output:
+    plan: OutputPlan
+    rest: float
+    propels: bool
+
+
+class Wiring:
+    """What is attached.
+
+    Args:
+        plan: What is wired.
+        one_shot_ms: How long the enable line's one-shot holds after each edge of `plan.enable_pin`;
+            None where none is fitted.
+    """
+
+    def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:
+        self.plan = plan
+        has_one_shot = plan.enable_pin is not None and one_shot_ms is not None
+        self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
+        actions = {action.name: action for action in plan.actions}
+        self._outputs: dict[str, _Output] = {}
+        self._high: set[int] = set()
+        for output in plan.outputs:
+            weights = {name: weight for name, weight in output.mix.items() if name in actions}
+            rest = output.offset + sum(
+                weight * actions[name].rest for name, weight in weights.items()
+            )
+            propels = any(weight and actions[name].propels for name, weight in weights.items())
+            self._outputs[output.name] = _Output(output, max(-1.0, min(1.0, rest)), propels)
+            if (pin := _output_enable(output)) >= 0:
+                self._high.add(pin)
+
+    @property
+    def propelling(self) -> tuple[str, ...]:
+        """Names of the outputs that make the robot go."""
+        return tuple(name for name, output in self._outputs.items() if output.propels)
+
+    @property
+    def outputs(self) -> Mapping[str, OutputPlan]:
+        """The outputs by name."""
+        return {name: output.plan for name, output in self._outputs.items()}
+
+    def idle_level(self, pin: int) -> int:
+        """Level of a pin that nobody drives.
+
+        The hardware guide asks for pull-downs at all outputs, and a pull-up at the output enable of
+        a PCA9685, which is active low.
+        """
+        return int(pin in self._high)
+
+    def power_ends_ns(self, levels: Levels) -> int | None:
+        """When the one-shot takes the motors' power; None where none is fitted."""
+        if self._one_shot_ns is None or self.plan.enable_pin is None:
+            return None
+        edge_ns = levels.edges_ns.get(self.plan.enable_pin)
+        return 0 if edge_ns is None else edge_ns + self._one_shot_ns
+
+    def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
+        """What each output does."""
+        ends_ns = self.power_ends_ns(levels)
+        powered = ends_ns is None or now_ns < ends_ns
+        read: dict[str, WiredOutput] = {}
+        for name, output in self._outputs.items():
+            if not powered and output.plan.driver in _POWERED:
+                read[name] = WiredOutput(0.0, True)
+            else:
+                read[name] = self._read(output, levels)
+        return read
+
+    def has_pulses(self, name: str, levels: Levels, now_ns: int) -> bool:
+        """Whether a servo or speed controller gets pulses, and has power."""
+        ends_ns = self.power_ends_ns(levels)
+        return (ends_ns is None or now_ns < ends_ns) and self._pulse(
+            self._outputs[name], levels
+        ) > 0.0
+
+    def _read(self, output: _Output, levels: Levels) -> WiredOutput:
+        settings = output.plan.settings
+        match output.plan.driver:
+            case "hbridge":
+                enable = whole(settings, "enable")
+                drive = self._duty(levels, whole(settings, "forward"))
+                drive -= self._duty(levels, whole(settings, "backward"))
+                return self._motor(
+                    output, drive * (self._duty(levels, enable) if enable >= 0 else 1)
+                )
+            case "phase_enable":
+                drive = self._duty(levels, whole(settings, "enable"))
+                # A phase that is high for a part of the time turns the motor back and forth.
+                direction = 1.0 - 2.0 * self._duty(levels, whole(settings, "phase"))
+                return self._motor(output, drive * direction)
+            case "servo":
+                return self._servo(output, self._pulse(output, levels))
+            case "esc":
+                return self._esc(output, self._pulse(output, levels))
+            case driver:
+                raise RobotError(f"The twin does not know what a {driver!r} is wired to.")
+
+    def _motor(self, output: _Output, drive: float) -> WiredOutput:
+        duty = Duty(number(output.plan.settings, "start"), number(output.plan.settings, "full"))
+        value = math.copysign(duty.size_at(abs(drive)), drive)
+        return WiredOutput(value, _near(value, output.rest, 0.01 if output.rest else 0.0))
+
+    def _servo(self, output: _Output, us: float) -> WiredOutput:
+        if not us:
+            return WiredOutput(None, True)
+        low, middle, high = _points(output.plan, "left_us", "centre_us", "right_us")
+        value = _between(us, low, middle, high)
+        return WiredOutput(value, _near(value, output.rest, ESC_DEAD_BAND_US / abs(high - middle)))
+
+    def _esc(self, output: _Output, us: float) -> WiredOutput:
+        if not us:
+            return WiredOutput(0.0, True)
+        low, middle, high = _points(output.plan, "backward_us", "neutral_us", "forward_us")
+        if abs(us - middle) <= ESC_DEAD_BAND_US:
+            return WiredOutput(0.0, True)
+        return WiredOutput(_between(us, low, middle, high), False)
+
+    def _duty(self, levels: Levels, pin: int) -> float:
+        duty = levels.duties.get(pin)
+        return float(self.idle_level(pin)) if duty is None else duty
+
+    def _pulse(self, output: _Output, levels: Levels) -> float:
+        settings = output.plan.settings
+        match text(settings, "over"):
+            case "lgpio":
+                return levels.pulses.get(whole(settings, "pin"), Pulse(0.0, 0.0)).us
+            case "pca9685":
+                enable = _output_enable(output.plan)
+                if enable >= 0 and self._duty(levels, enable) > 0.0:
+                    return 0.0
+                channel = Channel(*(whole(settings, key) for key in ("bus", "address", "channel")))
+                return levels.channels.get(channel, Pulse(0.0, 0.0)).us
+            case over:
+                raise RobotError(
+                    f"Output {output.plan.name!r}: the twin has no servos over {over!r}; "
+                    "it has them over 'pca9685' and 'lgpio'."
+                )
+
+
+def _output_enable(plan: OutputPlan) -> int:
+    pin = plan.settings.get("output_enable", -1)
+    return pin if isinstance(pin, int) and plan.settings.get("over") == "pca9685" else -1
+
+
+def _points(plan: OutputPlan, *keys: str) -> tuple[float, ...]:
+    return tuple(number(plan.settings, key) for key in keys)
+
+
+def _between(us: float, low: float, middle: float, high: float) -> float:
+    """Value of a pulse: -1 at `low`, 0 at `middle`, 1 at `high`; the ends may be swapped."""
+    end = high if (us - middle) * (high - middle) > 0 else low
+    if end == middle:
+        return 0.0
+    value = (us - middle) / (end - middle) * (1.0 if end == high else -1.0)
+    return max(-1.0, min(1.0, value))
+
+
+def _near(value: float, rest: float, tolerance: float) -> bool:
+    return abs(value - rest) <= tolerance

@@ -1,0 +1,165 @@
+"""A rectangular room with a few boxes in it."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.twin.world.world import Pose
+
+__all__ = ["Box", "Room", "find_start", "lay_out"]
+
+ROOM_LENGTH: Final = 6.0  # m, along x
+ROOM_WIDTH: Final = 4.0  # m, along y
+BOXES: Final = 5
+SMALLEST_BOX: Final = 0.25  # m, a side
+LARGEST_BOX: Final = 0.6  # m
+CLEARANCE: Final = 0.7  # m that stay free between boxes, so that the vehicle fits through
+START_CLEARANCE: Final = 0.45  # m that are free around a start
+START_AHEAD: Final = 1.4  # m that are free ahead of a start
+_LOOK_AHEAD: Final = np.radians(np.array((-15.0, -7.0, 0.0, 7.0, 15.0)))
+_TRIES: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle along the axes, in metres."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    def apart(self, other: Box) -> float:
+        """Distance to another box, along the axis where it is larger; 0 and less if they touch."""
+        return max(
+            other.left - self.right,
+            self.left - other.right,
+            other.bottom - self.top,
+            self.bottom - other.top,
+        )
+
+    def gap(self, x: float, y: float) -> float:
+        """Distance from a point outside."""
+        return math.hypot(
+            max(self.left - x, 0.0, x - self.right), max(self.bottom - y, 0.0, y - self.top)
+        )
+
+
+class Room:
+    """Walls and boxes.
+
+    Args:
+        length: Along x, in metres; the room begins at 0.
+        width: Along y, in metres; the room begins at 0.
+        boxes: What stands in it.
+
+    Attributes:
+        starts: (N, 2) start of each wall segment.
+        edges: (N, 2) from its start to its end.
+    """
+
+    def __init__(self, length: float, width: float, boxes: tuple[Box, ...]) -> None:
+        self.length = length
+        self.width = width
+        self.boxes = boxes
+        corners: list[NDArray[np.float64]] = []
+        for box in (Box(0.0, 0.0, length, width), *boxes):
+            corners.append(
+                np.array(
+                    [
+                        (box.left, box.bottom),
+                        (box.right, box.bottom),
+                        (box.right, box.top),
+                        (box.left, box.top),
+                    ]
+                )
+            )
+        self.starts = np.concatenate(corners)
+        self.edges = np.concatenate([np.roll(c, -1, axis=0) - c for c in corners])
+
+    def clearance(self, x: float, y: float) -> tuple[float, float, float]:
+        """The nearest wall: distance of a point from it, negative outside the room; where it is."""
+        nearest = min(
+            (x, 0.0, y),
+            (self.length - x, self.length, y),
+            (y, x, 0.0),
+            (self.width - y, x, self.width),
+        )
+        for box in self.boxes:
+            gap = box.gap(x, y)
+            if gap < nearest[0]:
+                nearest = (
+                    gap,
+                    min(max(x, box.left), box.right),
+                    min(max(y, box.bottom), box.top),
+                )
+        return nearest
+
+    def cast(
+        self, x: float, y: float, directions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
+        """Where rays from a point end.
+
+        Args:
+            x: Of the point.
+            y: Of the point.
+            directions: (R, 2) directions; distances are in units of their length.
+
+        Returns:
+            Distance (R,), number of the segment that was hit (R,), and metres along it (R,).
+        """
+        to_start_x, to_start_y = self.starts[:, 0] - x, self.starts[:, 1] - y
+        edge_x, edge_y = self.edges[:, 0], self.edges[:, 1]
+        ray_x, ray_y = directions[:, :1], directions[:, 1:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = 1.0 / (ray_x * edge_y - ray_y * edge_x)  # (R, N)
+            distance = (to_start_x * edge_y - to_start_y * edge_x) * scale
+            share = (to_start_x * ray_y - to_start_y * ray_x) * scale
+            hits = (distance > 0.0) & (share >= 0.0) & (share <= 1.0)
+        distance = np.where(hits, distance, np.inf)
+        segment = distance.argmin(axis=1)
+        rays = np.arange(len(directions))
+        along = share[rays, segment] * np.hypot(edge_x, edge_y)[segment]
+        return distance[rays, segment], segment, along
+
+
+def lay_out(seed: int) -> Room:
+    """A room that follows from the seed alone."""
+    rng = random.Random(f"room {seed}")
+    boxes: list[Box] = []
+    for _ in range(40 * BOXES):
+        length = rng.uniform(SMALLEST_BOX, LARGEST_BOX)
+        width = rng.uniform(SMALLEST_BOX, LARGEST_BOX)
+        left, bottom = rng.uniform(0.0, ROOM_LENGTH - length), rng.uniform(0.0, ROOM_WIDTH - width)
+        box = Box(left, bottom, left + length, bottom + width)
+        if all(box.apart(other) > CLEARANCE for other in boxes):
+            boxes.append(box)
+        if len(boxes) == BOXES:
+            break
+    return Room(ROOM_LENGTH, ROOM_WIDTH, tuple(boxes))
+
+
+def find_start(room: Room, seed: int) -> Pose:
+    """A place in the room with room around it and more of it ahead; it follows from the seed."""
+    rng = random.Random(f"start {seed}")
+    best, best_pose = -math.inf, Pose(room.length / 2, room.width / 2, 0.0)
+    for _ in range(_TRIES):
+        x, y = rng.uniform(0.0, room.length), rng.uniform(0.0, room.width)
+        heading = rng.uniform(-math.pi, math.pi)
+        around = room.clearance(x, y)[0] - START_CLEARANCE
+        angles = heading + _LOOK_AHEAD
+        directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+        ahead = around
+        if around > 0.0:
+            ahead = float(room.cast(x, y, directions)[0].min()) - START_AHEAD
+        if (free := min(around, ahead)) > best:
+            best, best_pose = free, Pose(x, y, heading)
+        if best > 0.0:
+            break
+    return best_pose

@@ -1,0 +1,80 @@
+"""Addresses as people write them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError
+from shapechanger.link.address import DEFAULT_PORT, Address, is_loopback, parse_address
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("car.local", Address("car.local", 5000)),
+        (" car.local:8443 ", Address("car.local", 8443)),
+        ("my_car", Address("my_car", 5000)),
+        ("192.168.42.1", Address("192.168.42.1", 5000)),
+        ("192.168.42.1:1", Address("192.168.42.1", 1)),
+        ("::1", Address("::1", 5000)),
+        ("[::1]", Address("::1", 5000)),
+        ("[fe80::1%wlan0]:65535", Address("fe80::1%wlan0", 65535)),
+    ],
+)
+def test_what_people_write_is_understood(text: str, address: Address) -> None:
+    """Names, IPv4 and IPv6, with and without a port."""
+    assert parse_address(text) == address
+    assert parse_address(str(address)) == address
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "No address is given"),
+        ("car local", "no address"),
+        ("https://car.local", "no address"),
+        ("user@car", "no address"),
+        ("-car", "no address"),
+        ("300.1.1.1", "no address"),
+        ("1.2.3", "no address"),
+        ("car:", "no port"),
+        ("car:0", "no port"),
+        ("car:65536", "no port"),
+        ("car:000080", "no port"),
+        ("car:٣", "no port"),
+        ("car:12:13", "no port"),
+        ("[::1", "brackets"),
+        ("[car]:5000", "brackets"),
+        ("[::1]5000", "brackets"),
+        ("[::1]:", "no port"),
+        ("x" * 64, "no address"),
+    ],
+)
+def test_nonsense_is_refused_with_an_example(text: str, words: str) -> None:
+    """The message shows how it is written."""
+    with pytest.raises(LinkError, match=words) as refused:
+        parse_address(text)
+    assert "192.168.42.1:5000" in str(refused.value)
+
+
+@given(text=st.text(max_size=30))
+def test_any_text_is_an_address_or_refused(text: str) -> None:
+    """An address can be written and read again; anything else is a `LinkError`."""
+    try:
+        address = parse_address(text)
+    except LinkError:
+        return
+    assert parse_address(str(address)) == address
+
+
+def test_the_port_of_2017_is_the_default() -> None:
+    """As it was."""
+    assert DEFAULT_PORT == 5000
+
+
+def test_which_hosts_only_this_machine_reaches() -> None:
+    """A name other than localhost may mean anything."""
+    assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
+    assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))

@@ -1,0 +1,155 @@
+"""The messages of the link: they arrive as they left, or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import get_args
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError
+from shapechanger.link import messages
+from shapechanger.link.messages import (
+    MAX_CLIENT_MESSAGE,
+    ClientMessage,
+    Command,
+    Observation,
+    RobotMessage,
+    decode_client_message,
+    decode_robot_message,
+    encode,
+)
+from tests.link.messages import client_messages, robot_messages
+
+DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
+
+
+@given(message=client_messages)
+def test_what_a_client_says_arrives(message: ClientMessage) -> None:
+    """A message comes out as it went in."""
+    assert decode_client_message(encode(message)) == message
+
+
+@given(message=robot_messages)
+def test_what_a_robot_says_arrives(message: RobotMessage) -> None:
+    """A message comes out as it went in."""
+    assert decode_robot_message(encode(message)) == message
+
+
+def test_every_message_is_tried() -> None:
+    """A new kind of message must join the tests."""
+    for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
+        tried = {kind.__name__ for kind in get_args(union)}
+        assert all(f"{name}" in repr(strategy) for name in tried)
+        assert tried <= set(messages.__all__)
+
+
+@pytest.mark.parametrize("side", DECODERS)
+@given(data=st.binary(max_size=300))
+def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
+    """Nothing but `LinkError` comes out of a decoder."""
+    with contextlib.suppress(LinkError):
+        DECODERS[side](data)
+
+
+@given(message=client_messages | robot_messages, data=st.data())
+def test_a_cut_message_is_refused(
+    message: ClientMessage | RobotMessage, data: st.DataObject
+) -> None:
+    """No message is the beginning of another one."""
+    whole = encode(message)
+    cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
+    for decode in DECODERS.values():
+        with pytest.raises(LinkError):
+            decode(cut)
+
+
+@given(message=client_messages, data=st.data())
+def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
+    message: ClientMessage, data: st.DataObject
+) -> None:
+    """What a decoder lets through can be said again in the same words."""
+    damaged = bytearray(encode(message))
+    bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
+    damaged[bit // 8] ^= 1 << bit % 8
+    try:
+        heard = decode_client_message(bytes(damaged))
+    except LinkError:
+        return
+    assert encode(decode_client_message(encode(heard))) == encode(heard)
+
+
+def test_a_message_with_something_behind_it_is_refused() -> None:
+    """One message a WebSocket message, and nothing smuggled behind it."""
+    with pytest.raises(LinkError):
+        decode_client_message(encode(messages.Take()) + b"\x00")
+
+
+def test_a_large_message_is_refused_before_it_is_read() -> None:
+    """The size is looked at first, whatever it holds."""
+    with pytest.raises(LinkError, match="larger than the 65536 allowed"):
+        decode_client_message(bytes(MAX_CLIENT_MESSAGE + 1))
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        b"\x82\xa4kind\xa7command\xa6values\xdd\xff\xff\xff\xff",
+        b"\x82\xa4kind\xa5hello\xa5proof\xc6\xff\xff\xff\xff",
+        b"\x82\xa4kind\xa5hello\xa4name\xdb\xff\xff\xff\xff",
+        b"\xdf\xff\xff\xff\xff\xa4kind\xa4take",
+        b"\x82\xa4kind\xa4take\xa1x" + b"\x91" * 60_000,
+        b"\x82\xa4kind\xa4take\xa1x" + b"\x81\xa1x" * 20_000,
+    ],
+)
+def test_a_length_that_lies_costs_nothing(lie: bytes) -> None:
+    """Four billion numbers are not made room for, and nesting does not reach the stack's end."""
+    with pytest.raises(LinkError):
+        decode_client_message(lie)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"kind": "command", "seq": -1, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 2**63, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 1.5, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 1, "answers": 0, "values": ["0"]},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0] * 65},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 0},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 10**6},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": 1.01},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": float("nan")},
+        {"kind": "hello", "version": 1, "proof": b"", "role": "king"},
+        {"kind": "hello", "version": 1, "proof": b"", "name": "x" * 65},
+        {"kind": "observation", "seq": 1},
+        {"kind": "dance"},
+        {"seq": 1},
+        [1, 2],
+        None,
+    ],
+)
+def test_values_out_of_bounds_are_refused(fields: object) -> None:
+    """The bounds that the messages state are kept."""
+    with pytest.raises(LinkError, match="no message"):
+        decode_client_message(msgspec.msgpack.encode(fields))
+
+
+def test_unknown_keys_are_ignored() -> None:
+    """A newer minor version may say more."""
+    fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
+    heard = decode_client_message(msgspec.msgpack.encode(fields))
+    assert heard == Command(seq=1, answers=2, values=(1.0,))
+
+
+def test_a_picture_travels_as_it_is() -> None:
+    """A JPEG costs its own bytes and a few for its length; no base64."""
+    jpeg = bytes(range(256)) * 20
+    fields = {name: 0 for name in Observation.__struct_fields__}
+    empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
+    full = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": jpeg})
+    assert len(full) - len(empty) <= len(jpeg) + 4
+    assert jpeg in full

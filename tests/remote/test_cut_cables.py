@@ -1,0 +1,150 @@
+"""Links that break: each is noticed in time, said in words, and never hidden by old data."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError, StaleObservation
+from shapechanger.link import messages as m
+from shapechanger.remote.client import RobotClient
+from tests.remote.robot import Robot, eventually
+
+Run = Callable[..., Robot]
+Connect = Callable[..., RobotClient]
+
+TIMEOUT_S = 0.3
+
+
+def _ready(client: RobotClient) -> None:
+    client.take()
+    client.arm()
+
+
+def test_a_black_hole_is_noticed_in_time(run: Run, connect: Connect) -> None:
+    """The socket stays open, no FIN comes, and the link is lost all the same."""
+    robot = run()
+    client = connect(robot, pace="lockstep", timeout_s=TIMEOUT_S)
+    _ready(client)
+    seen = client.ask()
+    robot.silent = True
+    began = time.monotonic()
+    client.command((0.0, 1.0), answers=seen.message.seq)
+    with pytest.raises(LinkError, match="nothing was heard for"):
+        client.observation(seen.message.seq, timeout_s=60.0)
+    assert TIMEOUT_S / 2 < time.monotonic() - began < 10 * TIMEOUT_S
+    assert not client.alive
+
+
+def test_silence_that_nobody_asked_about_is_no_loss(run: Run, connect: Connect) -> None:
+    """A client that wants nothing asks whether anybody is there, and is answered."""
+    robot = run()
+    client = connect(robot, timeout_s=TIMEOUT_S)
+    eventually(lambda: len(robot.told(m.Ping)) > 3)
+    assert client.alive
+
+
+def test_a_robot_that_dies_is_noticed_at_once(credentials: Path) -> None:
+    """Whoever waits for an observation is told, long before any timeout."""
+    robot = Robot()
+    with robot.running(credentials):
+        client = RobotClient.connect(robot.known, timeout_s=30.0)
+        errors: list[LinkError] = []
+
+        def wait() -> None:
+            try:
+                client.observation(timeout_s=60.0)
+            except LinkError as error:
+                errors.append(error)
+
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+    waiting.join(10.0)
+    assert "lost" in str(errors[0])
+    with pytest.raises(LinkError, match="lost"):
+        client.take()
+    client.close()
+
+
+def test_a_cut_between_question_and_answer_is_an_answer(run: Run, connect: Connect) -> None:
+    """Nobody waits for what cannot come."""
+    robot = run(delay_s=60.0)
+    client = connect(robot, timeout_s=30.0)
+    threading.Thread(
+        target=lambda: (eventually(lambda: bool(robot.told(m.Take))), robot.cut())
+    ).start()
+    with pytest.raises(LinkError, match="lost"):
+        client.take()
+
+
+def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
+    """No observation in time is an error of its own, and the link stands."""
+    client = connect(run(delay_s=0.2))
+    client.acknowledge()
+    with pytest.raises(StaleObservation):
+        client.observation(timeout_s=0.01)
+    assert client.observation(timeout_s=10.0).message.seq == 1
+
+
+def test_closing_a_dead_line_takes_no_time(run: Run, connect: Connect) -> None:
+    """A robot that says nothing cannot hold up whoever leaves."""
+    robot = run()
+    client = connect(robot, timeout_s=60.0)
+    robot.silent = True
+    began = time.monotonic()
+    client.close()
+    assert time.monotonic() - began < 5.0
+
+
+@given(garbage=st.binary(max_size=100))
+def test_garbage_ends_the_link_in_words(credentials: Path, garbage: bytes) -> None:
+    """No thread dies of it, and nobody waits on."""
+    robot = Robot(garbage=garbage)
+    with robot.running(credentials), RobotClient.connect(robot.known) as client:
+        with pytest.raises(LinkError, match="no message"):
+            client.ask()
+        assert not client.alive
+
+
+def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
+    """Somebody who replays is not believed."""
+    robot = run()
+    client = connect(robot)
+    robot._seq = 10
+    client.ask()
+    robot._seq = 5
+    with pytest.raises(LinkError, match="replays"):
+        client.ask()
+
+
+def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connect) -> None:
+    """The robot's words, not a broken pipe."""
+    robot = run()
+    client = connect(robot)
+    robot.say(m.Refused(reason="You say too much.", fatal=True))
+    eventually(lambda: not client.alive)
+    with pytest.raises(LinkError, match="You say too much"):
+        client.ask()
+
+
+def test_a_stuck_line_brings_the_newest_command_only(run: Run, connect: Connect) -> None:
+    """Commands that could not leave are replaced, never played back."""
+    robot = run()
+    client = connect(robot)
+    client.take()
+    stuck = threading.Event()
+    loop = client._loop
+    assert loop is not None
+    loop.call_soon_threadsafe(lambda: stuck.wait(10.0))
+    for i in range(1, 6):
+        client.command((0.0, i / 10), answers=0)
+    stuck.set()
+    eventually(lambda: bool(robot.told(m.Command)))
+    client.ping()
+    assert [command.values for command in robot.told(m.Command)] == [(0.0, 0.5)]

@@ -1,0 +1,94 @@
+"""What a workstation remembers of robots, and who else may read it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import LinkError, UnknownName
+from shapechanger.link.proof import new_key
+from shapechanger.remote.known import KnownRobot, forget, known_names, recall, remember
+
+PRINT = "ab" * 32
+
+
+@pytest.fixture(autouse=True)
+def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+def test_a_robot_is_recalled_as_it_was() -> None:
+    """By its name; forgetting it is possible."""
+    robot = KnownRobot("new-bright", "car.local:5000", new_key(), PRINT)
+    path = remember(robot)
+    assert recall("new-bright") == robot
+    assert known_names() == ("new-bright",)
+    assert path.stat().st_mode & 0o777 == 0o600
+    forget("new-bright")
+    with pytest.raises(UnknownName):
+        recall("new-bright")
+    with pytest.raises(UnknownName):
+        forget("new-bright")
+
+
+def test_a_new_address_replaces_the_old() -> None:
+    """And leaves no second file behind."""
+    key = new_key()
+    remember(KnownRobot("car", "car.local", key, PRINT))
+    path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
+    assert recall("car").address == "10.0.0.7"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_misspelt_name_is_told_what_there_is() -> None:
+    """With the nearest spelling."""
+    remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
+    with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
+        recall("new-brigt")
+
+
+def test_a_key_that_others_can_read_is_not_used() -> None:
+    """As ssh does; the message has the command."""
+    path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
+    path.chmod(0o644)
+    with pytest.raises(LinkError, match="chmod 600"):
+        recall("car")
+
+
+@pytest.mark.parametrize("text", ["adress = 1", "not toml", 'address = "a"\nkey = 1\n'])
+def test_a_broken_file_is_named(text: str) -> None:
+    """Whoever edits it by hand finds it again."""
+    path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
+    path.write_text(text)
+    with pytest.raises(LinkError, match=r"car\.toml"):
+        recall("car")
+
+
+@pytest.mark.parametrize(
+    ("name", "address", "key", "fingerprint"),
+    [
+        ("../car", "car.local", new_key(), PRINT),
+        ("car", "http://car", new_key(), PRINT),
+        ("car", "car.local", "short", PRINT),
+        ("car", "car.local", "", PRINT),
+        ("car", "car.local", new_key(), "trust me"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(
+    name: str, address: str, key: str, fingerprint: str
+) -> None:
+    """Before it is written down."""
+    with pytest.raises(LinkError):
+        KnownRobot(name, address, key, fingerprint)
+
+
+def test_without_encryption_there_may_be_no_key() -> None:
+    """That word must be typed."""
+    assert KnownRobot("car", "car.local", "", "insecure").key == ""
+
+
+def test_a_key_does_not_get_into_a_log() -> None:
+    """What is printed shows no secret."""
+    key = new_key()
+    assert key not in repr(KnownRobot("car", "car.local", key, PRINT))

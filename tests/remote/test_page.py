@@ -1,0 +1,32 @@
+"""What docs/remote.md shows works as it shows it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.remote.known import remember
+from tests.remote.robot import Robot
+
+PAGE = Path(__file__).parents[2] / "docs" / "remote.md"
+
+
+def test_the_examples_drive_a_robot(
+    run: Callable[..., Robot], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One after another, on a robot that is remembered under the name that the page uses."""
+    robot = run(control_hz=100.0, clock="real")
+    remember(dataclasses.replace(robot.known, name="new-bright"))
+    names: dict[str, Any] = {"__name__": "__main__"}
+    blocks = re.findall(r"```(?:py|python)\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    assert len(blocks) == 4
+    for block in blocks:
+        exec(compile(block, str(PAGE), "exec"), names)
+        if "env" in names:
+            names["env"].close()
+    assert capsys.readouterr().out.startswith("(0.0, 0.3)")

@@ -1,0 +1,181 @@
+"""The env against the daemon that runs on robots, with a guard and a camera that are faked."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.errors import RobotRefused
+from shapechanger.layout import Layout
+from shapechanger.link.fingerprint import fingerprint_hex
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.known import KnownRobot
+from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
+from tests.remote.robot import STATE, eventually
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import Running, running
+
+ID = "shapechanger/RemoteVehicle-v1"
+HZ = 20.0
+SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
+
+
+class Served:
+    """A daemon in a thread of its own.
+
+    Attributes:
+        running: The daemon, to be touched on its own loop only.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
+        made = make_credentials(folder, "test car")
+        self.known_at = fingerprint_hex(made.fingerprint)
+        self.key = load_credentials(folder).key_file.read_text().strip()
+        self._plan = car_plan(
+            certificate=str(made.certificate),
+            private_key=str(made.private_key),
+            key_file=str(made.key_file),
+            state_layout=Layout(STATE).to_json(),
+            control_hz=HZ,
+            **plan,
+        )
+        self._monkeypatch = monkeypatch
+        self._ready = threading.Event()
+
+    @contextlib.contextmanager
+    def serving(self) -> Iterator[Served]:
+        """Until the end of the block."""
+        thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
+        thread.start()
+        assert self._ready.wait(20.0)
+        try:
+            yield self
+        finally:
+            self._loop.call_soon_threadsafe(self._stop.set)
+            thread.join()
+
+    @property
+    def known(self) -> KnownRobot:
+        """What a workstation remembers of it."""
+        return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
+
+    def sense(self, **quantities: float) -> None:
+        """Let the guard say what it senses."""
+        sensed = SENSED | quantities
+        state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
+        self._loop.call_soon_threadsafe(lambda: self.running.guard.say(**state))
+
+    async def _serve(self) -> None:
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        async with running(self._plan, self._monkeypatch) as robot:
+            self.running: Running = robot
+            self._ready.set()
+            while not self._stop.is_set():
+                robot.show()
+                robot.guard.say()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(1.0 / HZ):
+                        await self._stop.wait()
+
+
+@pytest.fixture
+def serve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Served]]:
+    """Start a daemon; it ends with the test."""
+    with contextlib.ExitStack() as stack:
+
+        def made(**plan: Any) -> Served:
+            robot = stack.enter_context(Served(tmp_path, monkeypatch, **plan).serving())
+            robot.sense()
+            return robot
+
+        yield made
+
+
+def made(robot: Served, **how: Any) -> gym.Env[Any, Any]:
+    """The env of a robot."""
+    known = robot.known
+    access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
+    return gym.make(ID, **access | how)
+
+
+@pytest.mark.parametrize("pace", ["realtime", "lockstep"])
+def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) -> None:
+    """The guard does what the action says, and the reward is what it senses."""
+    robot = serve(arming="anyone")
+    env = made(robot, pace=pace, state=True)
+    seen, info = env.reset(seed=0)
+    assert env.observation_space.contains(seen)
+    assert info["armed"]
+    for _ in range(5):
+        seen, reward, terminated, truncated, info = env.step(np.array([0.25, 0.5], np.float32))
+        assert not terminated
+        assert not truncated, info["truncated_because"]
+        assert info["refused"] == ""
+    assert info["action_applied"].tolist() == [0.25, 0.5]
+    assert 0.0 < reward < 0.5
+    assert info["latency"]["observation_age_at_action"] > 0.0
+    assert info["reward_sources"]["speed"] == "wheel"
+    robot.sense(collision=1.0)
+    for _ in range(20):
+        *_, terminated, _, info = env.step(np.array([0.0, 0.0], np.float32))
+        if terminated:
+            break
+    assert info["reward_collision"] == -10.0
+    env.close()
+    eventually(lambda: "disarm" in robot.running.guard.kinds())
+
+
+def test_a_person_takes_the_robot_from_a_program(serve: Callable[..., Served]) -> None:
+    """The episode is truncated with the person's name; the next one waits for them."""
+    robot = serve(arming="anyone")
+    env = made(robot, pace="lockstep", reset_timeout_s=0.3)
+    env.reset(seed=0)
+    with RobotClient.connect(robot.known, role="person", name="Grace", frames=False) as person:
+        person.take()
+        *_, truncated, info = env.step(np.zeros(2, np.float32))
+        assert truncated
+        assert info["truncated_because"].startswith("Grace commands the robot now")
+        with pytest.raises(RobotRefused, match="Grace commands"):
+            env.reset()
+    env.close()
+
+
+def test_a_person_arms_what_a_program_drives(serve: Callable[..., Served]) -> None:
+    """The program waits, the person clicks, the program drives; an emergency stop ends it."""
+    robot = serve()
+    with RobotClient.connect(robot.known, role="person", name="Grace") as person:
+
+        def click(_: str) -> None:
+            person.ask()
+            threading.Thread(target=person.arm).start()
+
+        env = made(robot, on_waiting=click, reset_timeout_s=20.0)
+        _, info = env.reset(seed=0)
+        assert info["armed"]
+        person.emergency_stop("a dog")
+        for _ in range(20):
+            *_, truncated, info = env.step(np.zeros(2, np.float32))
+            if truncated:
+                break
+        assert info["truncated_because"].startswith("Emergency stop")
+        env.close()
+
+
+def test_an_answer_to_what_was_never_seen_is_refused(serve: Callable[..., Served]) -> None:
+    """In the daemon's words."""
+    robot = serve(arming="anyone")
+    with RobotClient.connect(robot.known, pace="lockstep") as client:
+        client.take()
+        client.arm()
+        seen = client.ask()
+        seq = client.command((0.0, 0.5), answers=seen.message.seq + 1000)
+        client.observation(seen.message.seq)
+        assert "was not sent to this client" in client.refusal(seq)

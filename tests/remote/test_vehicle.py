@@ -1,0 +1,464 @@
+"""The env against a robot on a real socket."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger import testing
+from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
+from shapechanger.layout import Element, Feature
+from shapechanger.link import messages as m
+from shapechanger.remote.four_way import FOUR_WAYS, FourWay
+from shapechanger.remote.known import remember
+from shapechanger.remote.vehicle import RemoteVehicleEnv
+from shapechanger.testing import MakeEnv
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from tests.remote.robot import FULL_SPEED, STATE, THROTTLE, WALL, Robot, eventually
+
+Run = Callable[..., Robot]
+
+ID = "shapechanger/RemoteVehicle-v1"
+AHEAD = np.array([0.0, 1.0], np.float32)
+REST = np.zeros(2, np.float32)
+TENDONS = tuple(
+    Feature(name, "1", 0.0, 1.0, Element("tendon", name)) for name in ("FDP", "FDS", "EDC")
+)
+
+
+def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
+    """The env of a robot, in step with it."""
+    return gym.make(ID, **{"pace": "lockstep"} | robot.arguments | how)
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        testing.passes_gymnasiums_checker,
+        testing.is_deterministic,
+        testing.shares_no_memory,
+        testing.reward_is_the_sum_of_its_terms,
+        testing.pickles,
+    ],
+    ids=lambda promise: promise.__name__,
+)
+def test_an_env_with_pictures_keeps_its_promises(
+    run: Run, promise: Callable[[MakeEnv], None]
+) -> None:
+    """All but those about flat observations, which a picture is not."""
+    promise(partial(made, run(home_at_take=True)))
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        testing.passes_gymnasiums_checker,
+        testing.is_deterministic,
+        testing.shares_no_memory,
+        testing.names_every_number,
+        testing.reward_is_the_sum_of_its_terms,
+        testing.pickles,
+    ],
+    ids=lambda promise: promise.__name__,
+)
+@pytest.mark.parametrize("image", [None, False])
+def test_an_env_without_pictures_keeps_its_promises(
+    run: Run, promise: Callable[[MakeEnv], None], image: bool | None
+) -> None:
+    """A robot without a camera, or one whose pictures nobody wants."""
+    robot = run(home_at_take=True, image_size=None if image is None else (160, 120))
+    promise(partial(made, robot, image=image))
+
+
+def test_layouts_name_pictures_and_states(run: Run) -> None:
+    """A picture is one block, in the order in which Gymnasium flattens a Dict."""
+    env = made(run(), state=True, size=(40, 30))
+    observation, action = layouts_of(env)
+    assert observation.names == ("camera/image", *(f.name for f in STATE))
+    assert observation["camera/image"].shape == (30, 40, 3)
+    assert action.names == ("steering", "throttle")
+    seen, _ = env.reset(seed=0)
+    assert env.observation_space.contains(seen)
+    assert gym.spaces.flatten(env.observation_space, seen).shape == (observation.size,)
+    env.close()
+
+
+@pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
+def test_pictures_have_the_size_that_was_asked_for(run: Run, size: tuple[int, int]) -> None:
+    """160 x 120 by default, 128 x 128 as in 2017."""
+    env = made(run(), size=size, render_mode="rgb_array")
+    seen, _ = env.reset(seed=0)
+    assert seen.shape == (size[1], size[0], 3)
+    assert env.render().shape == (120, 160, 3)
+    env.close()
+
+
+def test_the_reward_is_metres_forward(run: Run) -> None:
+    """Signed, so backwards costs; the sensors are named."""
+    robot = run(reward={"velocity": 2.0})
+    env = made(robot, reward={"stall": -5.0})
+    env.reset(seed=0)
+    way = FULL_SPEED / robot.control_hz
+    _, forth, *_, info = env.step(AHEAD)
+    assert forth == info["reward_velocity"] == pytest.approx(2.0 * way)
+    assert env.step(-AHEAD)[1] == pytest.approx(-2.0 * way)
+    assert info["reward_sources"] == {
+        "speed": "encoder",
+        "collision": "bumper",
+        "stall": "encoder",
+    }
+    env.close()
+
+
+def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
+    """Terminated, not truncated: the task is over, the link is not."""
+    robot = run()
+    env = made(robot, on_reset=lambda seed: robot.stand_at(0.0))
+    env.reset(seed=0)
+    ends = []
+    for _ in range(int(WALL / FULL_SPEED * robot.control_hz) + 3):
+        _, _, terminated, truncated, info = env.step(AHEAD)
+        ends.append((terminated, truncated, info["reward_collision"]))
+        if terminated:
+            break
+    assert ends[-1] == (True, False, -10.0)
+    assert not any(terminated or truncated for terminated, truncated, _ in ends[:-1])
+    *_, terminated, _, info = env.step(AHEAD)
+    assert (terminated, info["reward_collision"]) == (False, 0.0)
+    env.reset(seed=0)
+    assert env.step(AHEAD)[2] is False
+    env.close()
+
+
+def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
+    """No term, and a source that says so; the number itself is named in info."""
+    robot = run(absent=("speed", "stall"))
+    env = made(robot, state=True)
+    seen, _ = env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert info["reward_sources"] == {"speed": "absent", "collision": "bumper", "stall": "absent"}
+    assert set(info["reward_terms"]) == {"reward_collision"}
+    assert info["absent"] == ("speed", "stall")
+    assert np.isfinite(seen["state"]).all()
+    env.close()
+
+
+def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
+    """A command that the robot did not act on has no way to the pins."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert set(info["latency"]) == {
+        "capture_to_send",
+        "round_trip",
+        "observation_age_at_action",
+        "command_to_pin",
+    }
+    assert 0.0 < info["latency"]["round_trip"] < 5.0
+    robot.refusal = "It is too old."
+    *_, info = env.step(AHEAD)
+    assert set(info["latency"]) == {"capture_to_send"}
+    assert info["refused"] == "It is too old."
+    assert info["action_applied"].tolist() == [0.0, 0.0]
+    env.close()
+
+
+def test_a_command_answers_what_was_seen(run: Run) -> None:
+    """The observation that the step before returned."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(AHEAD)
+    eventually(lambda: len(robot.told(m.Command)) >= 3)
+    answers = [command.answers for command in robot.told(m.Command)]
+    assert answers == sorted(set(answers))
+    env.close()
+
+
+@pytest.mark.parametrize("how", ["frozen", "broken"])
+def test_an_old_picture_is_never_passed_off_as_new(run: Run, how: str) -> None:
+    """A camera that freezes or sends garbage: the picture is the last one, and info says so."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    before, *_, info = env.step(AHEAD)
+    assert not info["frame_repeated"]
+    if how == "frozen":
+        robot.frozen = True
+    else:
+        robot.jpeg = b"\xff\xd8 no picture"
+    after, *_, info = env.step(AHEAD)
+    assert info["frame_repeated"]
+    assert np.array_equal(before, after)
+    assert how == "broken" or info["frame_age"] > 1.0
+    env.close()
+
+
+def test_a_camera_that_gives_nothing_new_does_not_start_an_episode(run: Run) -> None:
+    """The first observation is of the time after the reset."""
+    env = made(run(frozen=True), reset_timeout_s=0.2)
+    with pytest.raises(LinkError, match="does its camera still work"):
+        env.reset(seed=0)
+    env.close()
+
+
+@pytest.mark.parametrize("action", [[0.0], [0.0, np.nan], [0.0, np.inf], [[0.0, 0.0]]])
+def test_an_action_that_cannot_be_meant_is_not_sent(run: Run, action: Any) -> None:
+    """The message says which numbers there are."""
+    robot = run()
+    env = RemoteVehicleEnv(pace="lockstep", **robot.arguments)
+    env.reset(seed=0)
+    sent = len(robot.told(m.Command))
+    with pytest.raises(SpaceMismatch, match="2 finite numbers \\(steering, throttle\\)"):
+        env.step(np.array(action))
+    assert len(robot.told(m.Command)) == sent
+    env.close()
+
+
+def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
+    """As every env does."""
+    env = RemoteVehicleEnv(pace="lockstep", **run().arguments)
+    env.reset(seed=0)
+    *_, info = env.step(np.array([-3.0, 2.0], np.float32))
+    assert info["action_applied"].tolist() == [-1.0, 1.0]
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("change", "because"),
+    [
+        ({"emergency": True, "stop_reason": "The button was pressed."}, "Emergency stop: The butt"),
+        ({"armed": False}, "The robot was disarmed."),
+        ({"held_by": "Grace"}, "Grace commands the robot now."),
+    ],
+)
+def test_a_person_truncates(run: Run, change: dict[str, Any], because: str) -> None:
+    """The task did not end; somebody ended it, and info says who."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    for name, value in change.items():
+        setattr(robot, name, value)
+    *_, terminated, truncated, info = env.step(AHEAD)
+    assert (terminated, truncated) == (False, True)
+    assert info["truncated_because"].startswith(because)
+    env.close()
+
+
+def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Path) -> None:
+    """The last observation comes once more, with the reason; then the episode is over."""
+    robot = Robot()
+    with robot.running(credentials):
+        env = made(robot, reset_timeout_s=20.0)
+        env.reset(seed=0)
+        last, *_ = env.step(AHEAD)
+        port = robot.port
+    seen, reward, terminated, truncated, info = env.step(AHEAD)
+    assert (reward, terminated, truncated) == (0.0, False, True)
+    assert "lost" in info["truncated_because"]
+    assert np.array_equal(seen, last)
+    assert not np.may_share_memory(seen, last)
+    assert info["frame_repeated"]
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(AHEAD)
+    with robot.running(credentials, port):
+        env.reset(seed=0)
+        assert env.step(AHEAD)[3] is False
+        env.close()
+
+
+def test_a_silent_link_truncates_in_time(run: Run) -> None:
+    """Without a FIN."""
+    robot = run()
+    env = made(robot, timeout_s=0.3)
+    env.reset(seed=0)
+    robot.silent = True
+    began = time.monotonic()
+    *_, truncated, info = env.step(AHEAD)
+    assert truncated
+    assert "nothing was heard" in info["truncated_because"]
+    assert time.monotonic() - began < 3.0
+    env.close()
+
+
+def test_reset_waits_for_the_operator(run: Run) -> None:
+    """Who is told once what is waited for; afterwards the robot is ours and armed."""
+    robot = run(arming="person")
+    said: list[str] = []
+
+    def told(sentence: str) -> None:
+        said.append(sentence)
+        robot.armed = True
+
+    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    _, info = env.reset(seed=0)
+    assert info["armed"]
+    assert said == ["tin waits for its operator: put it at the start and arm it."]
+    env.step(AHEAD)
+    env.reset(seed=0)
+    assert robot.told(m.Disarm)  # So that the operator can pick it up.
+    assert len(said) == 2
+    env.close()
+
+
+def test_reset_does_not_wait_for_ever(run: Run) -> None:
+    """The message says what to do."""
+    env = made(run(arming="person"), reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused, match=r"was not armed within 0 s.*shapechanger robot drive"):
+        env.reset(seed=0)
+    env.close()
+
+
+def test_reset_waits_until_whoever_drives_is_done(run: Run) -> None:
+    """And says in the robot's words who that is."""
+    robot = run(held_by="Grace")
+    said: list[str] = []
+
+    def told(sentence: str) -> None:
+        said.append(sentence)
+        robot.held_by = ""
+
+    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    env.reset(seed=0)
+    assert said == ["Grace commands."]
+    robot.held_by = "Grace"
+    impatient = made(robot, reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused, match="Grace commands"):
+        impatient.reset(seed=0)
+    impatient.close()
+    env.close()
+
+
+def test_the_routine_of_the_profile_brings_it_back(run: Run) -> None:
+    """Each step as long as it says, by the robot's clock."""
+    robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
+    env = made(robot, on_reset="routine")
+    env.reset(seed=0)
+    values = [command.values for command in robot.told(m.Command)]
+    assert values.count((0.0, -0.5)) == 10
+    assert values.count((1.0, 0.0)) == 4
+    env.close()
+
+
+def test_a_routine_that_is_not_there_is_asked_for_in_words(run: Run) -> None:
+    """The message says how to get one."""
+    env = made(run(), on_reset="routine")
+    with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
+        env.reset(seed=0)
+    env.close()
+
+
+def test_a_function_gets_the_seed(run: Run) -> None:
+    """A twin's operator can put the robot where the seed says."""
+    seeds: list[int | None] = []
+    env = made(run(), on_reset=seeds.append)
+    env.reset(seed=3)
+    env.reset()
+    assert seeds == [3, None]
+    env.close()
+
+
+def test_steps_last_a_control_period(run: Run) -> None:
+    """In real time; the robot's answers are waited for, and none is older than the command."""
+    robot = run(control_hz=50.0, clock="real")
+    env = made(robot, pace="realtime")
+    env.reset(seed=0)
+    began = time.monotonic()
+    for _ in range(20):
+        *_, info = env.step(REST)
+    took_s = time.monotonic() - began
+    assert took_s > 0.9 * 20 / 50.0
+    assert info["deadline_missed"] <= 20
+    env.close()
+
+
+def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
+    """Tendons pull and do not push; without a camera the observation is the state."""
+    robot = run(
+        actions=TENDONS,
+        state=tuple(Feature(f"{f.name}/applied", "1", 0.0, 1.0, f.element) for f in TENDONS),
+        image_size=None,
+    )
+    env = made(robot)
+    assert env.action_space.low.tolist() == [0.0, 0.0, 0.0]
+    assert env.observation_space.shape == (3,)
+    env.reset(seed=0)
+    _, reward, *_, info = env.step(np.array([0.5, 0.0, 1.0], np.float32))
+    assert info["action_applied"].tolist() == [0.5, 0.0, 1.0]
+    assert (reward, info["reward_terms"]) == (0.0, {})
+    assert set(info["reward_sources"].values()) == {"absent"}
+    env.close()
+    with pytest.raises(RobotRefused, match="has no camera"):
+        made(robot, image=True)
+    blind = RemoteVehicleEnv(render_mode="rgb_array", pace="lockstep", **robot.arguments)
+    with pytest.raises(RenderError, match="has it a camera"):
+        blind.render()
+    blind.close()
+
+
+def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
+    """Also in another process, from the id and its arguments alone."""
+    remember(run().known)
+    with EnvRef(ID, {"robot": "tin", "pace": "lockstep"}).make() as env:
+        env.reset(seed=0)
+    with pytest.raises(UnknownName, match="Did you mean 'tin'"):
+        gym.make(ID, robot="tim")
+
+
+@pytest.mark.parametrize(
+    ("how", "error"),
+    [
+        ({"on_reset": "opertor"}, UnknownName),
+        ({"reward": {"speed": 1.0}}, UnknownName),
+        ({"size": (0, 10)}, SpaceMismatch),
+    ],
+)
+def test_arguments_that_cannot_be_meant_are_refused(
+    run: Run, how: dict[str, Any], error: type[Exception]
+) -> None:
+    """And no connection stays open."""
+    with pytest.raises(error):
+        RemoteVehicleEnv(**run().arguments, **how)
+
+
+def test_closing_gives_the_robot_back(run: Run) -> None:
+    """Twice does nothing more."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    eventually(lambda: len(robot.told(m.Release)) == 1)
+
+
+def test_four_keys_drive_as_in_2017(run: Run) -> None:
+    """The columns of labels.csv in their order; a key that steers does not drive."""
+    env = FourWay(made(run()), throttle=0.6, steering=0.4)
+    env.reset(seed=0)
+    applied = {
+        way: env.step(np.int64(i))[4]["action_applied"].tolist() for i, way in enumerate(FOUR_WAYS)
+    }
+    assert applied == {
+        "forward": pytest.approx([0.0, 0.6]),
+        "backward": pytest.approx([0.0, -0.6]),
+        "right": pytest.approx([0.4, 0.0]),
+        "left": pytest.approx([-0.4, 0.0]),
+    }
+    env.close()
+
+
+def test_four_keys_drive_nothing_else(run: Run) -> None:
+    """A finger has no steering."""
+    env = made(run(actions=(THROTTLE,)))
+    with pytest.raises(SpaceMismatch, match="steering, throttle"):
+        FourWay(env)
+    env.close()

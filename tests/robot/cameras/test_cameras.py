@@ -1,0 +1,402 @@
+"""Every camera driver that runs without a camera, and fakes for the others."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import sys
+import threading
+import time
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.cameras import v4l2_api as api
+from shapechanger.robot.cameras.barcode import read_barcode
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
+from shapechanger.robot.cameras.v4l2 import V4l2
+
+
+def _jpeg(value: int = 0, size: tuple[int, int] = (32, 24)) -> bytes:
+    image = np.full((size[1], size[0], 3), value, np.uint8)
+    return simplejpeg.encode_jpeg(image, 80, colorsubsampling="420")
+
+
+def _plan(driver: str, **settings: int | str) -> CameraPlan:
+    return CameraPlan(driver, size=(32, 24), fps=1000.0, settings=settings)
+
+
+def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
+    """What a `read` that waits in another thread says when the camera is closed."""
+    words: list[str] = []
+
+    def wait() -> None:
+        try:
+            while True:
+                reads()
+        except RobotError as error:
+            words.append(str(error))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    camera.close()
+    thread.join(10.0)
+    assert not thread.is_alive()
+    camera.close()  # Twice is once.
+    return words[0]
+
+
+def test_unknown_driver_is_named() -> None:
+    """With the ones there are."""
+    with pytest.raises(UnknownName, match="picamera2, v4l2, file, pipe, pattern"):
+        open_camera(_plan("webcam"))
+
+
+def test_pattern_moves_and_carries_its_time() -> None:
+    """So that the age of a frame can be measured anywhere."""
+    camera = open_camera(CameraPlan("pattern", fps=100.0))
+    frames = [camera.read() for _ in range(3)]
+    for frame in frames:
+        image = simplejpeg.decode_jpeg(frame.jpeg)
+        assert image.shape == (120, 160, 3)
+        assert read_barcode(image) == frame.captured_ns % 2**48
+    times = [frame.captured_ns for frame in frames]
+    assert times[2] - times[0] >= 19_000_000  # Two periods, less the last one's lateness.
+    assert len({frame.jpeg for frame in frames}) == 3
+    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
+
+
+def test_pattern_too_small_for_its_barcode_is_refused() -> None:
+    """In words, when it is opened."""
+    with pytest.raises(RobotError, match="no room"):
+        open_camera(_plan("pattern"))
+
+
+def test_folder_is_read_in_order_and_again(tmp_path: Path) -> None:
+    """A recorded drive, as pictures."""
+    for name, value in (("b.jpg", 90), ("a.jpg", 10), ("c.JPEG", 200)):
+        (tmp_path / name).write_bytes(_jpeg(value))
+    (tmp_path / "notes.txt").write_text("no picture")
+    camera = open_camera(_plan("file", path=str(tmp_path)))
+    means = [round(simplejpeg.decode_jpeg(camera.read().jpeg).mean()) for _ in range(4)]
+    assert means == [10, 90, 200, 10]
+    assert "closed" in _ends_when_closed(camera, camera.read)
+
+
+def test_bad_file_is_named_and_left_out(tmp_path: Path) -> None:
+    """One broken picture does not end a drive."""
+    (tmp_path / "a.jpg").write_bytes(b"broken")
+    (tmp_path / "b.jpg").write_bytes(_jpeg(90))
+    camera = open_camera(_plan("file", path=str(tmp_path)))
+    with pytest.raises(RobotError, match=r"a\.jpg: .*no whole JPEG"):
+        camera.read()
+    assert camera.read().jpeg == _jpeg(90)
+
+
+def test_folder_without_pictures_is_refused(tmp_path: Path) -> None:
+    """Or none at all."""
+    with pytest.raises(RobotError, match=r"no \.jpg"):
+        open_camera(_plan("file", path=str(tmp_path)))
+    with pytest.raises(RobotError, match="cannot be read"):
+        open_camera(_plan("file", path=str(tmp_path / "none")))
+
+
+@pytest.fixture
+def fifo(tmp_path: Path) -> Path:
+    """A named pipe."""
+    path = tmp_path / "camera"
+    os.mkfifo(path)
+    return path
+
+
+def _comment(jpeg: bytes, comment: bytes) -> bytes:
+    return jpeg[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + jpeg[2:]
+
+
+def test_pipe_gives_the_newest_picture_and_its_time(fifo: Path) -> None:
+    """What has waited in the pipe is old."""
+    camera = open_camera(_plan("pipe", path=str(fifo)))
+    with fifo.open("wb", buffering=0) as writer:
+        writer.write(
+            _comment(_jpeg(10), b"captured_ns=77") + _comment(_jpeg(90), b"captured_ns=78")
+        )
+        frame = camera.read()
+        assert frame == Frame(_comment(_jpeg(90), b"captured_ns=78"), 78)
+        before_ns = time.monotonic_ns()
+        writer.write(_jpeg(30))
+        frame = camera.read()
+        assert before_ns <= frame.captured_ns <= time.monotonic_ns()
+        writer.write(b"garbage" + _jpeg(40))
+        with pytest.raises(RobotError, match="7 bytes"):
+            camera.read()
+        assert camera.read().jpeg == _jpeg(40)
+    with pytest.raises(RobotError, match="has ended"):
+        camera.read()
+    writing = threading.Thread(target=fifo.write_bytes, args=(_jpeg(50),))
+    writing.start()
+    assert camera.read().jpeg == _jpeg(50)  # The next writer.
+    writing.join()
+    camera.close()
+
+
+def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:
+    """The daemon must be able to end."""
+    camera = open_camera(_plan("pipe", path=str(fifo)))
+    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
+
+
+def test_file_of_pictures_is_read_in_order(tmp_path: Path) -> None:
+    """Nothing in it is newer than the rest."""
+    file = tmp_path / "drive.mjpeg"
+    file.write_bytes(b"".join(map(_jpeg, (10, 20, 30))))
+    camera = open_camera(_plan("pipe", path=str(file)))
+    assert [camera.read().jpeg for _ in range(3)] == [_jpeg(v) for v in (10, 20, 30)]
+    with pytest.raises(RobotError, match="has ended"):
+        camera.read()
+
+
+def test_program_is_a_camera(tmp_path: Path) -> None:
+    """Such as rpicam-vid; it ends with the camera."""
+    (tmp_path / "a.jpg").write_bytes(_jpeg(90))
+    script = f"import sys; sys.stdout.buffer.write(open('{tmp_path}/a.jpg','rb').read())"
+    command = f'| {sys.executable} -c "{script}; sys.stdout.flush(); import time; time.sleep(60)"'
+    camera = open_camera(_plan("pipe", path=command))
+    assert camera.read().jpeg == _jpeg(90)
+    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
+    with pytest.raises(RobotError, match="cannot be opened"):
+        open_camera(_plan("pipe", path="| no-such-program"))
+
+
+def test_upside_down_is_turned(tmp_path: Path) -> None:
+    """A camera that hangs from a roof."""
+    image = np.zeros((24, 32, 3), np.uint8)
+    image[:12] = 255
+    (tmp_path / "a.jpg").write_bytes(simplejpeg.encode_jpeg(image, 95))
+    plan = CameraPlan("file", (32, 24), 1000.0, 95, True, {"path": str(tmp_path)})
+    turned = simplejpeg.decode_jpeg(open_camera(plan).read().jpeg)
+    assert (turned[2].mean(), turned[-3].mean()) == pytest.approx((0, 255), abs=5)
+
+
+class _Kernel:
+    """Answers a webcam's calls, with buffers in a file."""
+
+    def __init__(self, path: Path, size: tuple[int, int] = (32, 24)) -> None:
+        path.write_bytes(bytes(3 * mmap.PAGESIZE))
+        self._size = size
+        self._path = path
+        self.calls: list[int] = []
+        self.pictures: list[tuple[bytes, int, int]] = []
+        self._queued: list[int] = []
+
+    def ioctl(self, fd: int, call: int, data: Any) -> int:
+        """One call."""
+        self.calls.append(call)
+        if call == api.SET_FORMAT:
+            struct.pack_into("=II", data, 8, *self._size)
+        elif call == api.QUERY_BUFFER:
+            index = api.Buffer.unpack(data).index
+            data[:] = api.Buffer(index, 0, 0, 0, index * mmap.PAGESIZE, mmap.PAGESIZE).pack()
+        elif call == api.QUEUE:
+            self._queued.append(api.Buffer.unpack(data).index)
+        elif call == api.DEQUEUE:
+            if not self.pictures:
+                raise BlockingIOError
+            jpeg, at_ns, flags = self.pictures.pop(0)
+            index = self._queued.pop(0)
+            with self._path.open("r+b") as file:
+                file.seek(index * mmap.PAGESIZE)
+                file.write(jpeg)
+            data[:] = api.Buffer(index, len(jpeg), flags, at_ns).pack()
+        return 0
+
+
+def test_structures_have_the_kernels_sizes() -> None:
+    """Their sizes are part of the calls' numbers."""
+    assert len(api.Buffer(0).pack()) == (api.QUEUE >> 16) & 0x3FFF == 88
+    assert len(api.pixel_format(1, 1)) == (api.SET_FORMAT >> 16) & 0x3FFF == 208
+    assert len(api.frame_rate(1.0)) == (api.SET_PARAMETERS >> 16) & 0x3FFF == 204
+    assert len(api.request(1)) == (api.REQUEST_BUFFERS >> 16) & 0x3FFF == 20
+    buffer = api.Buffer(2, 100, 0x2000, 5_000_001_000, 8192, 4096)
+    assert api.Buffer.unpack(buffer.pack()) == buffer
+
+
+def test_webcam_gives_the_newest_picture_and_the_kernels_time(tmp_path: Path) -> None:
+    """Over a fake of the kernel; no camera was at hand."""
+    kernel = _Kernel(tmp_path / "video0")
+    camera = V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
+    assert kernel.calls[-1] == api.STREAM_ON
+    monotonic = api.BUFFER_FLAG_MONOTONIC
+    kernel.pictures = [
+        (_jpeg(10), 1_000_000, monotonic),
+        (_jpeg(90) + bytes(20), 2_000_000, monotonic),
+        (b"torn", 3_000_000, monotonic | api.BUFFER_FLAG_ERROR),
+    ]
+    assert camera.read() == Frame(_jpeg(90), 2_000_000)
+    kernel.pictures = [(_jpeg(20), 5, 0)]  # A driver without a monotonic clock.
+    assert camera.read().captured_ns > 1_000_000_000
+    camera.close()
+    with pytest.raises(RobotError, match="closed"):
+        camera.read()
+
+
+def test_webcam_without_the_size_is_refused(tmp_path: Path) -> None:
+    """With the command that lists its sizes."""
+    kernel = _Kernel(tmp_path / "video0", size=(640, 480))
+    with pytest.raises(RobotError, match="list-formats-ext"):
+        V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
+    with pytest.raises(RobotError, match="does not answer"):
+        open_camera(_plan("v4l2", device=str(tmp_path / "video1")))
+
+
+class _Request:
+    """As `picamera2.request.CompletedRequest`."""
+
+    def __init__(self, image: np.ndarray) -> None:
+        self._image = image
+        self.released = False
+
+    def make_array(self, name: str) -> np.ndarray:
+        assert name == "main"
+        return self._image
+
+    def get_metadata(self) -> dict[str, Any]:
+        return {"SensorTimestamp": 123_456_789, "ExposureTime": 10_000}
+
+    def release(self) -> None:
+        self.released = True
+
+
+class _Picamera2:
+    """As `picamera2.Picamera2`: the signatures are those of its source (raspberrypi/picamera2)."""
+
+    made: list[_Picamera2] = []  # noqa: RUF012  (reset by the fixture)
+
+    def __init__(
+        self,
+        camera_num: int = 0,
+        verbose_console: Any = None,
+        tuning: Any = None,
+        allocator: Any = None,
+    ) -> None:
+        if camera_num > 0:
+            raise IndexError("list index out of range")
+        self.calls: list[tuple[str, Any]] = []
+        self.requests: list[_Request] = []
+        self.image = np.zeros((24, 32, 3), np.uint8)
+        self.made.append(self)
+
+    def create_video_configuration(
+        self,
+        main: Any = {},  # noqa: B006  (as in the source)
+        lores: Any = None,
+        raw: Any = None,
+        transform: Any = None,
+        colour_space: Any = None,
+        buffer_count: int = 6,
+        controls: Any = {},  # noqa: B006
+        display: Any = "main",
+        encode: Any = "main",
+        queue: bool = True,
+        sensor: Any = {},  # noqa: B006
+        use_case: str = "video",
+    ) -> dict[str, Any]:
+        return {"main": main, "transform": transform, "controls": controls, "queue": queue}
+
+    def configure(self, camera_config: Any = "preview") -> None:
+        self.calls.append(("configure", camera_config))
+
+    def start(self, config: Any = None, show_preview: Any = False) -> None:
+        self.calls.append(("start", None))
+
+    def capture_request(
+        self, wait: Any = None, signal_function: Any = None, flush: Any = None
+    ) -> _Request:
+        self.calls.append(("capture_request", wait))
+        if self.image.size == 0:
+            raise TimeoutError
+        self.requests.append(_Request(self.image))
+        return self.requests[-1]
+
+    def stop(self) -> None:
+        self.calls.append(("stop", None))
+
+    def close(self) -> None:
+        self.calls.append(("close", None))
+
+
+class _Transform:
+    """As `libcamera.Transform`."""
+
+    def __init__(
+        self, rotation: int = 0, hflip: int = 0, vflip: int = 0, transpose: int = 0
+    ) -> None:
+        self.flips = (hflip, vflip)
+
+
+@pytest.fixture
+def picamera2(monkeypatch: pytest.MonkeyPatch) -> type[_Picamera2]:
+    """A Pi with the camera's packages."""
+    for name, attribute, value in (
+        ("picamera2", "Picamera2", _Picamera2),
+        ("libcamera", "Transform", _Transform),
+    ):
+        module = types.ModuleType(name)
+        setattr(module, attribute, value)
+        monkeypatch.setitem(sys.modules, name, module)
+    _Picamera2.made.clear()
+    return _Picamera2
+
+
+def test_pi_camera_gives_jpeg_with_the_sensors_time(picamera2: type[_Picamera2]) -> None:
+    """Over a recording fake; no camera was at hand."""
+    plan = CameraPlan("picamera2", (32, 24), 25.0, 80, True, {"number": 0})
+    camera = open_camera(plan)
+    fake = picamera2.made[0]
+    configuration = fake.calls[0][1]
+    assert configuration["main"] == {"size": (32, 24), "format": "BGR888"}
+    assert configuration["transform"].flips == (1, 1)
+    assert configuration["controls"] == {"FrameDurationLimits": (40_000, 40_000)}
+    assert configuration["queue"] is False
+    fake.image[..., 0] = 255  # Red.
+    frame = camera.read()
+    assert frame.captured_ns == 123_456_789
+    np.testing.assert_allclose(simplejpeg.decode_jpeg(frame.jpeg)[12, 16], (255, 0, 0), atol=5)
+    assert fake.requests[0].released
+    assert fake.calls[-1] == ("capture_request", 2.0)
+    camera.close()
+    camera.close()
+    assert [name for name, _ in fake.calls[-2:]] == ["stop", "close"]
+    with pytest.raises(RobotError, match="closed"):
+        camera.read()
+
+
+def test_pi_camera_that_hangs_or_changes_its_size_says_so(picamera2: type[_Picamera2]) -> None:
+    """And gives its buffer back all the same."""
+    camera = open_camera(_plan("picamera2", number=0))
+    picamera2.made[0].image = np.zeros((48, 64, 3), np.uint8)
+    with pytest.raises(RobotError, match="64 by 48"):
+        camera.read()
+    assert picamera2.made[0].requests[0].released
+    picamera2.made[0].image = np.zeros((0, 0, 3), np.uint8)
+    with pytest.raises(RobotError, match="given nothing for 2 s"):
+        camera.read()
+
+
+def test_pi_camera_that_is_not_there_is_named(picamera2: type[_Picamera2]) -> None:
+    """With the command that lists what there is."""
+    with pytest.raises(RobotError, match=r"no camera 1.*rpicam-hello"):
+        open_camera(_plan("picamera2", number=1))
+
+
+def test_missing_picamera2_is_told_how_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not on PyPI in a form that works."""
+    monkeypatch.setitem(sys.modules, "libcamera", None)
+    with pytest.raises(RobotError, match=r"apt install python3-picamera2.*--system-site-packages"):
+        open_camera(_plan("picamera2", number=0))

@@ -1,0 +1,161 @@
+"""Barcodes, checks and streams of pictures, without a camera."""
+
+import numpy as np
+import pytest
+import simplejpeg
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.barcode import barcode_rows, draw_barcode, read_barcode
+from shapechanger.robot.cameras.checked import FreezeDetector, check_jpeg
+from shapechanger.robot.cameras.jpeg_stream import JpegSplitter, captured_ns_of
+from shapechanger.robot.cameras.turned import turned
+
+_RNG = np.random.default_rng(20171121)
+
+
+def _picture(width: int = 160, height: int = 120) -> np.ndarray:
+    return _RNG.integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def _jpeg(value: int = 0, width: int = 32, height: int = 24) -> bytes:
+    image = np.full((height, width, 3), value, np.uint8)
+    return simplejpeg.encode_jpeg(image, 80, colorsubsampling="420")
+
+
+def _with_comment(jpeg: bytes, comment: bytes) -> bytes:
+    segment = b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment
+    return jpeg[:2] + segment + jpeg[2:]
+
+
+@given(
+    number=st.integers(0, 2**48 - 1),
+    size=st.sampled_from([(96, 96), (128, 128), (160, 120), (320, 240), (640, 480)]),
+    quality=st.sampled_from([20, 50, 80]),
+    subsampling=st.sampled_from(["444", "420"]),
+)
+def test_barcode_survives_jpeg(
+    number: int, size: tuple[int, int], quality: int, subsampling: str
+) -> None:
+    """Over a picture of noise, which is the worst."""
+    image = _picture(*size)
+    below = image[barcode_rows(size[0]) :].copy()
+    draw_barcode(image, number)
+    assert read_barcode(image) == number
+    np.testing.assert_array_equal(image[barcode_rows(size[0]) :], below)
+    jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling=subsampling)
+    assert read_barcode(simplejpeg.decode_jpeg(jpeg)) == number
+
+
+@pytest.mark.parametrize("value", [0, 255])
+def test_plain_picture_has_no_barcode(value: int) -> None:
+    """A dark room is not time zero."""
+    assert read_barcode(np.full((120, 160, 3), value, np.uint8)) is None
+
+
+def test_noise_has_hardly_ever_a_barcode() -> None:
+    """16 bits of check let one in 65536 through."""
+    assert [read_barcode(_picture()) for _ in range(100)] == [None] * 100
+
+
+def test_barcode_that_does_not_fit_is_refused() -> None:
+    """A cell of less than three pixels would not survive."""
+    with pytest.raises(ValueError, match="not 64 by 48"):
+        draw_barcode(_picture(64, 48), 1)
+    assert read_barcode(_picture(64, 48)) is None
+
+
+def test_picture_of_the_wrong_size_is_named() -> None:
+    """The client has made room for another one."""
+    check_jpeg(_jpeg(), (32, 24))
+    with pytest.raises(RobotError, match="32 by 24 pixels; the profile says 160 by 120"):
+        check_jpeg(_jpeg(), (160, 120))
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", _jpeg()[:-2], b"\xff\xd8 and \xff\xd9"])
+def test_garbage_is_no_picture(data: bytes) -> None:
+    """Also one that has the first and last bytes of a picture."""
+    with pytest.raises(RobotError, match=r"no (whole )?JPEG"):
+        check_jpeg(data, (32, 24))
+
+
+def test_same_bytes_are_not_a_new_picture() -> None:
+    """A camera that has frozen goes on sending."""
+    detector = FreezeDetector()
+    assert [detector.is_new(_jpeg(v)) for v in (1, 1, 2, 2, 1)] == [True, False, True, False, True]
+
+
+def test_turned_twice_is_as_before() -> None:
+    """Up to what JPEG loses."""
+    image = np.zeros((24, 32, 3), np.uint8)
+    image[:8, :8] = 255
+    jpeg = simplejpeg.encode_jpeg(image, 95)
+    once = simplejpeg.decode_jpeg(turned(jpeg, 95))
+    assert once[-4, -4].min() > 200
+    assert once[4, 4].max() < 50
+    twice = simplejpeg.decode_jpeg(turned(turned(jpeg, 95), 95))
+    np.testing.assert_allclose(twice, image, atol=30)
+
+
+@given(values=st.lists(st.integers(0, 255), min_size=1, max_size=5), cut=st.integers(1, 400))
+def test_stream_may_be_cut_anywhere(values: list[int], cut: int) -> None:
+    """A pipe gives what it has."""
+    pictures = [_jpeg(value) for value in values]
+    stream = b"".join(pictures)
+    splitter = JpegSplitter()
+    found: list[bytes] = []
+    for start in range(0, len(stream), cut):
+        splitter.feed(stream[start : start + cut])
+        while (jpeg := splitter.next()) is not None:
+            found.append(jpeg)
+    assert found == pictures
+
+
+@given(garbage=st.binary(max_size=200), data=st.data())
+def test_stream_goes_on_after_garbage(garbage: bytes, data: st.DataObject) -> None:
+    """Whatever it was, pictures come again; and never without an end."""
+    picture = _jpeg()
+    splitter = JpegSplitter()
+    splitter.feed(picture[: data.draw(st.integers(0, len(picture)))] + garbage)
+    splitter.feed(picture * 3)
+    found: list[bytes | None] = []
+    for _ in range(1000):
+        try:
+            found.append(splitter.next())
+        except RobotError:
+            continue
+        if found[-1] is None:
+            break
+    assert found.count(picture) >= 1 or found == [None]  # A broken length may swallow some.
+    splitter.feed(picture * 400)
+    for _ in range(5000):
+        try:
+            jpeg = splitter.next()
+        except RobotError:
+            continue
+        if jpeg is None:
+            break
+        found.append(jpeg)
+    assert found.count(picture) >= 1
+
+
+def test_stream_without_end_is_cut_off() -> None:
+    """4 MiB, and no more memory."""
+    splitter = JpegSplitter()
+    splitter.feed(_jpeg()[:-2] + bytes(4 * 1024 * 1024))
+    with pytest.raises(RobotError, match="more than"):
+        splitter.next()
+    splitter.feed(_jpeg(7))
+    assert splitter.next() == _jpeg(7)
+
+
+def test_time_of_capture_is_in_the_comment() -> None:
+    """And only there."""
+    assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=1234567890123")) == 1234567890123
+    assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=soon")) is None
+    assert captured_ns_of(_with_comment(_jpeg(), b"x" * 100)) is None
+    assert captured_ns_of(_jpeg()) is None
+    stream = JpegSplitter()
+    stream.feed(_with_comment(_jpeg(), b"\xff\xd9"))  # The end of a picture inside a comment.
+    assert stream.next() == _with_comment(_jpeg(), b"\xff\xd9")

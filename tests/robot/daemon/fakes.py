@@ -1,0 +1,145 @@
+"""A guard, a camera and a clock without a robot, that remember what they were told."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import queue
+import socket
+from collections.abc import Callable
+from typing import Any
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from tests.robot.daemon.plans import guard_state
+
+
+class FakeGuard:
+    """The other end of the daemon's socket: it obeys at once, and answers with its state."""
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        ours.setblocking(False)
+        self.daemon_fd = theirs.detach()
+        self.orders: list[Order] = []
+        self.state: GuardState = guard_state()
+        self._now_ns = now_ns
+        self._socket = ours
+
+    def attach(self) -> None:
+        """Answer as orders come, as on a real clock."""
+        asyncio.get_running_loop().add_reader(self._socket, self.tick)
+
+    def close(self) -> None:
+        """Die."""
+        asyncio.get_running_loop().remove_reader(self._socket)
+        self._socket.close()
+
+    def tick(self) -> None:
+        """Read all orders, and say what follows."""
+        while True:
+            try:
+                data = self._socket.recv(MAX_DATAGRAM)
+            except BlockingIOError:
+                break
+            if not data:
+                asyncio.get_running_loop().remove_reader(self._socket)
+                return
+            order = decode_order(data)
+            self.orders.append(order)
+            self._obey(order)
+        self.say()
+
+    def say(self, **changes: Any) -> None:
+        """Send the state."""
+        self.state = dataclasses.replace(self.state, at_ns=self._now_ns(), **changes)
+        self._socket.send(encode(self.state))
+        self.state = dataclasses.replace(self.state, refused="", refused_seq=None)
+
+    def kinds(self) -> list[str]:
+        """The kinds of the orders so far."""
+        return [order.kind for order in self.orders]
+
+    def _obey(self, order: Order) -> None:
+        changes: dict[str, Any] = {}
+        rest = {"applied": (0.0, 0.0), "applied_seq": None}
+        if order.kind == "arm":
+            changes = {"armed": True, "emergency": False, "stop_reason": ""}
+        elif order.kind == "disarm":
+            changes = {"armed": False, "stop_reason": order.reason, **rest}
+        elif order.kind == "emergency":
+            count = self.state.emergencies + 1
+            changes = {"armed": False, "emergency": True, "emergencies": count, **rest}
+        elif order.kind == "command" and self.state.armed:
+            changes = {
+                "applied": order.values,
+                "applied_session": order.session,
+                "applied_seq": order.seq,
+                "applied_ns": self._now_ns(),
+            }
+        elif order.kind == "command":
+            changes = {"refused": "Not armed.", "refused_seq": order.seq}
+        self.state = dataclasses.replace(self.state, **changes)
+
+
+class FakeCamera:
+    """Gives the pictures that a test puts in."""
+
+    def __init__(self) -> None:
+        self.opened = 0
+        self._frames: queue.Queue[Frame | str | int] = queue.Queue()
+
+    def open(self, plan: CameraPlan) -> FakeCamera:
+        """As `open_camera`."""
+        self.opened += 1
+        return self
+
+    def put(self, frame: Frame) -> None:
+        """Give this next."""
+        self._frames.put(frame)
+
+    def fail(self, why: str) -> None:
+        """Fail next."""
+        self._frames.put(why)
+
+    def read(self) -> Frame:
+        """The next picture."""
+        while True:
+            frame = self._frames.get()
+            if isinstance(frame, Frame):
+                return frame
+            if isinstance(frame, str):
+                raise RobotError(frame)
+            if frame == self.opened:
+                raise RobotError("The camera is closed.")
+
+    def close(self) -> None:
+        """Let whoever reads go."""
+        self._frames.put(self.opened)
+
+
+class SteppedClock:
+    """Time that moves when the daemon asks, as a twin's."""
+
+    def __init__(self) -> None:
+        self.ns = 1_000_000_000
+        self.steps: list[float] = []
+        self.tick: Callable[[], None] = lambda: None
+        self.captured_ns: int | None = None
+
+    def now_ns(self) -> int:
+        """The time."""
+        return self.ns
+
+    def wait(self, readable: Any, until_ns: int, at_most_s: float) -> bool:
+        """For the guard only."""
+        raise NotImplementedError
+
+    async def sleep(self, seconds: float) -> int | None:
+        """Let so much time go by, and the guard look."""
+        await asyncio.sleep(0)
+        self.steps.append(seconds)
+        self.ns += round(seconds * 1e9)
+        self.tick()
+        return self.captured_ns

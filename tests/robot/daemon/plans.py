@@ -1,0 +1,63 @@
+"""A small car, its pictures and its plan, for the tests of the daemon."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import simplejpeg
+
+from shapechanger.layout import Feature, Layout
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.guard.wire import GuardState
+
+SIZE = (160, 120)
+ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+STATE = Layout(
+    (Feature("speed", "m/s"), Feature("distance", "m"), Feature("throttle/applied", "1"))
+)
+
+
+def car_plan(**changes: Any) -> DaemonPlan:
+    """A car with a camera on this machine only, without TLS."""
+    fields: dict[str, Any] = {
+        "robot": "test car",
+        "body": "car",
+        "action_layout": ACTIONS.to_json(),
+        "state_layout": STATE.to_json(),
+        "camera": CameraPlan("pattern", SIZE),
+        "port": 0,
+        "discovery": False,
+    }
+    return DaemonPlan(**(fields | changes))
+
+
+def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
+    """A JPEG that differs from that of every other number."""
+    rng = np.random.default_rng(number)
+    # Coarse blocks, as a street has them, and not noise, which no JPEG is small for.
+    coarse = rng.integers(0, 256, (size[1] // 8, size[0] // 8, 3), dtype=np.uint8)
+    return simplejpeg.encode_jpeg(coarse.repeat(8, 0).repeat(8, 1), quality=80)
+
+
+def guard_state(**changes: Any) -> GuardState:
+    """What a guard at rest says."""
+    fields: dict[str, Any] = {
+        "at_ns": 0,
+        "armed": False,
+        "emergency": False,
+        "emergencies": 0,
+        "stop_reason": "Not armed.",
+        "applied": (0.0, 0.0),
+        "applied_session": 0,
+        "applied_seq": None,
+        "applied_ns": None,
+        "refused": "",
+        "refused_seq": None,
+        "outputs": {},
+        "quantities": {"speed": 0.25},
+        "sources": {"speed": "wheel"},
+        "bumps": 0,
+    }
+    return GuardState(**(fields | changes))

@@ -1,0 +1,150 @@
+"""The key and the certificate of a robot."""
+
+from __future__ import annotations
+
+import ssl
+import subprocess
+import sys
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+
+from shapechanger.errors import OutputError, RobotError
+from shapechanger.link.fingerprint import fingerprint_of
+from shapechanger.robot.daemon.credentials import (
+    check_exposure,
+    credentials_folder,
+    load_credentials,
+    make_credentials,
+    read_key,
+    server_tls,
+)
+from tests.robot.daemon.plans import car_plan
+
+
+def test_credentials_are_made_once(tmp_path: Path) -> None:
+    """A second time they stay, since clients know them."""
+    made = make_credentials(tmp_path / "car", "car")
+    assert make_credentials(tmp_path / "car", "car") == made == load_credentials(tmp_path / "car")
+    assert len(read_key(made.key_file)) == 16
+
+
+def test_only_the_owner_reads_them(tmp_path: Path) -> None:
+    """From the first moment on."""
+    made = make_credentials(tmp_path / "a" / "car", "car")
+    assert made.key_file.stat().st_mode & 0o777 == 0o600
+    assert made.private_key.stat().st_mode & 0o777 == 0o600
+    assert (tmp_path / "a" / "car").stat().st_mode & 0o777 == 0o700
+
+
+def test_the_certificate_is_what_it_should_be(tmp_path: Path) -> None:
+    """Its name, its curve and ten years, also where the clock is years behind."""
+    made = make_credentials(tmp_path, "my car")
+    certificate = x509.load_pem_x509_certificate(made.certificate.read_bytes())
+    assert certificate.subject.rfc4514_string() == "CN=my car"
+    assert certificate.not_valid_before_utc < datetime(2020, 1, 2, tzinfo=UTC)
+    assert certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=3_600)
+    der = ssl.PEM_cert_to_DER_cert(made.certificate.read_text())
+    assert made.fingerprint == fingerprint_of(der)
+
+
+def test_tls_is_the_newest(tmp_path: Path) -> None:
+    """Nothing below 1.3."""
+    made = make_credentials(tmp_path, "car")
+    context, fingerprint = server_tls(made.certificate, made.private_key)
+    assert context.minimum_version is ssl.TLSVersion.TLSv1_3
+    assert fingerprint == made.fingerprint
+
+
+def test_what_is_missing_is_said_with_the_way_out(tmp_path: Path) -> None:
+    """The command that makes it."""
+    with pytest.raises(RobotError, match="shapechanger robot init"):
+        load_credentials(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["key", "certificate.key"])
+def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> None:
+    """With the command that mends it."""
+    make_credentials(tmp_path, "car")
+    (tmp_path / name).chmod(0o640)
+    with pytest.raises(RobotError, match="chmod 600"):
+        load_credentials(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["key", "certificate.pem", "certificate.key"])
+def test_half_of_it_is_not_made_up(tmp_path: Path, name: str) -> None:
+    """What is left may be known to somebody."""
+    make_credentials(tmp_path, "car")
+    (tmp_path / name).unlink()
+    with pytest.raises(RobotError, match="Only some"):
+        make_credentials(tmp_path, "car")
+    with pytest.raises(RobotError, match="robot init"):
+        load_credentials(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "garbage"),
+    [
+        ("key", b"short"),
+        ("key", b"\xff\xfe"),
+        ("certificate.pem", b"x"),
+        ("certificate.pem", b"\xff"),
+    ],
+)
+def test_garbage_is_refused(tmp_path: Path, name: str, garbage: bytes) -> None:
+    """The message names the file."""
+    make_credentials(tmp_path, "car")
+    (tmp_path / name).write_bytes(garbage)
+    with pytest.raises(RobotError, match=name):
+        load_credentials(tmp_path)
+
+
+def test_a_certificate_of_another_key_is_refused(tmp_path: Path) -> None:
+    """They must be a pair."""
+    one, two = (make_credentials(tmp_path / name, name) for name in ("one", "two"))
+    with pytest.raises(RobotError, match="no pair"):
+        server_tls(one.certificate, two.private_key)
+
+
+def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+    """As everything of the file system."""
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot be written"):
+        make_credentials(tmp_path / "file" / "car", "car")
+
+
+def test_the_folder_follows_the_desktop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """XDG_CONFIG_HOME, which counts only if it is absolute."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert credentials_folder("car") == tmp_path / "shapechanger/robots/car"
+    monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
+    assert credentials_folder("car") == Path.home() / ".config/shapechanger/robots/car"
+
+
+@pytest.mark.parametrize("name", ["", "..", ".hidden", "a/b", "a\0b"])
+def test_a_name_cannot_lead_elsewhere(name: str) -> None:
+    """It is that of one folder."""
+    with pytest.raises(RobotError, match="cannot be called"):
+        credentials_folder(name)
+
+
+def test_nobody_serves_others_without_a_key_by_accident() -> None:
+    """Only this machine, or by a word that says what it is."""
+    check_exposure(car_plan(host="127.0.0.1"))
+    check_exposure(car_plan(host="0.0.0.0", insecure=True))
+    secured = {"certificate": "c", "private_key": "p", "key_file": "k"}
+    check_exposure(car_plan(host="0.0.0.0", **secured))
+    for missing in secured:
+        with pytest.raises(RobotError, match="--insecure"):
+            check_exposure(car_plan(host="0.0.0.0", **(secured | {missing: ""})))
+
+
+def test_reading_credentials_does_not_load_what_makes_them() -> None:
+    """A daemon holds no certificate builder in its memory."""
+    script = (
+        "import sys, shapechanger.robot.daemon.process; "
+        "assert 'cryptography' not in sys.modules and 'gpiozero' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)

@@ -1,0 +1,76 @@
+"""What a client is told of the robot."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
+from tests.robot.daemon.plans import ACTIONS, STATE, guard_state
+
+READER = StateReader(STATE, ACTIONS)
+
+
+def observation(**changes: Any) -> Any:
+    """An observation of a robot at rest."""
+    fields: dict[str, Any] = {
+        "seq": 7,
+        "now_ns": 50,
+        "reader": READER,
+        "state": guard_state(at_ns=40),
+        "newest": NumberedFrame(3, Frame(b"jpeg", 30)),
+        "frame_sent": 0,
+        "lease": 1,
+        "command_ns": None,
+        "holder": None,
+        "mine": False,
+    }
+    return build_observation(**(fields | changes))
+
+
+def test_what_nothing_measures_is_absent_and_no_number() -> None:
+    """Never a zero that looks like a measurement."""
+    seen = observation(state=guard_state(applied=(0.1, 0.5)))
+    assert seen.state[0] == 0.25
+    assert math.isnan(seen.state[1])
+    assert seen.state[2] == 0.5
+    assert seen.sources == {"speed": "wheel", "distance": "absent"}
+
+
+def test_before_the_guard_has_spoken_nothing_is_known() -> None:
+    """And the robot is not said to be armed."""
+    seen = observation(state=None)
+    assert all(map(math.isnan, seen.state))
+    assert "guard" in seen.stop_reason
+    assert not seen.armed
+    assert seen.state_ns == 50
+
+
+def test_a_picture_is_sent_once() -> None:
+    """The same picture keeps its number and time, and is not sent again."""
+    assert observation().frame == b"jpeg"
+    again = observation(frame_sent=3)
+    assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
+
+
+def test_who_wants_no_pictures_gets_none() -> None:
+    """But knows when the newest was taken."""
+    seen = observation(frame_sent=None)
+    assert (seen.frame, seen.captured_ns) == (None, 30)
+
+
+def test_without_a_camera_the_time_is_that_of_the_state() -> None:
+    """There is no picture to have an age."""
+    seen = observation(newest=None)
+    assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
+
+
+def test_a_command_of_an_older_lease_is_not_this_drivers() -> None:
+    """Its number could be one of this driver's own."""
+    state = guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39)
+    own = observation(state=state, command_ns=38)
+    assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)
+    other = observation(state=state, command_ns=38, lease=2)
+    assert (other.applied_seq, other.applied_ns, other.command_ns) == (None, None, None)
+    assert other.action_applied == (0.0, 0.5)

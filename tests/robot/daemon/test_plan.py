@@ -1,0 +1,35 @@
+"""What the command line hands over."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.daemon.plan import DaemonPlan
+from tests.robot.daemon.plans import car_plan
+
+
+def test_a_plan_crosses_as_json() -> None:
+    """With all that is in it."""
+    plan = car_plan(reward={"speed": 1.0}, reset=(((0.0, -0.3), 1.5), ((0.0, 0.0), 0.5)))
+    assert DaemonPlan.from_dict(json.loads(json.dumps(plan.to_dict()))) == plan
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"control_hz": 0.0}, "control_hz"),
+        ({"port": 65536}, "port"),
+        ({"arming": "nobody"}, "arming"),
+        ({"deadline_ms": "250"}, "deadline_ms"),
+        ({"robott": "car"}, "robott"),
+        ({"robot": ""}, "robot"),
+        ({"camera": {"driver": "pattern", "size": [160]}}, "camera"),
+    ],
+)
+def test_nonsense_is_refused_by_name(change: dict[str, object], words: str) -> None:
+    """The message names the field."""
+    with pytest.raises(ProfileError, match=words):
+        DaemonPlan.from_dict(json.loads(json.dumps(car_plan().to_dict() | change)))

@@ -1,0 +1,559 @@
+"""A daemon over real sockets: who is let in, and what becomes of those who misbehave."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.link.messages import (
+    MAX_CLIENT_MESSAGE,
+    VERSION,
+    Acknowledge,
+    Arm,
+    Challenge,
+    Command,
+    Disarm,
+    EmergencyStop,
+    Event,
+    Hello,
+    Lease,
+    Observation,
+    Ping,
+    Pong,
+    Refused,
+    Release,
+    Take,
+    encode,
+)
+from shapechanger.link.proof import make_proof
+from shapechanger.robot.daemon import connection, server
+from shapechanger.robot.daemon.credentials import make_credentials, read_key
+from shapechanger.robot.daemon.plan import DaemonPlan
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import Client, Running, running, until
+
+Script = Callable[[Running], Awaitable[None]]
+
+
+@pytest.fixture
+def play(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Runs a script with a daemon."""
+
+    def play(script: Script, plan: DaemonPlan | None = None) -> None:
+        async def whole() -> None:
+            async with running(car_plan() if plan is None else plan, monkeypatch) as robot:
+                await script(robot)
+
+        asyncio.run(whole())
+
+    return play
+
+
+@pytest.fixture
+def secured(tmp_path: Path) -> tuple[DaemonPlan, bytes]:
+    """A plan with TLS and a key, and the key."""
+    made = make_credentials(tmp_path / "car", "car")
+    plan = car_plan(
+        certificate=str(made.certificate),
+        private_key=str(made.private_key),
+        key_file=str(made.key_file),
+    )
+    return plan, read_key(made.key_file)
+
+
+def test_who_holds_the_key_is_let_in(play: Any, secured: tuple[DaemonPlan, bytes]) -> None:
+    """Over TLS 1.3, and is told what the robot is."""
+    plan, key = secured
+
+    async def script(robot: Running) -> None:
+        async with robot.connect() as client:
+            tls = client.socket.get_extra_info("ssl_object")
+            assert tls.version() == "TLSv1.3"
+            welcome = await client.greet(key)
+            assert (welcome.robot, welcome.body, welcome.session) == ("test car", "car", 1)
+            assert welcome.image_size == (160, 120)
+
+    play(script, plan)
+
+
+def test_a_wrong_key_is_refused_in_words_and_slowly(
+    play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Five times; then not even the right one is looked at for a minute."""
+    plan, key = secured
+    monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
+
+    async def script(robot: Running) -> None:
+        loop = asyncio.get_running_loop()
+        for _ in range(5):
+            async with robot.connect() as client:
+                began = loop.time()
+                with pytest.raises(AssertionError):
+                    await client.greet(b"wrong" * 4)
+                assert loop.time() - began >= 0.05
+                refused = client.heard[-1]
+                assert isinstance(refused, Refused)
+                assert refused.fatal
+                assert "Wrong key" in refused.reason
+        async with robot.connect() as client:
+            assert "Too many wrong keys" in await client.closed_with()
+        assert key and robot.guard.orders == []
+
+    play(script, plan)
+
+
+@pytest.mark.parametrize("spoiled", ["nonce", "certificate", "role"])
+def test_a_proof_made_elsewhere_does_not_fit(
+    play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, spoiled: str
+) -> None:
+    """One that was heard before, one for a certificate in the middle, one of another role."""
+    plan, key = secured
+    monkeypatch.setattr(server, "_WRONG_KEY_S", 0.0)
+
+    async def script(robot: Running) -> None:
+        async with robot.connect() as client:
+            challenge = await client.expect(Challenge)
+            parts = {
+                "nonce": challenge.nonce,
+                "certificate": client.certificate,
+                "role": "program",
+            }
+            parts[spoiled] = {"nonce": b"n" * 32, "certificate": b"c" * 32, "role": "person"}[
+                spoiled
+            ]  # type: ignore[assignment]
+            proof = make_proof(key, parts["nonce"], parts["certificate"], parts["role"])  # type: ignore[arg-type]
+            await client.say(Hello(version=VERSION, proof=proof))
+            assert "Wrong key" in await client.closed_with()
+
+    play(script, plan)
+
+
+def test_another_version_is_refused_with_both_numbers(play: Any) -> None:
+    """And with what to do."""
+
+    async def script(robot: Running) -> None:
+        async with robot.connect() as client:
+            await client.say(Hello(version=VERSION + 1, proof=b""))
+            reason = await client.closed_with()
+            assert f"version {VERSION} " in reason
+            assert f"speak {VERSION + 1}" in reason
+
+    play(script)
+
+
+async def _text(client: Client) -> None:
+    await client.socket.send_str("hello")
+
+
+async def _garbage(client: Client) -> None:
+    await client.socket.send_bytes(b"\xc1\xff\x00")
+
+
+async def _cut(client: Client) -> None:
+    await client.socket.send_bytes(encode(Command(seq=1, answers=1, values=(0.0, 1.0)))[:-3])
+
+
+async def _large(client: Client) -> None:
+    await client.socket.send_bytes(bytes(MAX_CLIENT_MESSAGE + 1))
+
+
+async def _hello_again(client: Client) -> None:
+    await client.say(Hello(version=VERSION, proof=b""))
+
+
+async def _flood(client: Client) -> None:
+    for token in range(1_000):
+        await client.say(Ping(token=token))
+
+
+async def _ping_flood(client: Client) -> None:
+    for _ in range(1_000):
+        await client.socket.ping(b"x")
+
+
+@pytest.mark.parametrize(
+    ("misbehave", "words"),
+    [
+        (_text, "binary messages"),
+        (_garbage, "no message"),
+        (_cut, "no message"),
+        (_large, "larger than the 65536 allowed"),
+        (_hello_again, "hello already"),
+        (_flood, "500 messages a second"),
+        (_ping_flood, "500 messages a second"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_who_misbehaves_is_told_why_and_stops_the_robot(
+    play: Any, misbehave: Callable[[Client], Awaitable[None]], words: str
+) -> None:
+    """Once known, too: the connection ends, and with it what it commanded."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            await misbehave(client)
+            assert words in await client.closed_with()
+            await until(lambda: robot.guard.kinds()[-1:] == ["disarm"], "it is disarmed")
+        async with robot.client() as other:
+            assert (await other.observe()).armed is False
+
+    play(script)
+
+
+def test_a_huge_message_ends_the_connection_before_it_is_whole(play: Any) -> None:
+    """One of 100 MB is not collected first."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            with pytest.raises((ConnectionError, aiohttp.ClientError)):
+                for _ in range(200):
+                    await client.socket.send_bytes(bytes(10**6))
+                    await asyncio.sleep(0)
+
+    play(script)
+
+
+def test_who_says_nothing_is_sent_away(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A place at the door is not for ever."""
+    monkeypatch.setattr(connection, "HELLO_S", 0.05)
+
+    async def script(robot: Running) -> None:
+        async with robot.connect() as client:
+            assert "did not say hello" in await client.closed_with()
+
+    play(script)
+
+
+def test_the_door_and_the_robot_have_so_many_places(play: Any) -> None:
+    """Eight may be at the door; six programs and eight clients may be in."""
+
+    async def script(robot: Running) -> None:
+        strangers = [robot.connect() for _ in range(9)]
+        clients = [await stranger.__aenter__() for stranger in strangers]
+        assert "Too many are at the door" in await clients.pop().closed_with()
+        for client in clients[:6]:
+            await client.greet(role="program")
+        await clients[6].say(Hello(version=VERSION, proof=b"", role="program"))
+        assert "places are for persons" in await clients[6].closed_with()
+        await clients[7].greet(role="person")
+        async with robot.client(role="person"), robot.connect() as ninth:
+            await ninth.say(Hello(version=VERSION, proof=b"", role="person"))
+            assert "no place" in await ninth.closed_with()
+        for stranger in strangers:
+            await stranger.__aexit__(None, None, None)
+
+    play(script)
+
+
+def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
+    """Everybody is told who commands; the old one's commands no longer count."""
+
+    async def script(robot: Running) -> None:
+        async with (
+            robot.client(name="sac") as sac,
+            robot.client(name="ppo") as ppo,
+            robot.client(name="Ann", role="person") as ann,
+        ):
+            assert await sac.take() == Lease(mine=True, holder="sac", reason="sac commands.")
+            lease = await ppo.take()
+            assert (lease.mine, lease.holder) == (False, "sac")
+            await robot.armed(ann)
+            lost = await sac.expect(Lease)
+            assert (lost.mine, lost.holder) == (False, "Ann")
+            assert "took the command from sac" in lost.reason
+            await sac.say(Command(seq=1, answers=0, values=(0.0, 1.0)))
+            assert "do not command" in (await sac.expect(Refused)).reason
+            assert (await ann.drive(1, 0.0, 0.5)).action_applied == (0.0, 0.5)
+        commands = [order for order in robot.guard.orders if order.kind == "command"]
+        assert [(order.session, order.values) for order in commands] == [(2, (0.0, 0.5))]
+
+    play(script)
+
+
+def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
+    """Repeated, out of order, in answer to what was never sent, of a wrong length, no numbers."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            seen = await client.drive(5, 0.0, 0.25)
+            nan = float("nan")
+            for seq, answers, values, words in (
+                (5, seen.seq, (0.0, 1.0), "not newer than 5"),
+                (4, seen.seq, (0.0, 1.0), "not newer than 5"),
+                (6, seen.seq + 100, (0.0, 1.0), "not sent to this client"),
+                (7, seen.seq, (1.0,), "has 2 values, this one has 1"),
+                (8, seen.seq, (0.0, nan), "no finite number"),
+            ):
+                await client.say(Command(seq=seq, answers=answers, values=values))
+                refused = await client.expect(Refused)
+                assert (refused.seq, refused.fatal) == (seq, False)
+                assert words in refused.reason
+            assert robot.guard.kinds().count("command") == 1
+
+    play(script)
+
+
+def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None:
+    """However new the command itself is."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            seen = await client.observe()
+            await asyncio.sleep(0.03)  # This is the age itself, and no wait for something.
+            await client.say(Command(seq=1, answers=seen.seq, values=(0.0, 1.0)))
+            assert "at most 20 ms are allowed" in (await client.expect(Refused)).reason
+            assert "command" not in robot.guard.kinds()
+
+    play(script, car_plan(max_observation_age_ms=20))
+
+
+def test_a_client_can_only_lower_what_it_asks(play: Any) -> None:
+    """Its own cap is multiplied; the picture's time goes along."""
+
+    async def script(robot: Running) -> None:
+        robot.show()
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            seen = await client.observe()
+            while seen.frame is None:
+                seen = await client.observe()
+            await client.say(
+                Command(seq=1, answers=seen.seq, values=(-1.0, 0.5), scale=0.5, ttl_ms=80)
+            )
+            await client.expect(Observation)
+            order = robot.guard.orders[-1]
+            assert (order.values, order.ttl_ms) == ((-0.5, 0.25), 80)
+            assert order.frame_ns == seen.captured_ns
+
+    play(script)
+
+
+@pytest.mark.parametrize("how", ["release", "close", "abort"])
+def test_who_leaves_disarms(play: Any, how: str) -> None:
+    """By saying so, by closing, and by vanishing."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person", name="Ann") as client:
+            await robot.armed(client)
+            if how == "release":
+                await client.say(Release())
+            elif how == "close":
+                await client.socket.close()
+            else:
+                client.socket.get_extra_info("socket")
+                client.socket._response.connection.transport.abort()  # type: ignore[union-attr]
+            await until(lambda: robot.guard.kinds() == ["arm", "disarm"], "it is disarmed")
+        assert "Ann" in robot.guard.orders[-1].reason
+
+    play(script)
+
+
+def test_a_watcher_that_leaves_stops_nothing(play: Any) -> None:
+    """Only who commands."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as driver:
+            await robot.armed(driver)
+            async with robot.client() as watcher:
+                await watcher.observe()
+            assert (await driver.drive(1, 0.0, 0.5)).action_applied == (0.0, 0.5)
+            assert robot.guard.kinds() == ["arm", "command"]
+
+    play(script)
+
+
+def test_anybody_stops_everything_and_only_a_person_ends_that(play: Any) -> None:
+    """Whoever is known, commanding or not; and the reason is told to all."""
+
+    async def script(robot: Running) -> None:
+        async with (
+            robot.client(role="person", name="Ann") as ann,
+            robot.client(name="sac") as sac,
+        ):
+            await robot.armed(ann)
+            await sac.say(EmergencyStop(reason="a\x1b[2Jcat"))
+            event = await ann.expect(Event)
+            while event.name != "emergency":
+                event = await ann.expect(Event)
+            assert robot.guard.orders[-1].reason == "sac: a [2Jcat"
+            seen = await ann.observe()
+            assert (seen.emergency, seen.emergencies, seen.armed) == (True, 1, False)
+            await sac.say(Arm(emergency=1))
+            assert "person" in (await sac.expect(Refused)).reason
+            await ann.say(Arm(emergency=1))
+            await until(lambda: robot.guard.state.armed, "it is armed again")
+            assert robot.guard.orders[-1].emergency == 1
+
+    play(script)
+
+
+@pytest.mark.parametrize("arming", ["person", "anyone"])
+def test_who_may_arm(play: Any, arming: str) -> None:
+    """A program only where the profile says so, and only the one that commands."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as one, robot.client() as two:
+            await one.say(Arm())
+            assert "Nobody commands" in (await one.expect(Refused)).reason
+            await one.take()
+            await two.say(Arm())
+            await two.expect(Refused)
+            await two.say(Disarm())
+            assert "emergency stop" in (await two.expect(Refused)).reason
+            await one.say(Arm())
+            if arming == "person":
+                assert "Only a person" in (await one.expect(Refused)).reason
+                assert robot.guard.orders == []
+                return
+            await until(lambda: robot.guard.state.armed, "it is armed")
+            await one.say(EmergencyStop())
+            await until(lambda: robot.guard.state.emergency, "it is stopped")
+            while not (await one.observe()).emergency:
+                pass
+            await one.say(Arm(emergency=1))
+            assert "Only a person ends" in (await one.expect(Refused)).reason
+
+    play(script, car_plan(arming=arming))
+
+
+def test_what_the_guard_refuses_comes_back(play: Any) -> None:
+    """To whoever commands, with the number of the command."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            await client.take()
+            seen = await client.observe()
+            await client.say(Command(seq=3, answers=seen.seq, values=(0.0, 1.0)))
+            assert await client.expect(Refused) == Refused(reason="Not armed.", seq=3)
+
+    play(script)
+
+
+def test_a_ping_comes_back_with_the_time(play: Any) -> None:
+    """With its token."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            before = robot.clock.now_ns()
+            await client.say(Ping(token=77))
+            pong = await client.expect(Pong)
+            assert pong.token == 77
+            assert before <= pong.now_ns <= robot.clock.now_ns()
+
+    play(script)
+
+
+def test_who_does_not_read_is_dropped_and_holds_up_nobody(
+    play: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another client sees no difference meanwhile."""
+    monkeypatch.setattr(connection, "_SEND_S", 0.5)
+
+    async def script(robot: Running) -> None:
+        slow = await robot.connect().__aenter__()
+        await slow.greet(role="person")
+        assert (await slow.take()).mine
+        slow.socket._reader._protocol.pause_reading()  # type: ignore[attr-defined]
+        async with robot.client() as client:
+
+            async def nag() -> None:
+                while True:
+                    robot.show()
+                    await slow.say(Acknowledge())
+                    await asyncio.sleep(0.004)
+
+            nagging = asyncio.create_task(nag())
+            loop, worst = asyncio.get_running_loop(), 0.0
+            while robot.guard.kinds()[-1:] != ["disarm"]:
+                began = loop.time()
+                await client.observe()
+                worst = max(worst, loop.time() - began)
+            nagging.cancel()
+            await asyncio.gather(nagging, return_exceptions=True)
+            assert worst < 1.0
+            assert (await client.take()).mine
+        slow.socket._response.connection.transport.abort()  # type: ignore[union-attr]
+
+    play(script, car_plan(control_hz=200.0))
+
+
+def test_the_page_says_what_this_is_and_no_more(play: Any) -> None:
+    """Plain, and with headers that let no other page use it."""
+
+    async def script(robot: Running) -> None:
+        async with robot.session.get(robot.url) as page:
+            text = await page.text()
+            assert "&lt;b&gt;car" in text
+            assert "shapechanger robot drive" in text
+            assert "script" not in text
+            assert "default-src 'none'" in page.headers["Content-Security-Policy"]
+            assert page.headers["X-Frame-Options"] == "DENY"
+            assert "aiohttp" not in page.headers["Server"]
+        async with robot.session.get(f"{robot.url}/healthz") as health:
+            assert (health.status, await health.json()) == (200, {"guard": "well"})
+        for path in ("/nothing", "/../etc/passwd"):
+            async with robot.session.get(robot.url + path) as missing:
+                assert missing.status == 404
+                assert missing.headers["X-Content-Type-Options"] == "nosniff"
+
+    play(script, car_plan(robot="<b>car"))
+
+
+def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
+    """Its scripts run in the browsers of people who are near the robot."""
+
+    async def script(robot: Running) -> None:
+        with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
+            async with robot.connect(origin="http://evil.example"):
+                pass
+        async with robot.connect(origin=robot.url) as client:
+            await client.greet()
+
+    play(script)
+
+
+def test_a_port_that_is_taken_is_said(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what that usually means."""
+
+    async def script(robot: Running) -> None:
+        with pytest.raises(RobotError, match="run already"):
+            async with running(car_plan(port=robot.port), monkeypatch):
+                pass
+
+    play(script)
+
+
+def test_the_daemon_ends_when_the_guard_is_gone(play: Any) -> None:
+    """There is nothing left to serve."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            robot.guard.close()
+            assert await robot.task == "The guard is gone."
+            while await client.hear() is not None:
+                pass
+
+    play(script)
+
+
+def test_taking_it_twice_is_no_new_lease(play: Any) -> None:
+    """Commands on their way still count."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            await client.say(Take())
+            await client.expect(Lease)
+            await client.drive(1)
+            assert robot.guard.orders[-1].session == 1
+
+    play(script)

@@ -1,0 +1,216 @@
+"""Whatever clients say, in whatever order: who moves the robot is who may."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from shapechanger.errors import LinkError
+from shapechanger.link.messages import (
+    VERSION,
+    Arm,
+    Command,
+    Disarm,
+    EmergencyStop,
+    Hello,
+    Release,
+    Take,
+    encode,
+)
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.cockpit import Cockpit
+from shapechanger.robot.daemon.session import Door, Session
+from shapechanger.robot.guard.wire import Order
+from tests.robot.daemon.plans import car_plan, guard_state
+
+MAX_AGE_NS = 400 * 1_000_000
+_places = st.integers(0, 3)
+_numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
+
+
+class Told:
+    """What a reference remembers of one client; written without looking at the daemon's code."""
+
+    def __init__(self, role: str) -> None:
+        self.role = role
+        self.sent: dict[int, int] = {}
+        self.newest_command = -1
+
+
+class Robot(RuleBasedStateMachine):
+    """Four clients that do whatever they like, and a reference of the rules."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_ns = 1_000_000_000
+        self.orders: list[Order] = []
+        self.allowed: list[tuple[int, tuple[float, ...]]] = []
+        self.cockpit = Cockpit(car_plan(), lambda: self.now_ns, self.orders.append)
+        self.sessions: dict[int, Session] = {}
+        self.told: dict[int, Told] = {}
+        self.holder: int | None = None
+        self.numbers = 0
+        self.stops = 0
+
+    def connected(self) -> bool:
+        """Whether there is anybody."""
+        return bool(self.sessions)
+
+    @rule(place=_places, role=st.sampled_from(("person", "program")))
+    def connect(self, place: int, role: Any) -> None:
+        """Somebody comes."""
+        if place in self.sessions:
+            return
+        self.numbers += 1
+        session = Session(self.numbers, self.cockpit, Door())
+        session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
+        self.sessions[place], self.told[place] = session, Told(role)
+
+    @rule(place=_places)
+    def leave(self, place: int) -> None:
+        """Somebody goes; if they commanded, the robot is disarmed."""
+        if place not in self.sessions:
+            return
+        self.sessions.pop(place).close()
+        if self.holder == place:
+            self.holder = None
+            self.stops += 1
+
+    @rule(place=_places)
+    def take(self, place: int) -> None:
+        """Somebody wants the command."""
+        if not self.say(place, Take()):
+            return
+        held = None if self.holder is None else self.told[self.holder].role
+        if held is None or (held == "program" and self.told[place].role == "person"):
+            self.holder = place
+
+    @rule(place=_places)
+    def release(self, place: int) -> None:
+        """Somebody gives it back, whether or not they have it."""
+        if self.say(place, Release()) and self.holder == place:
+            self.holder = None
+            self.stops += 1
+
+    @rule(place=_places, emergency=st.integers(0, 2))
+    def arm(self, place: int, emergency: int) -> None:
+        """Somebody arms: only a person, and only if anybody commands."""
+        before = len(self.orders)
+        if not self.say(place, Arm(emergency=emergency)):
+            return
+        may = self.told[place].role == "person" and self.holder is not None
+        assert [order.kind for order in self.orders[before:]] == (["arm"] if may else [])
+
+    @rule(place=_places)
+    def stop(self, place: int) -> None:
+        """Anybody may stop everything."""
+        before = len(self.orders)
+        if self.say(place, EmergencyStop(reason="because")):
+            assert [order.kind for order in self.orders[before:]] == ["emergency"]
+
+    @rule(place=_places)
+    def disarm(self, place: int) -> None:
+        """A person, or who commands."""
+        before = len(self.orders)
+        if self.say(place, Disarm()):
+            may = self.told[place].role == "person" or self.holder == place
+            assert [order.kind for order in self.orders[before:]] == (["disarm"] if may else [])
+
+    @precondition(connected)
+    @rule(place=_places)
+    def observe(self, place: int) -> None:
+        """An observation leaves."""
+        if place in self.sessions:
+            observation = self.sessions[place].observe()
+            assert observation.mine == (self.holder == place)
+            self.told[place].sent[observation.seq] = self.now_ns
+
+    @precondition(connected)
+    @rule(
+        place=_places,
+        seq=st.integers(0, 12),
+        back=st.integers(-1, 3),
+        values=st.lists(_numbers, min_size=1, max_size=3).map(tuple),
+        scale=st.floats(0.0, 1.0),
+    )
+    def command(
+        self, place: int, seq: int, back: int, values: tuple[float, ...], scale: float
+    ) -> None:
+        """Somebody commands: new, old, twice, in answer to anything, nonsense."""
+        if place not in self.sessions:
+            return
+        told = self.told[place]
+        answers = max(0, max(told.sent, default=0) - back)
+        message = Command(seq=seq, answers=answers, values=values, scale=scale)
+        sent_ns = told.sent.get(answers)
+        if (
+            self.holder == place
+            and seq > told.newest_command
+            and len(values) == 2
+            and all(map(math.isfinite, values))
+            and sent_ns is not None
+            and self.now_ns - sent_ns <= MAX_AGE_NS
+        ):
+            self.allowed.append((seq, tuple(scale * value for value in values)))
+        told.newest_command = max(told.newest_command, seq)
+        assert self.say(place, message)
+
+    @rule(milliseconds=st.integers(1, 600))
+    def wait(self, milliseconds: int) -> None:
+        """Time goes by."""
+        self.now_ns += milliseconds * 1_000_000
+
+    @rule(garbage=st.binary(max_size=20), place=_places)
+    def garbage(self, garbage: bytes, place: int) -> None:
+        """Somebody talks nonsense, and is thrown out."""
+        if place not in self.sessions:
+            return
+        before = len(self.orders)
+        try:
+            self.sessions[place].receive(b"\xc1" + garbage)
+        except LinkError:
+            assert len(self.orders) == before
+            self.leave(place)
+
+    @rule()
+    def news(self) -> None:
+        """The guard and the camera say something."""
+        self.cockpit.on_state(guard_state(at_ns=self.now_ns, armed=True))
+        self.cockpit.on_frame(Frame(b"jpeg", self.now_ns))
+
+    @invariant()
+    def only_allowed_commands_reach_the_guard(self) -> None:
+        """Exactly those of the reference, in order, with lease and number rising."""
+        commands = [order for order in self.orders if order.kind == "command"]
+        assert [(order.seq, order.values) for order in commands] == self.allowed
+        numbers = [(order.session, order.seq) for order in commands]
+        assert numbers == sorted(set(numbers))
+
+    @invariant()
+    def who_commanded_and_left_has_stopped_the_robot(self) -> None:
+        """Each loss of the command is one disarm order, with its reason."""
+        lost = [o for o in self.orders if o.kind == "disarm" and not o.reason.endswith("disarmed")]
+        assert len(lost) == self.stops
+        assert all(order.reason for order in lost)
+
+    @invariant()
+    def there_is_one_who_commands(self) -> None:
+        """The same as in the reference."""
+        held = self.cockpit.lease.holder
+        place = next((p for p, s in self.sessions.items() if s.who == held), None)
+        assert place == self.holder
+
+    def say(self, place: int, message: Any) -> bool:
+        """Say something, if there is somebody at that place."""
+        if place not in self.sessions:
+            return False
+        self.sessions[place].receive(encode(message))
+        return True
+
+
+TestRobot = Robot.TestCase
+TestRobot.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)

@@ -1,0 +1,177 @@
+"""The Pi's own pins, over a fake lgpio that behaves as its source says."""
+
+from __future__ import annotations
+
+import collections
+import importlib
+import sys
+import types
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+
+class _Lgpio(types.ModuleType):
+    """Levels and PWM of a chip; a new duty waits for the end of the cycle, as in `lgPthTx.c`."""
+
+    SET_PULL_NONE, SET_PULL_UP, SET_PULL_DOWN = 0, 1, 2
+    BOTH_EDGES, RISING_EDGE, FALLING_EDGE = 3, 1, 2
+
+    class error(Exception):
+        pass
+
+    def __init__(self) -> None:
+        super().__init__("lgpio")
+        self.outputs: set[int] = set()
+        self.levels: dict[int, int] = {}
+        self.pwm: dict[int, tuple[float, float]] = {}
+        self.pulses: dict[int, int] = {}
+        self.closed = False
+
+    def gpiochip_open(self, chip: int) -> int:
+        if chip != 0:
+            raise self.error("can not open gpiochip")
+        return 7
+
+    def gpiochip_close(self, handle: int) -> None:
+        self.closed = True
+
+    def gpio_get_chip_info(self, handle: int) -> tuple[int, int, str, str]:
+        return 0, 58, "gpiochip0", "pinctrl-bcm2711"
+
+    def gpio_claim_input(self, handle: int, pin: int, flags: int = 0) -> None:
+        self.outputs.discard(pin)
+        self.pwm.pop(pin, None)
+
+    def gpio_claim_output(self, handle: int, pin: int, level: int = 0, flags: int = 0) -> None:
+        if pin not in self.outputs:
+            self.outputs.add(pin)
+            self.levels[pin] = level
+
+    def gpio_get_mode(self, handle: int, pin: int) -> int:
+        return 2 if pin in self.outputs else 0
+
+    def gpio_read(self, handle: int, pin: int) -> int:
+        return self.levels.get(pin, 0)
+
+    def gpio_write(self, handle: int, pin: int, level: int) -> None:
+        self.levels[pin] = level
+
+    def tx_pwm(self, handle: int, pin: int, hz: float, duty: float) -> None:
+        if hz == 0:
+            self.pwm.pop(pin, None)  # The level stays.
+        else:
+            self.pwm[pin] = (hz, duty)
+            if duty > 0:
+                self.levels[pin] = 1  # Now in the high phase; a duty of 0 acts later.
+
+    def tx_servo(self, handle: int, pin: int, width_us: int, hz: int) -> None:
+        self.pulses[pin] = width_us
+        if width_us > 0:
+            self.levels[pin] = 1
+
+
+@pytest.fixture
+def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
+    """A Raspberry Pi 4 with this lgpio."""
+    fake = _Lgpio()
+    ours = ("gpiozero.pins.lgpio", "shapechanger.robot.drivers.lgpio_pins")
+    for name in (*ours, "shapechanger.robot.drivers.lgpio_servo"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, "lgpio", fake)
+    monkeypatch.setattr("gpiozero.pins.local.get_pi_revision", lambda: 0xC03115)
+    # gpiozero shares the pins of all factories on one machine.
+    monkeypatch.setattr("gpiozero.pins.local.LocalPiFactory.pins", {})
+    monkeypatch.setattr(
+        "gpiozero.pins.local.LocalPiFactory._reservations", collections.defaultdict(list)
+    )
+    yield fake
+    for name in (*ours, "shapechanger.robot.drivers.lgpio_servo"):
+        sys.modules.pop(name, None)
+
+
+def _factory(ours: bool) -> Any:
+    if ours:
+        return importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LowAtOnceFactory()
+    return importlib.import_module("gpiozero.pins.lgpio").LGPIOFactory()
+
+
+def _motor(factory: Any) -> Any:
+    from gpiozero import Motor
+
+    return Motor(22, 27, pin_factory=factory)
+
+
+@pytest.mark.parametrize(("ours", "level"), [(False, 1), (True, 0)])
+def test_zero_is_low_at_once(lgpio: _Lgpio, ours: bool, level: int) -> None:
+    """Gpiozero alone leaves the pin high until the cycle ends, up to 20 ms at 50 Hz."""
+    motor = _motor(_factory(ours))
+    motor.forward(0.4)
+    motor.stop()
+    assert lgpio.levels[22] == level
+    motor.close()
+
+
+def test_both_inputs_are_never_high_on_the_way_back(lgpio: _Lgpio) -> None:
+    """The cycles of two pins do not begin together, so the first must be low before."""
+    motor = _motor(_factory(ours=True))
+    motor.forward(0.4)
+    motor.backward(0.4)
+    assert (lgpio.levels[22], lgpio.levels[27]) == (0, 1)
+    motor.close()
+
+
+def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
+    """An input would float where the pull-down is missing."""
+    factory = _factory(ours=True)
+    motor = _motor(factory)
+    motor.forward(1.0)
+    motor.close()
+    factory.close()
+    assert lgpio.outputs == {22, 27}
+    assert (lgpio.levels[22], lgpio.levels[27]) == (0, 0)
+    assert lgpio.closed
+
+
+def test_gpiozero_alone_would_let_go_of_the_level(lgpio: _Lgpio) -> None:
+    """The reason for the pins of our own: closing a motor in its high phase leaves no level."""
+    motor = _motor(_factory(ours=False))
+    motor.forward(1.0)
+    motor.close()
+    assert lgpio.outputs == set()
+    assert lgpio.levels[22] == 1
+
+
+def test_active_low_output_is_never_low_on_opening_and_after_closing(lgpio: _Lgpio) -> None:
+    """Low at the OE input of a PCA9685 would let its old pulses through."""
+    from gpiozero import DigitalOutputDevice
+
+    factory = _factory(ours=True)
+    device = DigitalOutputDevice(26, active_high=False, pin_factory=factory)
+    assert lgpio.levels[26] == 1
+    device.close()
+    factory.close()
+    assert (26 in lgpio.outputs, lgpio.levels[26]) == (True, 1)
+
+
+def test_gpiozero_makes_1400_us_out_of_1500_us(lgpio: _Lgpio) -> None:
+    """The reason for refusing its servo: int(7.5) of 100 steps of 20 ms (gpiozero#1209)."""
+    from gpiozero import Servo
+
+    servo = Servo(17, initial_value=0, pin_factory=_factory(ours=False))
+    hz, duty = lgpio.pwm[17]
+    assert duty / 100 / hz * 1e6 == pytest.approx(1400)
+    servo.close()
+
+
+def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
+    """Lgpio forgets a pin at the level of that moment; ours is low."""
+    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_servo").LgpioServoPins()
+    pins.pulse(17, 1503, 50)
+    assert lgpio.pulses[17] == 1503
+    pins.close()
+    assert (lgpio.pulses[17], lgpio.levels[17], lgpio.closed) == (0, 0, True)
+    with pytest.raises(OSError, match="closed"):
+        pins.pulse(17, 1500, 50)
+    pins.close()

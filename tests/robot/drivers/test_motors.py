@@ -1,0 +1,117 @@
+"""Motors on H-bridges."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.duty import Duty
+from tests.robot.drivers.fakes import FakeHardware
+
+_HBRIDGE = {"forward": 22, "backward": 27, "enable": -1, "pwm_hz": 50, "start": 0.0, "full": 1.0}
+_PHASE = {"phase": 5, "enable": 6, "pwm_hz": 500, "start": 0.0, "full": 1.0}
+_values = st.floats(-1.0, 1.0)
+
+
+@given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
+def test_duty_comes_back_within_a_step(value: float, start: float, full: float) -> None:
+    """What a motor is said to do is what it does, to one step of lgpio."""
+    duty = Duty(start, full)
+    assert duty.size_at(duty.of(value)) == pytest.approx(abs(value), abs=0.011 / (full - start))
+
+
+@given(steps=st.integers(1, 100))
+def test_duty_survives_the_truncation_of_lgpio(steps: int) -> None:
+    """Gpiozero computes int(duty * 100), which makes 28 out of 0.29."""
+    assert int(Duty().of(steps / 100) * 100) == steps
+
+
+def test_smallest_value_starts_the_motor() -> None:
+    """Below its start a motor only hums."""
+    assert Duty(start=0.25).of(1e-6) == 0.25
+    assert Duty(start=0.25).of(0.0) == 0.0
+
+
+@given(values=st.lists(_values, min_size=1, max_size=8))
+def test_never_both_directions(values: list[float]) -> None:
+    """Both inputs of an H-bridge on would be a brake at best."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE)
+    for value in values:
+        motor.write(value, 0)
+    levels = {"GPIO22": 0.0, "GPIO27": 0.0}
+    for pin, level in hardware.factory.log:
+        levels[pin] = level
+        assert min(levels.values()) == 0.0
+
+
+def test_pwm_has_the_frequency_of_the_profile() -> None:
+    """The 2017 car has 50 Hz, gpiozero 100."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE)
+    assert [hardware.factory.pin(pin).frequency for pin in (22, 27)] == [50, 50]
+    motor.close()
+
+
+def test_forward_is_forward() -> None:
+    """Swapped pins must not pass."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE)
+    assert motor.write(0.4, 0) == pytest.approx(0.4)
+    assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.4, 0.0]
+    assert motor.write(-0.6, 0) == pytest.approx(-0.6)
+    assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.0, 0.6]
+
+
+def test_enable_is_on_only_while_the_motor_is_held() -> None:
+    """Letting go means that the bridge is off."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE | {"enable": 24})
+    enable = hardware.factory.pin(24)
+    assert enable.state == 1.0
+    motor.release()
+    assert enable.state == 0.0
+    motor.write(0.0, 0)
+    assert enable.state == 1.0
+
+
+@pytest.mark.parametrize(("driver", "settings"), [("hbridge", _HBRIDGE), ("phase_enable", _PHASE)])
+def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) -> None:
+    """Closing twice is closing once."""
+    hardware = FakeHardware()
+    motor = hardware.output(driver, **settings)
+    motor.write(1.0, 0)
+    motor.close()
+    motor.close()
+    assert set(dict(hardware.factory.log).values()) == {0.0}
+
+
+def test_pin_in_use_is_refused_in_words() -> None:
+    """Two motors on one pin is a mistake in the profile."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE)
+    with pytest.raises(RobotError, match="GPIO22"):
+        hardware.output("hbridge", **_HBRIDGE | {"backward": 23})
+    motor.close()
+
+
+def test_setting_of_a_wrong_type_is_refused_in_words() -> None:
+    """The guard reads plans that somebody may have written by hand."""
+    with pytest.raises(RobotError, match="'forward' must be a whole number, not 'x'"):
+        FakeHardware().output("hbridge", **_HBRIDGE | {"forward": "x"})
+
+
+def test_speed_is_zero_while_the_direction_changes() -> None:
+    """And it does not stutter where the direction stays."""
+    hardware = FakeHardware()
+    motor = hardware.output("phase_enable", **_PHASE)
+    for value in (0.5, 0.6, -0.6, -0.7):
+        assert motor.write(value, 0) == pytest.approx(value)
+    assert hardware.factory.log == [
+        ("GPIO6", 0.5),
+        ("GPIO6", 0.6),
+        ("GPIO6", 0.0),
+        ("GPIO5", 1.0),
+        ("GPIO6", 0.6),
+        ("GPIO6", 0.7),
+    ]

@@ -1,0 +1,272 @@
+"""Servos and speed controllers, and what sends their pulses."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.pca9685 import prescale_for
+from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.drivers.sysfs_pwm import SysfsPwm
+from tests.robot.drivers.fakes import MS, FakeHardware
+
+_AT = {"over": "lgpio", "pin": 12, "hz": 50}
+_SERVO = {
+    "left_us": 1000,
+    "centre_us": 1500,
+    "right_us": 2000,
+    "travel_deg_per_s": float("inf"),
+}
+_ESC = {
+    "backward_us": 1000,
+    "neutral_us": 1500,
+    "forward_us": 2000,
+    "arm_s": 2.5,
+    "reverse": "direct",
+    "brake_ms": 200,
+}
+_ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "hz": 50, "output_enable": -1}
+
+
+def _asleep() -> dict[int, int]:
+    """A PCA9685 after power-up: MODE1 says asleep, the prescaler 30 (data sheet, table 5)."""
+    return {0x00: 0x11, 0x01: 0x04, 0xFE: 0x1E}
+
+
+@given(value=st.floats(-1.0, 1.0), ends=st.tuples(st.floats(500, 1400), st.floats(1600, 2500)))
+def test_width_and_value_are_inverse(value: float, ends: tuple[float, float]) -> None:
+    """What is said to be done is what was asked for, whichever way a servo is mounted."""
+    for low, high in (ends, ends[::-1]):
+        pulses = PulseRange(low, 1500.0, high)
+        assert pulses.value(pulses.width_us(value)) == pytest.approx(value, abs=1e-9)
+
+
+def test_middle_outside_of_the_ends_is_refused() -> None:
+    """Both sides of such a servo would be the same."""
+    with pytest.raises(RobotError, match="must lie between"):
+        PulseRange(1000.0, 900.0, 2000.0)
+
+
+def test_gpiozero_is_refused_with_its_reason() -> None:
+    """It cannot say 1.5 ms."""
+    with pytest.raises(RobotError, match=r"gpiozero#1209.*pca9685"):
+        FakeHardware().output("servo", **_SERVO, over="gpiozero")
+    with pytest.raises(UnknownName, match="pca9685, lgpio, sysfs"):
+        FakeHardware().output("servo", **_SERVO, over="pca")
+
+
+def test_servo_gets_no_pulse_before_it_is_told() -> None:
+    """It would jump."""
+    hardware = FakeHardware()
+    servo = hardware.output("servo", **_SERVO | _AT)
+    assert hardware.pulses.widths_us == {}
+    assert servo.write(-0.5, 0) == -0.5
+    assert hardware.pulses.widths_us == {12: 1250}
+    servo.release()
+    assert hardware.pulses.widths_us == {12: 0}
+    servo.close()
+
+
+def test_servo_keeps_its_speed() -> None:
+    """90 degrees a second are a value of 1 a second, at 180 degrees from end to end."""
+    servo = FakeHardware().output("servo", **_SERVO | _AT | {"travel_deg_per_s": 90.0})
+    assert servo.write(0.0, 0) == 0.0
+    assert servo.write(1.0, 100 * MS) == pytest.approx(0.1)
+    assert servo.write(-1.0, 300 * MS) == pytest.approx(-0.1)
+
+
+def test_controller_gets_neutral_until_it_is_armed() -> None:
+    """It would refuse to start, or take what it gets for neutral."""
+    hardware = FakeHardware()
+    esc = hardware.output("esc", **_ESC | _AT)
+    assert hardware.pulses.widths_us == {12: 1500}
+    assert esc.write(1.0, 5_000 * MS) == 0.0
+    assert esc.write(1.0, 7_499 * MS) == 0.0
+    assert hardware.pulses.widths_us == {12: 1500}
+    assert esc.write(1.0, 7_500 * MS) == 1.0
+    assert hardware.pulses.widths_us == {12: 2000}
+    esc.release()
+    assert esc.write(1.0, 8_000 * MS) == 0.0  # It must see neutral again.
+    esc.close()
+    assert hardware.pulses.widths_us == {12: 0}
+
+
+def _armed(reverse: str) -> tuple[Any, FakeHardware]:
+    hardware = FakeHardware()
+    esc = hardware.output("esc", **_ESC | _AT | {"reverse": reverse, "arm_s": 0.0})
+    return esc, hardware
+
+
+def test_controller_without_reverse_stands() -> None:
+    """And says so."""
+    esc, hardware = _armed("none")
+    assert esc.write(-1.0, 0) == 0.0
+    assert hardware.pulses.widths_us == {12: 1500}
+
+
+def test_controller_reverses_at_once() -> None:
+    """Where it can."""
+    assert _armed("direct")[0].write(-1.0, 0) == -1.0
+
+
+def test_controller_brakes_before_it_reverses() -> None:
+    """Brake, neutral, reverse; after going forward it all begins again."""
+    esc, hardware = _armed("double")
+    esc.write(1.0, 0)
+    told: list[tuple[float, int]] = []
+    for ms in range(0, 600, 100):
+        told.append((esc.write(-0.5, ms * MS), hardware.pulses.widths_us[12]))
+    assert told == [(0, 1250), (0, 1250), (0, 1500), (0, 1500), (-0.5, 1250), (-0.5, 1250)]
+    assert esc.write(0.0, 700 * MS) == 0.0
+    assert esc.write(-0.5, 800 * MS) == -0.5  # It has not gone forward.
+    assert esc.write(0.5, 900 * MS) == 0.5
+    assert esc.write(-0.5, 1000 * MS) == 0.0
+    assert esc.write(0.5, 1050 * MS) == 0.5  # A wish to go forward waits for nothing.
+
+
+def test_unknown_reverse_is_refused() -> None:
+    """With the ones there are."""
+    with pytest.raises(UnknownName, match="direct, double, none"):
+        _armed("sideways")
+
+
+def test_prescaler_of_50_hz() -> None:
+    """The data sheet's formula; its own example is 200 Hz, 30."""
+    assert (prescale_for(50), prescale_for(200)) == (121, 30)
+    with pytest.raises(RobotError, match="24 to 1526 Hz"):
+        prescale_for(10)
+
+
+def test_chip_is_set_up_asleep_and_woken() -> None:
+    """The prescaler takes nothing else; and nothing that was there before may start again."""
+    hardware = FakeHardware({0x40: _asleep()})
+    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    assert [(register, data) for _, register, data in hardware.bus.writes] == [
+        (0xFD, [0x10]),
+        (0x00, [0x30]),
+        (0xFE, [121]),
+        (0x01, [0x04]),
+        (0x00, [0x20]),
+        (0x06 + 12, [0, 0, 0, 0x10]),
+    ]
+
+
+def test_chip_that_runs_is_not_put_to_sleep() -> None:
+    """Other channels hold a cat on its legs."""
+    hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121}})
+    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    assert [register for _, register, _ in hardware.bus.writes] == [0x01, 0x00, 0x06 + 12]
+
+
+def test_pulse_is_in_whole_steps() -> None:
+    """1.5 ms are 307 steps of 4.88 us, and the servo says that it is a little beside."""
+    hardware = FakeHardware({0x40: _asleep()})
+    servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=15)
+    assert servo.write(0.0, 0) == pytest.approx((307 * 4.88 - 1500) / 500)
+    assert hardware.bus.writes[-1] == (0x40, 0x06 + 60, [0, 0, 307 & 0xFF, 307 >> 8])
+    before = len(hardware.bus.writes)
+    servo.write(0.0, 1)
+    assert len(hardware.bus.writes) == before  # Nothing new, nothing sent.
+    servo.release()
+    assert hardware.bus.writes[-1] == (0x40, 0x06 + 60, [0, 0, 0, 0x10])
+
+
+def test_channels_share_their_chip() -> None:
+    """And a chip is opened afresh after the last one has let go."""
+    hardware = FakeHardware({0x40: _asleep()})
+    servos = [hardware.output("servo", **_SERVO | _ON_CHIP, channel=c) for c in range(12)]
+    assert sum(register == 0xFE for _, register, _ in hardware.bus.writes) == 1
+    with pytest.raises(RobotError, match=r"Channel 3 .* used twice"):
+        hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    with pytest.raises(RobotError, match="one frequency"):
+        hardware.output("servo", **_SERVO | _ON_CHIP | {"hz": 60}, channel=13)
+    for servo in servos:
+        servo.close()
+        servo.close()
+    assert hardware.bus.closed == 1
+    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3).close()
+    assert hardware.bus.closed == 2
+
+
+def test_output_enable_is_low_only_while_something_is_sent() -> None:
+    """It is active low; a resistor keeps the outputs off before we come and after we go."""
+    hardware = FakeHardware({0x40: _asleep()})
+    on_chip = _ON_CHIP | {"output_enable": 26}
+    one, two = (hardware.output("servo", **_SERVO | on_chip, channel=c) for c in (0, 1))
+    enable = hardware.factory.pin(26)
+    assert enable.state == 1.0
+    one.write(0.0, 0)
+    two.write(0.0, 0)
+    one.release()
+    assert enable.state == 0.0
+    two.release()
+    assert enable.state == 1.0
+
+
+def test_outputs_are_off_when_the_bus_fails() -> None:
+    """The chip would go on with what it was told last, full throttle perhaps."""
+    hardware = FakeHardware({0x40: _asleep()})
+    servo = hardware.output("servo", **_SERVO | _ON_CHIP | {"output_enable": 26}, channel=0)
+    servo.write(1.0, 0)
+    chip = hardware.bus.chips.pop(0x40)
+    with pytest.raises(RobotError, match="does not answer"):
+        servo.write(0.0, 1)
+    assert hardware.factory.pin(26).state == 1.0
+    hardware.bus.chips[0x40] = chip
+    servo.write(0.0, 2)
+    assert hardware.factory.pin(26).state == 0.0
+
+
+def test_channel_that_does_not_exist_leaves_nothing_open() -> None:
+    """The next one opens the chip as if nothing had been."""
+    hardware = FakeHardware({0x40: _asleep()})
+    on_chip = _ON_CHIP | {"output_enable": 26}
+    with pytest.raises(RobotError, match="channels 0 to 15, not 16"):
+        hardware.output("servo", **_SERVO | on_chip, channel=16)
+    hardware.output("servo", **_SERVO | on_chip, channel=15).close()
+    assert hardware.bus.closed == 2
+
+
+def test_chip_that_is_not_there_is_named() -> None:
+    """With its address, because that is what one looks for with i2cdetect."""
+    with pytest.raises(RobotError, match="PCA9685 at 0x40 on I2C bus 1 does not answer"):
+        FakeHardware().output("servo", **_SERVO | _ON_CHIP, channel=3)
+
+
+def test_chip_that_lost_its_power_is_noticed() -> None:
+    """It sleeps then, and would stay silent for ever."""
+    hardware = FakeHardware({0x40: _asleep()})
+    servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=0)
+    servo.write(0.0, 0)
+    hardware.bus.chips[0x40] = _asleep()
+
+    def write_for_a_second() -> None:
+        for _ in range(100):
+            servo.write(0.0, 0)
+
+    with pytest.raises(RobotError, match="lost its power"):
+        write_for_a_second()
+
+
+def test_kernel_pwm_is_written_in_nanoseconds(tmp_path: Path) -> None:
+    """The files of /sys/class/pwm, in a folder of ours."""
+    folder = tmp_path / "pwmchip0" / "pwm1"
+    folder.mkdir(parents=True)
+    pwm = SysfsPwm(0, 1, 50, tmp_path)
+    assert pwm.write_us(1500.4) == 1500.0
+
+    def files() -> dict[str, int]:
+        return {file.name: int(file.read_text()) for file in folder.iterdir()}
+
+    assert files() == {"period": 20_000_000, "duty_cycle": 1_500_000, "enable": 1}
+    pwm.close()
+    assert files() == {"period": 20_000_000, "duty_cycle": 0, "enable": 0}
+
+
+def test_kernel_pwm_that_is_not_there_is_named(tmp_path: Path) -> None:
+    """The overlay is missing in config.txt."""
+    with pytest.raises(RobotError, match="pwmchip0 does not answer"):
+        SysfsPwm(0, 0, 50, tmp_path)

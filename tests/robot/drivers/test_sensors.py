@@ -1,0 +1,213 @@
+"""Sensors, at the level of pins and registers."""
+
+import math
+import struct
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError, UnknownName
+from tests.robot.drivers.fakes import MS, FakeHardware
+
+_ENCODER = {"a": 5, "b": -1, "counts_per_turn": 20, "wheel_m": 0.2}
+_QUADRATURE = _ENCODER | {"b": 6}
+_SONAR = {"trigger": 23, "echo": 24, "max_m": 2.0}
+_BUMPER = {"pins": [6, 13], "pull": "up"}
+
+
+def _turn(hardware: FakeHardware, backward: bool, turns: int, period_s: float) -> float:
+    """Turn a quadrature encoder, from and to both levels high; a leads forward."""
+    edges = [(5, 0), (6, 0), (5, 1), (6, 1)]
+    if backward:
+        edges = [(6, 0), (5, 0), (6, 1), (5, 1)]
+    now_s = 0.0
+    for _ in range(turns):
+        for pin, level in edges:
+            now_s += period_s / 4
+            hardware.factory.drive(pin, level, now_s)
+    return now_s
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_quadrature_knows_the_direction(backward: bool) -> None:
+    """One count is 10 mm; one in 20 ms is 0.5 m/s."""
+    hardware = FakeHardware()
+    encoder = hardware.sensor("encoder", **_QUADRATURE)
+    now_s = _turn(hardware, backward, 3, 0.02)
+    speed = encoder.read(round(now_s * 1e9), -1.0)["speed"]
+    assert speed == pytest.approx(-0.5 if backward else 0.5)
+    encoder.close()
+
+
+@given(speed=st.floats(0.05, 5.0), counts=st.integers(2, 30))
+def test_speed_is_distance_over_time(speed: float, counts: int) -> None:
+    """Whatever the speed, and however many edges are seen."""
+    hardware = FakeHardware()
+    encoder = hardware.sensor("encoder", **_QUADRATURE)
+    now_s = _turn(hardware, False, counts, 0.01 / speed)
+    assert encoder.read(round(now_s * 1e9), 0.0)["speed"] == pytest.approx(speed)
+
+
+def test_one_channel_has_the_sign_of_the_propulsion() -> None:
+    """And keeps the last one while the robot rolls out."""
+    hardware = FakeHardware()
+    encoder = hardware.sensor("encoder", **_ENCODER)
+    for i in range(6):
+        hardware.factory.drive(5, i % 2, 0.01 * i)
+    assert encoder.read(50 * MS, -1.0)["speed"] == pytest.approx(-0.5)
+    assert encoder.read(50 * MS, 0.0)["speed"] == pytest.approx(-0.5)
+    assert encoder.read(50 * MS, 1.0)["speed"] == pytest.approx(0.5)
+
+
+def test_wheel_without_edges_stands() -> None:
+    """Its speed falls as the next edge stays away, and is zero after half a second."""
+    hardware = FakeHardware()
+    encoder = hardware.sensor("encoder", **_QUADRATURE)
+    assert encoder.read(0, 0.0) == {"speed": 0.0}
+    now_ns = round(_turn(hardware, False, 2, 0.02) * 1e9)
+    assert encoder.read(now_ns, 1.0)["speed"] == pytest.approx(0.5)
+    assert encoder.read(now_ns + 100 * MS, 1.0)["speed"] == pytest.approx(0.025)
+    assert encoder.read(now_ns + 501 * MS, 1.0)["speed"] == 0.0
+
+
+def test_short_push_is_not_missed() -> None:
+    """A bumper may spring back between two reads."""
+    hardware = FakeHardware()
+    bumper = hardware.sensor("switch", **_BUMPER)
+    assert bumper.read(0, 1.0) == {"bump": 0.0}
+    hardware.factory.drive(13, 0, 0.1)
+    hardware.factory.drive(13, 1, 0.101)
+    assert bumper.read(0, 1.0) == {"bump": 1.0}
+    assert bumper.read(0, 1.0) == {"bump": 0.0}
+    hardware.factory.drive(6, 0, 0.2)
+    assert [bumper.read(0, 1.0)["bump"] for _ in range(3)] == [1.0, 1.0, 1.0]
+    bumper.close()
+
+
+def test_switch_to_three_volts() -> None:
+    """The other way of wiring it."""
+    hardware = FakeHardware()
+    bumper = hardware.sensor("switch", pins=[6], pull="down")
+    assert bumper.read(0, 0.0) == {"bump": 0.0}
+    hardware.factory.drive(6, 1, 0.1)
+    assert bumper.read(0, 0.0) == {"bump": 1.0}
+    with pytest.raises(UnknownName, match="up, down"):
+        hardware.sensor("switch", pins=[7], pull="sideways")
+
+
+def _echo(hardware: FakeHardware, seconds: float) -> None:
+    hardware.factory.drive(24, 1, 1.0)
+    hardware.factory.drive(24, 0, 1.0 + seconds)
+
+
+def test_echo_is_a_distance() -> None:
+    """Sound goes there and back."""
+    hardware = FakeHardware()
+    sonar = hardware.sensor("hcsr04", **_SONAR)
+    assert sonar.read(0, 1.0) == {}
+    _echo(hardware, 2 * 0.5 / 343.2)
+    assert sonar.read(10 * MS, 1.0)["distance"] == pytest.approx(0.5)
+    _echo(hardware, 0.038)  # What it sends when it has heard nothing.
+    assert sonar.read(20 * MS, 1.0)["distance"] == 2.0
+    sonar.close()
+
+
+def test_pings_keep_their_distance() -> None:
+    """At most one in 60 ms, or one hears the echo of the one before."""
+    hardware = FakeHardware()
+    sonar = hardware.sensor("hcsr04", **_SONAR)
+    pings: list[int] = []
+    for ms in range(0, 200, 10):
+        before = len(hardware.factory.log)
+        sonar.read(ms * MS, 1.0)
+        if len(hardware.factory.log) > before:
+            pings.append(ms)
+    assert pings == [0, 60, 120, 180]
+    assert hardware.factory.log[:2] == [("GPIO23", 1.0), ("GPIO23", 0.0)]
+
+
+def test_sonar_that_is_silent_for_a_second_fails_and_comes_back() -> None:
+    """A cable came loose, and was put back."""
+    hardware = FakeHardware()
+    sonar = hardware.sensor("hcsr04", **_SONAR)
+    sonar.read(0, 1.0)
+    assert sonar.read(1000 * MS, 1.0) == {}
+    with pytest.raises(RobotError, match="no echo"):
+        sonar.read(1001 * MS, 1.0)
+    _echo(hardware, 0.002)
+    assert sonar.read(1100 * MS, 1.0)["distance"] == pytest.approx(0.3432)
+
+
+def _motion(x: int, y: int, z: int, yaw: int) -> dict[int, int]:
+    data = struct.pack(">7h", x, y, z, 0, 0, 0, yaw)
+    return {0x75: 0x68} | {0x3B + i: byte for i, byte in enumerate(data)}
+
+
+def test_motion_is_in_si_units() -> None:
+    """4 g and 500 deg/s are the ends of its numbers."""
+    hardware = FakeHardware({0x68: _motion(8192, -4096, 8192, 655)})
+    imu = hardware.sensor("mpu6050", bus=1, address=0x68)
+    read = imu.read(0, 1.0)
+    assert read["acceleration_x"] == pytest.approx(9.80665)
+    assert read["acceleration_y"] == pytest.approx(-9.80665 / 2)
+    assert read["yaw_rate"] == pytest.approx(math.radians(10.0))
+    chip = hardware.bus.chips[0x68]
+    assert [chip[register] for register in (0x6B, 0x1A, 0x1B, 0x1C)] == [1, 3, 8, 8]
+    imu.close()
+
+
+def test_gyroscope_learns_its_zero_while_the_robot_rests() -> None:
+    """It says up to 20 deg/s when nothing turns."""
+    hardware = FakeHardware({0x68: _motion(0, 0, 8192, 655)})
+    imu = hardware.sensor("mpu6050", bus=1, address=0x68)
+    assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.0)
+    hardware.bus.chips[0x68] |= _motion(0, 0, 8192, 1310)
+    assert imu.read(0, 1.0)["yaw_rate"] == pytest.approx(math.radians(10.0))
+
+
+def test_other_chip_or_none_is_named() -> None:
+    """With what it calls itself, since there are many that look the same."""
+    with pytest.raises(RobotError, match="calls itself 0x71, not 0x68"):
+        FakeHardware({0x68: {0x75: 0x71}}).sensor("mpu6050", bus=1, address=0x68)
+    with pytest.raises(RobotError, match="0x68 on I2C bus 1 does not answer"):
+        FakeHardware().sensor("mpu6050", bus=1, address=0x68)
+    with pytest.raises(RobotError, match="0x40 on I2C bus 1 does not answer"):
+        FakeHardware().sensor("ina219", bus=1, address=0x40)
+
+
+def test_motion_sensor_that_sleeps_is_noticed() -> None:
+    """After a loss of power all of its numbers are 0, gravity too."""
+    hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
+    imu = hardware.sensor("mpu6050", bus=1, address=0x68)
+    hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
+    with pytest.raises(RobotError, match="lost its power"):
+        imu.read(0, 0.0)
+
+
+def test_battery_is_in_volts() -> None:
+    """4 mV a step, above three bits of status; it is asked ten times a second."""
+    hardware = FakeHardware({0x41: {0x02: (1850 << 3 | 2) >> 8, 0x03: (1850 << 3 | 2) & 0xFF}})
+    battery = hardware.sensor("ina219", bus=1, address=0x41)
+    assert battery.read(0, 0.0)["battery"] == pytest.approx(7.4)
+    del hardware.bus.chips[0x41]
+    assert battery.read(99 * MS, 0.0)["battery"] == pytest.approx(7.4)
+    with pytest.raises(RobotError, match="does not answer"):
+        battery.read(100 * MS, 0.0)
+    battery.close()
+
+
+def test_temperature_is_in_degrees(tmp_path: Path) -> None:
+    """The kernel says thousandths."""
+    file = tmp_path / "temp"
+    file.write_text("48312\n")
+    sensor = FakeHardware().sensor("cpu_temperature", path=str(file))
+    assert sensor.read(0, 0.0) == {"temperature": 48.312}
+    file.write_text("hot")
+    assert sensor.read(999 * MS, 0.0) == {"temperature": 48.312}
+    with pytest.raises(RobotError, match="says 'hot'"):
+        sensor.read(1000 * MS, 0.0)
+    with pytest.raises(RobotError, match="does not answer"):
+        FakeHardware().sensor("cpu_temperature", path=str(tmp_path / "none"))
+    sensor.close()

@@ -1,0 +1,77 @@
+"""Robots for the tests of the guard."""
+
+from dataclasses import replace
+
+from shapechanger.robot.guard.plan import (
+    ActionPlan,
+    GuardPlan,
+    LimitPlan,
+    OutputPlan,
+    SensorPlan,
+    StopPlan,
+)
+from shapechanger.robot.guard.wire import Order
+
+MS = 1_000_000
+"""Nanoseconds of a millisecond."""
+
+
+def motor(name: str, forward: int, backward: int, mix: dict[str, float], part: str) -> OutputPlan:
+    """A motor on two pins of an H-bridge."""
+    settings = {
+        "forward": forward,
+        "backward": backward,
+        "enable": -1,
+        "pwm_hz": 50,
+        "start": 0.0,
+        "full": 1.0,
+    }
+    return OutputPlan(name, "hbridge", part, mix, 0.0, settings)
+
+
+def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
+    """A car with two motors: steering moves at most 4 a second, throttle 2 a second."""
+    return GuardPlan(
+        name="test car",
+        actions=(
+            ActionPlan("steering", -0.8, 0.8, slew_per_s=4.0),
+            ActionPlan("throttle", -0.4, 0.6, slew_per_s=2.0, propels=True),
+        ),
+        outputs=(
+            motor("steer", 17, 4, {"steering": 1.0}, "steering"),
+            motor("drive", 22, 27, {"throttle": 1.0}, "wheels"),
+        ),
+        sensors=(
+            SensorPlan("bumper", "switch", "bump"),
+            SensorPlan("wheel", "encoder", "speed"),
+            SensorPlan("eye", "hcsr04", "distance"),
+            SensorPlan("meter", "ina219", "battery"),
+        ),
+        limits=limits or LimitPlan(),
+        stop=stop or StopPlan(),
+    )
+
+
+def quick_car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
+    """The same without slew."""
+    plan = car(limits, stop)
+    actions = tuple(replace(action, slew_per_s=float("inf")) for action in plan.actions)
+    return replace(plan, actions=actions)
+
+
+def arm(now_ns: int, emergency: int = 0) -> Order:
+    """Somebody arms the robot now."""
+    return Order("arm", issued_ns=now_ns, emergency=emergency)
+
+
+def command(
+    seq: int,
+    now_ns: int,
+    values: tuple[float, ...] = (0.5, 0.5),
+    *,
+    session: int = 1,
+    ttl_ms: int = 1_000,
+    frame_ns: int | None = None,
+) -> Order:
+    """A command that the daemon received now."""
+    return Order("command", session, seq, now_ns, ttl_ms, frame_ns, values)

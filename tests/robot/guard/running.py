@@ -1,0 +1,106 @@
+"""A supervisor with guard and stand-in daemon in processes of their own, on recorded pins."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from tests.robot.guard.plans import quick_car
+from tests.robot.guard.recording import Record
+from tests.robot.guard.waiting import until
+
+__all__ = ["Robot", "running"]
+
+_START = Path(__file__).with_name("start_recorded.py")
+_PINS = {"GPIO17", "GPIO4", "GPIO22", "GPIO27"}
+
+
+class Robot:
+    """The processes and what they wrote."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", record: Record) -> None:
+        self.process = process
+        self.record = record
+
+    def pids(self, opened: str) -> list[int]:
+        """Those that opened the hardware, without the supervisor, or those of the daemon."""
+        lines = self.record.lines()
+        pids = [line["pid"] for line in lines if line.get("opened") == opened]
+        return [pid for pid in pids if pid != self.process.pid]
+
+    def drive(self) -> None:
+        """Wait until it drives."""
+        until(lambda: any(line["duty"] > 0.0 for line in self.record.pins()))
+
+    def kill(self, opened: str, number: signal.Signals) -> int:
+        """Send a signal to the first guard ("hardware") or daemon, and say when."""
+        before = self.record.lines()[-1]["t"]
+        os.kill(self.pids(opened)[0], number)
+        return before
+
+    def commands(self) -> list[int]:
+        """When the daemon sent its commands."""
+        return [line["t"] for line in self.record.lines() if "command" in line]
+
+    def rested_ns(self, after_ns: int, pid: int | None = None) -> int:
+        """Wait until every pin was put to rest after a time, and say when the last one was.
+
+        Args:
+            after_ns: The time.
+            pid: By which process; None for any.
+        """
+        found: dict[str, int] = {}
+
+        def look() -> bool:
+            found.clear()
+            for line in self.record.pins():
+                if line["t"] < after_ns or (pid is not None and line["pid"] != pid):
+                    continue
+                if line["duty"] > 0.0:
+                    found.pop(line["pin"], None)
+                else:
+                    found.setdefault(line["pin"], line["t"])
+            return found.keys() >= _PINS
+
+        until(look)
+        return max(found.values())
+
+    def notes(self, key: str) -> list[Any]:
+        """Everything of one kind that was written."""
+        return [line[key] for line in self.record.lines() if key in line]
+
+
+@contextlib.contextmanager
+def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> Iterator[Robot]:
+    """Start a robot that drives, and end it."""
+    record = Record(folder / "record")
+    record.write(opened="test")
+    fd = plan_fd(
+        ServePlan(
+            guard=plan or replace(quick_car(), sensors=()),
+            daemon={"record": str(record.path), **daemon},
+            hardware=("tests.robot.guard.recording:connect", str(record.path)),
+        )
+    )
+    command = [sys.executable, "-I", str(_START), "supervise", "--plan-fd", str(fd)]
+    with open(folder / "log", "wb") as log:
+        process = subprocess.Popen(command, pass_fds=[fd], stderr=log)
+    os.close(fd)
+    robot = Robot(process, record)
+    try:
+        yield robot
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+        # They end themselves when the supervisor is gone; those that are stopped cannot.
+        for pid in robot.pids("hardware") + robot.pids("daemon"):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)

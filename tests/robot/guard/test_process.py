@@ -1,0 +1,369 @@
+"""The guard's loop on a clock that is handed in, with mock pins and real sockets."""
+
+import itertools
+import logging
+import os
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import pytest
+from gpiozero import OutputDevice
+from gpiozero.pins.mock import MockFactory, MockPWMPin
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard import sensors
+from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.guard.process import Guard, main
+from shapechanger.robot.guard.wire import GuardState, Order, decode_state, encode
+from tests.robot.guard.plans import MS, arm, command, quick_car
+
+_T0 = 1_000 * MS
+
+
+class _Clock:
+    """Time that goes by when it is waited for; what happens meanwhile is said beforehand."""
+
+    def __init__(self) -> None:
+        self.time_ns = _T0
+        self.events: list[tuple[int, Callable[[], object]]] = []
+
+    def at(self, ms: int, event: Callable[[], object]) -> None:
+        """Let something happen so many milliseconds after the start."""
+        self.events.append((_T0 + ms * MS, event))
+        self.events.sort(key=lambda event: event[0])
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        if self.events and self.events[0][0] <= until_ns:
+            self.time_ns, event = self.events.pop(0)
+            event()
+        else:
+            self.time_ns = max(until_ns, self.time_ns)
+        return True
+
+
+class _Bench:
+    """A guard with everything around it."""
+
+    def __init__(self, plan: GuardPlan) -> None:
+        self.clock = _Clock()
+        self.factory = MockFactory(pin_class=MockPWMPin)
+        self.daemon, guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.daemon.setblocking(False)
+        self.supervisor, heart = socket.socketpair()
+        self._channel = DaemonChannel(guards_end.detach())
+        self._heartbeat = Heartbeat(heart.detach(), 0.0)
+        self.guard = Guard(plan, self, self._channel, self._heartbeat, logging.getLogger("test"))
+        self.states: list[GuardState] = []
+
+    def pin_factory(self) -> MockFactory:
+        return self.factory
+
+    def duty(self, pin: int) -> float:
+        return self.factory.pin(pin).state
+
+    def say(self, *orders: Order) -> None:
+        for order in orders:
+            self.daemon.send(encode(order))
+
+    def read(self) -> list[GuardState]:
+        """Take in all states so far."""
+        try:
+            while data := self.daemon.recv(1 << 16):
+                self.states.append(decode_state(data))
+        except BlockingIOError:
+            pass
+        return self.states
+
+    def run(self, end_ms: int) -> GuardState:
+        """Run until a time, and give the last state."""
+        self.clock.at(end_ms, lambda: setattr(self.guard, "ended", "the test is over"))
+        self.guard.run()
+        return self.read()[-1]
+
+    def close(self) -> None:
+        self.guard.close()
+        self._channel.close()
+        os.close(self._heartbeat.leave())
+        self.daemon.close()
+        self.supervisor.close()
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[[GuardPlan], _Bench]]:
+    """Make benches that are closed in the end."""
+    benches: list[_Bench] = []
+
+    def bench(plan: GuardPlan) -> _Bench:
+        benches.append(_Bench(plan))
+        return benches[-1]
+
+    yield bench
+    for one in benches:
+        one.close()
+
+
+def _plan(**changes: object) -> GuardPlan:
+    return replace(quick_car(), **{"sensors": (), **changes})
+
+
+def _drives(bench: _Bench) -> None:
+    bench.clock.at(1, lambda: bench.say(arm(_T0), command(1, _T0)))
+
+
+_Make = Callable[[GuardPlan], _Bench]
+
+
+def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
+    """Not at the next tick, and not at the tick after the deadline."""
+    bench = make(_plan())
+    duties: dict[int, float] = {}
+    _drives(bench)
+    for ms in (2, 249, 251):
+        bench.clock.at(ms, lambda ms=ms: duties.update({ms: bench.duty(22)}))
+    bench.run(260)
+    assert duties == {2: 0.5, 249: 0.5, 251: 0.0}
+    stopped = next(s for s in bench.states if s.stop_reason == "No fresh command.")
+    assert stopped.at_ns == _T0 + 250 * MS
+    acting = next(s for s in bench.states if s.applied_seq == 1)
+    assert acting.applied == (0.5, 0.5)
+    assert acting.applied_ns == acting.at_ns == _T0 + 1 * MS
+    assert acting.outputs == {"steer": 0.5, "drive": 0.5}
+
+
+def test_the_drive_is_written_before_the_steering(make: _Make) -> None:
+    """A servo on a slow bus must not delay a stop."""
+    assert list(make(_plan()).run(10).outputs) == ["drive", "steer"]
+
+
+def test_states_come_on_every_change_and_at_50_hz(make: _Make) -> None:
+    """The daemon sees each change, and that the guard lives."""
+    bench = make(_plan())
+    _drives(bench)
+    bench.run(100)
+    times = [state.at_ns for state in bench.states]
+    assert _T0 + 1 * MS in times
+    gaps = [after - before for before, after in itertools.pairwise(times)]
+    assert max(gaps) <= 20 * MS
+
+
+def test_a_refusal_is_said_once(make: _Make) -> None:
+    """With the number of the command that it is about."""
+    bench = make(_plan())
+    bench.clock.at(5, lambda: bench.say(command(7, _T0)))
+    bench.run(50)
+    refused = [(s.refused, s.refused_seq) for s in bench.states if s.refused]
+    assert refused == [("Command 7 is refused. Not armed.", 7)]
+
+
+def test_garbage_is_refused_in_words(make: _Make) -> None:
+    """It is no order, whatever it is."""
+    bench = make(_plan())
+    bench.clock.at(5, lambda: bench.daemon.send(b"\xff{"))
+    bench.clock.at(6, lambda: bench.daemon.send(b"[" * 20_000))
+    bench.run(30)
+    assert any("larger than" in state.refused for state in bench.states)
+
+
+def test_a_full_socket_drops_states_and_does_not_stop_the_guard(make: _Make) -> None:
+    """A daemon that does not read any more is not waited for."""
+    bench = make(_plan())
+    bench.daemon.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+    bench.clock.at(20_000, lambda: bench.say(arm(bench.clock.time_ns)))
+    bench.clock.at(20_100, bench.read)
+    assert bench.run(20_200).armed
+
+
+def test_the_enable_pin_is_toggled_at_every_tick(make: _Make) -> None:
+    """Its edges keep the one-shot going that enables the motors; afterwards it is low."""
+    bench = make(_plan(enable_pin=5))
+    pin = bench.factory.pin(5)
+    bench.clock.at(1, pin.clear_states)
+    bench.run(101)
+    assert len(pin.states) - 1 == 10
+    bench.guard.close()
+    assert not pin.state
+
+
+def test_the_button_is_an_emergency_stop(make: _Make) -> None:
+    """Pressed is ground; while it is pressed nobody arms."""
+    bench = make(_plan(stop_pin=6))
+    _drives(bench)
+    bench.clock.at(45, lambda: bench.factory.pin(6).drive_low())
+    bench.clock.at(60, lambda: bench.say(arm(_T0, 1)))
+    state = bench.run(80)
+    assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
+    assert any("button is pressed" in s.refused for s in bench.states)
+    assert bench.duty(22) == 0.0
+
+
+def test_a_lost_daemon_disarms(make: _Make) -> None:
+    """Whatever its last command was."""
+    bench = make(_plan())
+    _drives(bench)
+    duties: list[float] = []
+    bench.clock.at(15, lambda: duties.append(bench.duty(22)))
+    bench.clock.at(15, lambda: (bench.read(), bench.daemon.close()))
+    bench.clock.at(16, lambda: duties.append(bench.duty(22)))
+    bench.clock.at(50, lambda: setattr(bench.guard, "ended", "the test is over"))
+    bench.guard.run()
+    assert duties == [0.5, 0.0]
+
+
+def test_a_daemon_that_left_with_states_unread_is_lost_too(make: _Make) -> None:
+    """The kernel says so in another way then."""
+    bench = make(_plan())
+    _drives(bench)
+    bench.clock.at(15, bench.daemon.close)
+    bench.clock.at(50, lambda: setattr(bench.guard, "ended", "the test is over"))
+    bench.guard.run()
+    assert bench.duty(22) == 0.0
+
+
+def test_a_lost_supervisor_ends_it(make: _Make) -> None:
+    """Nobody would notice its death any more."""
+    bench = make(_plan())
+    bench.clock.at(15, bench.supervisor.close)
+    bench.guard.run()
+    assert bench.guard.ended == "the supervisor is gone"
+
+
+def test_its_heart_beats(make: _Make) -> None:
+    """In every round, here; a supervisor that does not listen is no reason to stop."""
+    bench = make(_plan())
+    bench.run(10_000)
+    assert len(bench.supervisor.recv(1 << 20)) > 100
+
+
+def test_an_output_that_fails_rests_everything_until_it_obeys_and_somebody_arms(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its enable line is not triggered while it does not obey."""
+    bench = make(_plan(enable_pin=5))
+    _drives(bench)
+    drive, steer = (driver for _, driver in bench.guard._outputs._drivers)
+
+    def fail(value: float, now_ns: int) -> float:
+        raise RobotError("Output drive does not answer.")
+
+    edges: list[int] = []
+    pin = bench.factory.pin(5)
+    bench.clock.at(31, lambda: monkeypatch.setattr(drive, "write", fail))
+    bench.clock.at(45, lambda: edges.append(len(pin.states)))
+    bench.clock.at(45, lambda: bench.say(arm(_T0 + 45 * MS, 1)))
+    bench.clock.at(60, lambda: edges.append(len(pin.states)))
+    bench.clock.at(60, monkeypatch.undo)
+    bench.clock.at(85, lambda: bench.say(arm(_T0 + 85 * MS, 2), command(2, _T0 + 85 * MS)))
+    state = bench.run(100)
+    assert edges[0] == edges[1]
+    assert len(pin.states) > edges[1]
+    stopped = [s for s in bench.states if s.emergency]
+    assert "Output drive does not answer." in stopped[0].stop_reason
+    assert all(s.outputs["steer"] == 0.0 and s.applied == (0.0, 0.0) for s in stopped)
+    assert stopped[-1].emergencies == 2  # Armed while it did not obey: that failed again.
+    assert state.applied_seq == 2
+    assert steer.write(0.0, 0) == 0.0
+
+
+def test_a_released_robot_lets_go_once(make: _Make) -> None:
+    """At its start and at each stop; in between it grips."""
+    plan = _plan()
+    bench = make(replace(plan, stop=replace(plan.stop, then="release")))
+    released: list[str] = []
+    for output, driver in bench.guard._outputs._drivers:
+        original = driver.release
+        driver.release = lambda name=output.name, original=original: (
+            released.append(name),
+            original(),
+        )
+    _drives(bench)
+    bench.run(300)
+    assert released == ["drive", "steer"] * 2
+
+
+class _Sensor:
+    """A sensor that says what it is told, or fails."""
+
+    def __init__(self) -> None:
+        self.says: dict[str, float] | Exception = {"bump": 0.0}
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        if isinstance(self.says, Exception):
+            raise self.says
+        return self.says
+
+    def close(self) -> None:
+        self.says = {}
+
+
+def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is no number counts as a failure."""
+    sensor = _Sensor()
+    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: sensor)
+    bench = make(_plan(sensors=(SensorPlan("bumper", "switch", "bump"),)))
+    _drives(bench)
+    said: list[dict[str, float] | Exception] = [
+        {"bump": 1.0},
+        RobotError("No answer."),
+        {"bump": float("nan")},
+        OSError("No bus."),
+        {"bump": 0.0},
+    ]
+    for i, what in enumerate(said):
+        bench.clock.at(25 + 10 * i, lambda what=what: setattr(sensor, "says", what))
+    bench.run(100)
+    reasons = list(dict.fromkeys(state.stop_reason for state in bench.states))
+    fails = "Sensor bumper fails, and can protect no longer: "
+    assert reasons == [
+        "Not armed.",
+        "",
+        "Not forward: the bumper touched something.",
+        f"{fails}No answer.",
+        f"{fails}It says what is no number.",
+        f"{fails}No bus.",
+    ]
+    assert bench.states[-1].bumps == 1
+    assert bench.states[-1].sources["collision"] == "bumper"
+
+
+def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The outputs that were opened before it are at rest and closed."""
+    opened = [_Sensor()]
+
+    def open_sensor(plan: SensorPlan, hardware: object) -> _Sensor:
+        if plan.name == "bad":
+            raise RobotError("No answer.")
+        return opened[0]
+
+    monkeypatch.setattr(sensors, "open_sensor", open_sensor)
+    plans = (SensorPlan("good", "switch", "bump"), SensorPlan("bad", "switch", "bump"))
+    daemon, guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with daemon, guards_end:
+        factory = MockFactory(pin_class=MockPWMPin)
+
+        class _Hardware:
+            clock = _Clock()
+
+            def pin_factory(self) -> MockFactory:
+                return factory
+
+        with pytest.raises(RobotError, match="No answer"):
+            Guard(_plan(sensors=plans), _Hardware(), None, None, logging.getLogger("test"))
+    assert opened[0].says == {}
+    OutputDevice(22, pin_factory=factory).close()  # Nobody has the pin any more.
+
+
+def test_wrong_arguments_end_it_in_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """With exit code 1."""
+    with pytest.raises(SystemExit) as ended:
+        main(["--plan-fd", "3"])
+    assert ended.value.code == 1
+    assert capsys.readouterr().err.count("\n") == 1

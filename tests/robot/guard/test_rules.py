@@ -1,0 +1,484 @@
+"""Each rule of the guard, exact to the nanosecond, with the time handed in."""
+
+from dataclasses import replace
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard.plan import (
+    ActionPlan,
+    GuardPlan,
+    LimitPlan,
+    SensorPlan,
+    StopPlan,
+)
+from shapechanger.robot.guard.rules import Rules
+from shapechanger.robot.guard.senses import Sensing
+from shapechanger.robot.guard.wire import Order
+from tests.robot.guard.plans import MS, arm, car, command, quick_car
+
+_T0 = 5_000 * MS
+
+
+def _armed(plan: GuardPlan) -> Rules:
+    rules = Rules(plan, _T0)
+    assert not rules.offer(arm(_T0), _T0)
+    return rules
+
+
+def _driving(plan: GuardPlan, values: tuple[float, ...] = (0.5, 0.5)) -> Rules:
+    rules = _armed(plan)
+    assert not rules.offer(command(1, _T0, values, frame_ns=_T0), _T0)
+    assert rules.tick(_T0).actions == values
+    return rules
+
+
+def test_a_new_guard_is_not_armed() -> None:
+    """Nobody has said that the robot may move."""
+    rules = Rules(quick_car(), _T0)
+    assert "Not armed" in rules.offer(command(1, _T0), _T0)
+    decision = rules.tick(_T0)
+    assert decision.actions == (0.0, 0.0)
+    assert decision.seq is None
+    assert decision.stop_reason == "Not armed."
+
+
+def test_a_command_acts_until_its_deadline_and_not_a_nanosecond_longer() -> None:
+    """The deadline is counted from when the daemon received the command."""
+    rules = _armed(quick_car())
+    assert rules.tick(_T0).stop_reason == "No fresh command."
+    assert not rules.offer(command(1, _T0 - 10 * MS), _T0)
+    end = _T0 + 240 * MS
+    assert rules.next_wake_ns(end - 1) == end
+    last = rules.tick(end - 1)
+    assert (last.actions, last.seq, last.session, last.stop_reason) == ((0.5, 0.5), 1, 1, "")
+    assert rules.tick(end).actions == (0.0, 0.0)
+    assert rules.tick(end).stop_reason == "No fresh command."
+
+
+def test_a_command_may_allow_itself_less_but_not_more_than_the_deadline() -> None:
+    """The shorter of both counts."""
+    rules = _armed(quick_car())
+    assert not rules.offer(command(1, _T0, ttl_ms=20), _T0)
+    assert rules.tick(_T0 + 20 * MS - 1).seq == 1
+    assert rules.tick(_T0 + 20 * MS).seq is None
+
+
+def test_a_command_from_a_little_ahead_acts_from_now() -> None:
+    """Clocks of two processes agree; a time ahead never lengthens the deadline."""
+    rules = _armed(quick_car())
+    assert not rules.offer(command(1, _T0 + 50 * MS), _T0)
+    assert rules.tick(_T0 + 250 * MS).seq is None
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (command(5, _T0, session=2), "not newer"),
+        (command(4, _T0, session=2), "not newer"),
+        (command(9, _T0, session=1), "not newer"),
+        (command(6, _T0 + 51 * MS, session=2), "future"),
+        (command(6, _T0 - 250 * MS, session=2), "250 ms old"),
+        (command(6, _T0 - 20 * MS, session=2, ttl_ms=20), "20 ms old"),
+        (command(6, _T0, session=2, ttl_ms=0), "0 ms old"),
+        (command(6, _T0, (0.1,), session=2), "1 values"),
+    ],
+)
+def test_what_is_not_the_newest_fresh_command_is_refused(order: Order, words: str) -> None:
+    """Repeated, older, of an older lease, late, from the future, or of another robot."""
+    rules = _armed(quick_car())
+    assert not rules.offer(command(5, _T0, session=2), _T0)
+    assert words in rules.offer(order, _T0)
+    assert rules.tick(_T0).seq == 5
+
+
+def test_a_refused_command_still_makes_older_ones_old() -> None:
+    """Whoever sent it had done with the ones before."""
+    rules = _armed(quick_car())
+    assert rules.offer(command(7, _T0 - 300 * MS), _T0)
+    assert "not newer" in rules.offer(command(6, _T0), _T0)
+
+
+def test_a_burst_that_is_read_late_does_nothing() -> None:
+    """A guard that was stopped finds seconds of orders; neither arming nor moving still counts."""
+    rules = Rules(quick_car(), _T0)
+    late = _T0 + 5_000 * MS
+    said = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
+    assert all(rules.offer(order, late) for order in said)
+    assert not rules.arming.armed
+    assert not rules.offer(arm(late), late)
+    assert rules.tick(late).actions == (0.0, 0.0)
+
+
+def test_what_was_said_before_arming_does_not_move_anything() -> None:
+    """Disarming ends a command for good, also when it would still be fresh after arming."""
+    rules = _driving(quick_car())
+    assert not rules.offer(Order("disarm", reason="the lease was lost."), _T0 + 1)
+    stopped = rules.tick(_T0 + 1)
+    assert stopped.actions == (0.0, 0.0)
+    assert stopped.stop_reason == "Disarmed: the lease was lost."
+    assert not rules.offer(arm(_T0 + 2), _T0 + 2)
+    assert rules.tick(_T0 + 2).actions == (0.0, 0.0)
+    rules.disarm("")
+    assert rules.tick(_T0 + 3).stop_reason == "Disarmed."
+
+
+def test_ending_disarms() -> None:
+    """Between the order to end and the end nothing moves."""
+    rules = _driving(quick_car())
+    assert not rules.offer(Order("end"), _T0)
+    assert rules.tick(_T0).seq is None
+
+
+def test_an_emergency_stop_latches_until_somebody_who_knows_of_it_arms() -> None:
+    """One that came while the order to arm was on its way is not ended by it."""
+    rules = _driving(quick_car())
+    rules.offer(Order("emergency", reason="a child."), _T0)
+    rules.offer(Order("emergency"), _T0)
+    assert rules.tick(_T0).stop_reason == "Emergency stop: a child."
+    assert rules.arming.emergencies == 2
+    rules.offer(Order("disarm", reason="the lease was lost."), _T0)
+    assert rules.tick(_T0).stop_reason == "Emergency stop: a child."
+    for seen in (0, 1, 3):
+        assert "2 emergency stops" in rules.offer(arm(_T0, seen), _T0)
+    assert "refused" in rules.offer(command(2, _T0), _T0)
+    assert not rules.offer(arm(_T0, 2), _T0)
+    assert not rules.offer(command(3, _T0), _T0)
+    assert rules.tick(_T0).seq == 3
+    rules.stop("")
+    assert rules.tick(_T0).stop_reason == "Emergency stop."
+
+
+def test_the_button_stops_and_keeps_from_arming_while_it_is_pressed() -> None:
+    """Each press is one emergency stop, however long it is held."""
+    rules = _driving(quick_car())
+    rules.press(True)
+    rules.press(True)
+    assert rules.arming.emergencies == 1
+    assert "button" in rules.offer(arm(_T0, 1), _T0)
+    rules.press(False)
+    assert rules.tick(_T0).stop_reason == "Emergency stop: the button was pressed."
+    assert not rules.offer(arm(_T0, 1), _T0)
+
+
+def test_values_stay_within_the_caps() -> None:
+    """Of the robot's own profile, whatever is asked."""
+    rules = _driving(quick_car(), (0.0, 0.0))
+    rules.offer(command(2, _T0, (-9.0, 9)), _T0)
+    assert rules.tick(_T0).actions == (-0.8, 0.6)
+
+
+def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
+    """A stop could not lead anywhere."""
+    action = ActionPlan("throttle", 0.2, 0.6)
+    with pytest.raises(RobotError, match="'throttle' rests at 0, outside its caps"):
+        Rules(replace(car(), actions=(action,)), 0)
+
+
+def test_slew_holds_away_from_rest_and_not_towards_it() -> None:
+    """Starting is gentle, stopping is not; the other way leads through rest."""
+    rules = _armed(car())
+
+    def at(ms: int, throttle: float) -> float:
+        rules.offer(command(ms, _T0 + ms * MS, (0.0, throttle)), _T0 + ms * MS)
+        return rules.tick(_T0 + ms * MS).actions[1]
+
+    assert at(10, 0.5) == pytest.approx(0.02)
+    assert at(20, 0.5) == pytest.approx(0.04)
+    assert at(25, 0.05) == pytest.approx(0.05)
+    assert at(30, 0.01) == 0.01
+    assert at(40, -0.4) == 0.0
+    assert at(50, -0.4) == pytest.approx(-0.02)
+    assert at(60, 0.4) == 0.0
+
+
+def test_a_pause_is_no_leave_to_jump() -> None:
+    """A guard that did not run for a while goes on as if it had paused two ticks."""
+    rules = _armed(car())
+    later = _T0 + 10_000 * MS
+    rules.offer(command(1, later, (0.0, 0.6)), later)
+    assert rules.tick(later).actions[1] == pytest.approx(0.04)
+
+
+def test_three_levels() -> None:
+    """A motor that knows full left, off and full right gets nothing in between, at once."""
+    steering = ActionPlan("steering", -0.4, 0.4, slew_per_s=1.0, levels="three", threshold=0.3)
+    rules = _armed(replace(car(), actions=(steering,)))
+    seen: list[float] = []
+    for seq, value in enumerate((0.29, 0.3, 1.0, -0.2, -0.3, 0.9, 0.9)):
+        rules.offer(command(seq, _T0, (value,)), _T0)
+        seen.append(rules.tick(_T0).actions[0])
+    assert seen == [0.0, 0.4, 0.4, 0.0, -0.4, 0.0, 0.4]
+
+
+def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
+    """The steering stays where it was and then goes back; the drive rests at once."""
+    rules = _driving(quick_car(stop=StopPlan(hold_ms=100, ramp_ms=200, then="release")))
+    rules.disarm("")
+    assert rules.tick(_T0).actions == (0.5, 0.0)
+    assert rules.next_wake_ns(_T0 + 95 * MS) == _T0 + 100 * MS
+    rules.stop("")  # A second stop does not begin anew.
+    assert rules.tick(_T0 + 100 * MS).actions == (0.5, 0.0)
+    assert rules.tick(_T0 + 200 * MS).actions == (pytest.approx(0.25), 0.0)
+    assert not rules.tick(_T0 + 300 * MS - 1).release
+    end = rules.tick(_T0 + 300 * MS)
+    assert end.actions == (0.0, 0.0)
+    assert end.release
+    assert rules.next_wake_ns(_T0 + 300 * MS) == _T0 + 310 * MS
+
+
+def test_a_new_guard_has_let_go() -> None:
+    """Where a stop ends in letting go, a start begins so, and a command grips."""
+    rules = Rules(quick_car(stop=StopPlan(hold_ms=100, then="release")), _T0)
+    assert rules.tick(_T0).release
+    rules.offer(arm(_T0), _T0)
+    rules.offer(command(1, _T0), _T0)
+    assert not rules.tick(_T0).release
+
+
+def test_an_output_that_fails_stops_everything_without_hold() -> None:
+    """Nobody knows what it does; so nothing else may go on for a while."""
+    rules = _driving(quick_car(stop=StopPlan(hold_ms=100)))
+    rules.fail("Output drive: no answer", _T0)
+    decision = rules.tick(_T0)
+    assert decision.actions == (0.0, 0.0)
+    assert decision.stop_reason == "Emergency stop: Output drive: no answer"
+
+
+def test_blind_is_still() -> None:
+    """The newest picture decides, whichever command told of it."""
+    rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
+    rules.offer(command(1, _T0), _T0)
+    assert rules.tick(_T0).stop_reason == "Blind: no picture yet."
+    rules.offer(command(2, _T0, frame_ns=_T0 + 51 * MS), _T0)
+    assert rules.tick(_T0).seq is None  # A picture from the future is none.
+    rules.offer(command(3, _T0, frame_ns=_T0 - 40 * MS), _T0)
+    rules.offer(command(4, _T0, frame_ns=_T0 - 90 * MS), _T0)
+    end = _T0 + 60 * MS
+    assert rules.next_wake_ns(end - 1) == end
+    assert rules.tick(end - 1).seq == 4
+    assert rules.tick(end).stop_reason == "Blind: no picture for 100 ms."
+    rules.offer(command(5, end, frame_ns=end), end)
+    assert rules.tick(end).seq == 5
+
+
+def test_a_picture_from_a_little_ahead_counts_from_now() -> None:
+    """It never lengthens the time until the robot is blind."""
+    rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
+    rules.offer(command(1, _T0, frame_ns=_T0 + 50 * MS), _T0)
+    assert rules.tick(_T0 + 100 * MS - 1).seq == 1
+    assert rules.tick(_T0 + 100 * MS).seq is None
+
+
+def _sense(rules: Rules, now_ns: int, **quantities: float) -> None:
+    names = {"bump": "bumper", "speed": "wheel", "distance": "eye", "battery": "meter"}
+    sources = {name: names.get(name, "else") for name in quantities}
+    rules.sense(Sensing(quantities, sources), now_ns)
+
+
+def _ask(rules: Rules, seq: int, now_ns: int, throttle: float) -> tuple[float, str]:
+    assert not rules.offer(command(seq, now_ns, (0.5, throttle)), now_ns)
+    decision = rules.tick(now_ns)
+    assert decision.actions[0] == 0.5
+    return decision.actions[1], decision.stop_reason
+
+
+def test_a_bump_keeps_it_from_going_forward_and_lets_it_go_back() -> None:
+    """While it touches, and some time after; one touch is one bump."""
+    rules = _driving(quick_car())
+    words = "Not forward: the bumper touched something."
+    _sense(rules, _T0, bump=1.0)
+    assert _ask(rules, 2, _T0, 0.5) == (0.0, words)
+    _sense(rules, _T0 + 10 * MS, bump=1.0)
+    assert _ask(rules, 3, _T0 + 10 * MS, -0.3) == (-0.3, "")
+    _sense(rules, _T0 + 20 * MS, bump=0.0)
+    free = _T0 + 760 * MS
+    assert _ask(rules, 4, free - 1, 0.5) == (0.0, words)
+    assert rules.next_wake_ns(free - 1) == free
+    assert _ask(rules, 5, free, 0.5) == (0.5, "")
+    assert rules.bumps == 1
+    _sense(rules, free, bump=1.0)
+    assert rules.bumps == 2
+
+
+def test_something_near_keeps_it_from_going_forward() -> None:
+    """And only where the profile has a distance."""
+    rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
+    _sense(rules, _T0, distance=0.29)
+    assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: something is near.")
+    assert _ask(rules, 3, _T0, -0.4) == (-0.4, "")
+    _sense(rules, _T0, distance=0.3)
+    assert _ask(rules, 4, _T0, 0.5) == (0.0, "")  # Through rest.
+    assert _ask(rules, 5, _T0, 0.5) == (0.5, "")
+    other = _driving(quick_car())
+    _sense(other, _T0, distance=0.01)
+    assert _ask(other, 2, _T0, 0.5) == (0.5, "")
+
+
+@pytest.mark.parametrize(("throttle", "way"), [(0.5, "forward"), (-0.4, "backward")])
+def test_a_stall_ends_the_push_until_something_else_is_asked(throttle: float, way: str) -> None:
+    """It pushes and does not move; the same push again would not help."""
+    rules = _driving(quick_car(), (0.5, throttle))
+    words = f"Not {way}: it pushes and does not move."
+    _sense(rules, _T0, speed=0.0)
+    _sense(rules, _T0 + 400 * MS - 1, speed=0.0)
+    later = _T0 + 400 * MS
+    assert _ask(rules, 2, later - 1, throttle) == (throttle, "")
+    _sense(rules, later, speed=0.0)
+    assert rules.senses.quantities == {"speed": 0.0, "stall": 1.0, "collision": 1.0}
+    assert rules.senses.sources == {"speed": "wheel", "stall": "wheel", "collision": "estimated"}
+    assert _ask(rules, 3, later, throttle) == (0.0, words)
+    _sense(rules, later + MS, speed=0.0)
+    assert _ask(rules, 4, later + MS, throttle) == (0.0, words)
+    assert _ask(rules, 5, later + MS, -throttle / 2) == (-throttle / 2, "")
+    assert _ask(rules, 6, later + MS, throttle) == (0.0, "")  # Through rest.
+    assert _ask(rules, 7, later + MS, throttle) == (throttle, "")
+
+
+def test_what_moves_or_hardly_pushes_does_not_stall() -> None:
+    """A wheel that turns now and then breaks the time."""
+    rules = _driving(quick_car())
+    for ms in range(0, 4_000, 100):
+        _sense(rules, _T0 + ms * MS, speed=0.2 if ms % 300 == 0 else 0.0)
+    assert rules.senses.quantities["stall"] == 0.0
+    _ask(rules, 2, _T0, 0.2)
+    for ms in range(0, 4_000, 100):
+        _sense(rules, _T0 + ms * MS, speed=0.0)
+    assert rules.senses.quantities["stall"] == 0.0
+
+
+def test_nothing_is_said_of_a_stall_that_nobody_would_notice() -> None:
+    """Without a measured speed, or where the profile does not want it."""
+    rules = _driving(quick_car())
+    _sense(rules, _T0)
+    assert rules.senses.quantities == {}
+    rules = _driving(quick_car(LimitPlan(stall_s=0.0)))
+    _sense(rules, _T0, speed=0.0)
+    assert rules.senses.quantities == {"speed": 0.0}
+
+
+def test_a_low_battery_is_believed_after_a_while_and_then_for_good() -> None:
+    """One noisy reading is nothing; and a battery recovers as soon as nothing moves."""
+    rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
+    _sense(rules, _T0, battery=6.0)
+    _sense(rules, _T0 + 400 * MS, battery=6.5)
+    _sense(rules, _T0 + 500 * MS, battery=6.0)
+    assert _ask(rules, 2, _T0 + 999 * MS, 0.5) == (0.5, "")
+    _sense(rules, _T0 + 1_000 * MS, battery=6.05)
+    words = "The battery has 6.05 V, less than 6.4 V."
+    assert rules.tick(_T0 + 1_000 * MS).stop_reason == words
+    later = _T0 + 1_010 * MS
+    _sense(rules, later, battery=7.0)
+    assert rules.tick(later).stop_reason == words
+    assert not rules.offer(arm(later), later)
+    assert _ask(rules, 3, later, 0.5) == (0.5, "")
+
+
+def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
+    """Arming again and again gives no driving in between."""
+    rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
+    for ms in range(0, 600, 100):
+        _sense(rules, _T0 + ms * MS, battery=6.0)
+    later = _T0 + 600 * MS
+    rules.offer(arm(later), later)
+    rules.offer(command(2, later), later)
+    assert "battery" in rules.tick(later).stop_reason
+
+
+def test_a_hot_computer_rests_until_it_has_cooled() -> None:
+    """Believed after a while, too."""
+    rules = _driving(quick_car(LimitPlan(high_temperature_c=80.0)))
+    _sense(rules, _T0, temperature=81.0)
+    _sense(rules, _T0 + 500 * MS, temperature=82.0)
+    later = _T0 + 500 * MS
+    rules.offer(command(2, later), later)
+    assert rules.tick(later).stop_reason == "The computer has 82 C, more than 80 C."
+    _sense(rules, later, temperature=80.0)
+    assert rules.tick(later).seq == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "stops"),
+    [
+        ("bumper", LimitPlan(), True),
+        ("wheel", LimitPlan(), False),
+        ("eye", LimitPlan(), False),
+        ("eye", LimitPlan(stop_distance_m=0.2), True),
+        ("meter", LimitPlan(), False),
+        ("meter", LimitPlan(low_battery_v=6.0), True),
+    ],
+)
+def test_a_sensor_that_protects_and_fails_stops(name: str, limits: LimitPlan, stops: bool) -> None:
+    """It can protect no longer; one that only informs may fail."""
+    rules = _driving(quick_car(limits))
+    rules.sense(Sensing(failures={name: "No answer."}), _T0)
+    decision = rules.tick(_T0)
+    assert (decision.seq is None) == stops
+    if stops:
+        assert decision.stop_reason == (
+            f"Sensor {name} fails, and can protect no longer: No answer."
+        )
+    rules.sense(Sensing(), _T0)
+    assert rules.tick(_T0).seq == 1
+
+
+def test_a_speed_that_is_not_measured_is_estimated_where_the_profile_says_how() -> None:
+    """It follows from what is applied, and says so."""
+    plan = quick_car()
+    steering, throttle = plan.actions
+    plan = replace(plan, actions=(steering, replace(throttle, unit="m/s", gain=3.0)))
+    rules = _driving(plan)
+    _sense(rules, _T0)
+    assert rules.senses.quantities == {"speed": 1.5}
+    assert rules.senses.sources == {"speed": "estimated"}
+    _sense(rules, _T0, speed=1.0)
+    assert rules.senses.quantities["speed"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("sensed", "collision", "source"),
+    [
+        ({"bump": 1.0, "collision": 0.0}, 1.0, "bumper"),
+        ({"bump": 0.0, "collision": 1.0}, 1.0, "else"),
+        ({"bump": 0.0, "collision": 0.0, "speed": 0.0}, 0.0, "bumper"),
+        ({"collision": 0.0}, 0.0, "else"),
+        ({"speed": 1.0}, 0.0, "estimated"),
+    ],
+)
+def test_a_collision_has_the_source_that_told_of_it(
+    sensed: dict[str, float], collision: float, source: str
+) -> None:
+    """A bumper is certain, a jolt likely, a stall the last thing that tells."""
+    rules = _driving(quick_car())
+    _sense(rules, _T0, **sensed)
+    assert rules.senses.quantities["collision"] == collision
+    assert rules.senses.sources["collision"] == source
+
+
+def test_the_direction_is_that_of_the_propulsion() -> None:
+    """For encoders that cannot tell forward from backward; steering a tank is neither."""
+    rules = _driving(quick_car())
+    assert rules.direction == 1.0
+    _ask(rules, 2, _T0, 0.0)
+    assert rules.direction == 0.0
+    _ask(rules, 3, _T0, -0.3)
+    assert rules.direction == -1.0
+    assert rules.applied == (0.5, -0.3)
+    tank = replace(car(), actions=(ActionPlan("steering", propels=True),))
+    turning = _driving(tank, (0.5,))
+    assert turning.direction == 0.0
+    _sense(turning, _T0, bump=1.0)
+    assert turning.tick(_T0).actions == (0.5,)
+    turning.disarm("")
+    assert turning.tick(_T0).actions == (0.0,)
+
+
+def test_temperature_protects_too() -> None:
+    """A thermometer that fails stops where a limit was set."""
+    plan = replace(
+        quick_car(LimitPlan(high_temperature_c=80.0)),
+        sensors=(SensorPlan("chip", "cpu_temperature", "temperature"),),
+    )
+    rules = _driving(plan)
+    rules.sense(Sensing(failures={"chip": "No file."}), _T0)
+    assert "Sensor chip" in rules.tick(_T0).stop_reason

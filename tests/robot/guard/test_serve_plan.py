@@ -1,0 +1,147 @@
+"""The plan that processes inherit, and what of it guard and supervisor load."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.robot.guard import safe_pins, start, supervisor
+from shapechanger.robot.guard.arguments import descriptors
+from shapechanger.robot.guard.mix import output_values
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+from shapechanger.robot.guard.restarts import Restarts
+from shapechanger.robot.guard.serve_plan import (
+    ServePlan,
+    plan_fd,
+    read_plan_fd,
+    supervisor_command,
+)
+from tests.robot.guard.plans import car
+from tests.robot.guard.recording import Record, connect
+
+_PLAN = ServePlan(car(), {"port": 5000, "nested": {"a": [1, 2]}}, ("module:function", "argument"))
+
+
+def test_a_plan_comes_back_as_it_was() -> None:
+    """Through JSON, with infinite slew and all."""
+    plan = replace(_PLAN, guard=replace(car(), actions=(ActionPlan("throttle"),)))
+    assert ServePlan.from_json(plan.to_json()) == plan
+
+
+def test_a_guard_has_its_deadline_to_show_that_it_lives_or_longer_on_a_twin() -> None:
+    """Never less than the deadline, since it may wait so long."""
+    assert _PLAN.guard_silence_ms == 250
+    assert replace(_PLAN, patience_ms=5_000).guard_silence_ms == 5_000
+
+
+def test_several_processes_may_read_the_same_file() -> None:
+    """It is inherited, and reading does not move it."""
+    fd = plan_fd(_PLAN)
+    try:
+        assert os.get_inheritable(fd)
+        assert read_plan_fd(fd) == _PLAN
+        script = f"import os; print(os.pread({fd}, 1 << 20, 0).decode())"
+        text = subprocess.check_output([sys.executable, "-c", script], pass_fds=[fd], text=True)
+        assert ServePlan.from_json(text) == _PLAN
+        assert read_plan_fd(fd) == _PLAN
+    finally:
+        os.close(fd)
+
+
+def test_outputs_are_mixed_from_actions_and_clipped() -> None:
+    """A tank's tracks: throttle plus and minus steering."""
+    plan = GuardPlan(
+        "tank",
+        (ActionPlan("steering"), ActionPlan("throttle")),
+        (
+            OutputPlan("left", "hbridge", mix={"throttle": 1.0, "steering": 1.0}),
+            OutputPlan("right", "hbridge", mix={"throttle": 1.0, "steering": -1.0}, offset=0.25),
+        ),
+    )
+    assert output_values(plan, (0.5, 0.25)) == (0.75, 0.0)
+    assert output_values(plan, (1.0, 1.0)) == (1.0, 0.25)
+    assert output_values(plan, (-1.0, -1.0)) == (-1.0, 0.25)
+    with pytest.raises(ValueError, match=r"longer|shorter"):
+        output_values(plan, (1.0,))
+
+
+def test_restarts_are_limited_in_a_time() -> None:
+    """Five in a minute; later ones may be had again."""
+    restarts = Restarts(most=2, within_s=60.0)
+    second = 10**9
+    assert [restarts.may_restart(t * second) for t in (0, 30, 59, 60, 61, 90)] == [
+        True,
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
+
+
+@pytest.mark.parametrize("arguments", [["--a", "1"], ["--a", "1", "--c", "2"], ["--a"]])
+def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
+    """Only we write these command lines."""
+    with pytest.raises(ValueError, match=r"This takes --a N --b N|argument 2 is"):
+        descriptors(arguments, ("--a", "--b"))
+
+
+def test_the_daemon_cannot_be_hidden_by_the_folder_it_is_started_in() -> None:
+    """And the guard takes nothing from its environment."""
+    commands = supervisor.Commands.of(_PLAN)
+    assert commands.guard == (sys.executable, "-I", start.__file__, "guard")
+    assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
+    assert commands.daemon == (sys.executable, "-P", "-m", "shapechanger.robot.daemon")
+
+
+def test_safe_pins_goes_on_past_an_output_that_fails(tmp_path: Path) -> None:
+    """Every other output is put to rest, and the enable pin too."""
+    record = Record(tmp_path / "record")
+    (tmp_path / "stuck-GPIO17").touch()
+    plan = replace(car(), enable_pin=5)
+    failures = safe_pins.make_safe(plan, connect(str(record.path)))
+    assert len(failures) == 1
+    assert failures[0].startswith("Output steer: ")
+    assert {line["pin"] for line in record.pins()} >= {"GPIO22", "GPIO27", "GPIO5"}
+    assert record.is_at_rest()
+    (tmp_path / "stuck-GPIO17").unlink()
+    assert not safe_pins.make_safe(plan, connect(str(record.path)))
+    (tmp_path / "stuck-GPIO5").touch()
+    assert "Enable pin 5" in safe_pins.make_safe(plan, connect(str(record.path)))[0]
+
+
+_LISTS_MODULES = """
+import importlib.util, sys
+spec = importlib.util.spec_from_file_location("start", sys.argv[1])
+start = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(start)
+start._put_package_in_place()
+import importlib
+for module in ("process", "supervisor"):
+    importlib.import_module(f"shapechanger.robot.guard.{module}")
+from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
+from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
+for module in (*OUTPUT_DRIVERS.values(), *SENSOR_DRIVERS.values()):
+    importlib.import_module(module)
+print(*sys.modules)
+"""
+
+
+def test_guard_and_supervisor_load_nothing_but_their_drivers() -> None:
+    """What is not loaded cannot fail, and takes no memory."""
+    command = [sys.executable, "-I", "-c", _LISTS_MODULES, start.__file__]
+    before = "import sys; print(*sys.modules)"
+    bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()
+    loaded = subprocess.check_output(command, text=True).split()
+    theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "start"}
+    for module in set(loaded) - set(bare):
+        top = module.partition(".")[0]
+        if top == "shapechanger":
+            ours = module.split(".")[1:2]
+            assert ours in ([], ["errors"], ["robot"]), module
+            assert module.split(".")[2:3] in ([], ["guard"], ["drivers"], ["hardware"]), module
+        else:
+            assert top in theirs or top in sys.stdlib_module_names, module

@@ -1,0 +1,47 @@
+"""Finding and reading files of profiles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import ProfileError, UnknownName
+from shapechanger.robot.profile import find_profile, load_profile, shipped_profiles
+from tests.robot.profile.texts import EVERYTHING
+
+
+def test_names_and_paths() -> None:
+    """A shipped profile has a name; everything else is a path."""
+    assert find_profile("car") == shipped_profiles()["car"]
+    assert find_profile("car.toml") == Path("car.toml")
+    assert find_profile("robots/car") == Path("robots/car")
+    assert find_profile(Path("my.toml")) == Path("my.toml")
+    with pytest.raises(UnknownName, match=r"'tnak'. Did you mean 'tank'\? There are: boat"):
+        find_profile("tnak")
+
+
+def test_a_mark_and_windows_lines_are_read(tmp_path: Path) -> None:
+    """What an editor of Windows adds is no part of a profile."""
+    path = tmp_path / "car.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + EVERYTHING.replace("\n", "\r\n").encode())
+    assert load_profile(path).name == "rover"
+
+
+def test_files_that_are_no_profile(tmp_path: Path) -> None:
+    """Missing, a folder, no text, too long, not to be read: each in words."""
+    with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml\."):
+        load_profile(tmp_path / "gone.toml")
+    with pytest.raises(ProfileError, match="is a folder, not a profile"):
+        load_profile(tmp_path)
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"# One.\n\xff")
+    with pytest.raises(ProfileError, match=r"x\.toml, line 2: this is no UTF-8 text"):
+        load_profile(path)
+    path.write_bytes(b"#" * (1024 * 1024 + 1))
+    with pytest.raises(ProfileError, match="longer than a profile can be"):
+        load_profile(path)
+    with pytest.raises(ProfileError, match=r"x\.toml/y\.toml cannot be read: Not a directory"):
+        load_profile(path / "y.toml")
+    with pytest.raises(ProfileError, match="cannot be read: embedded null"):
+        load_profile("a\0b.toml")

@@ -1,0 +1,665 @@
+"""Each mistake in a profile is one sentence: the file, the line, what is wrong, what exists."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.profile import shipped_profiles
+from tests.robot.profile.texts import EVERYTHING, changed, read
+
+# What is replaced in the profile with everything, and by what; how the line begins that is named,
+# and what is said.
+MISTAKES = [
+    # Tables and keys that nobody knows.
+    (
+        "[limits]",
+        "[limit]",
+        "[limit]",
+        "no table or key 'limit' (did you mean 'limits'?); there are: act",
+    ),
+    (
+        "# A rover",
+        'colour = "red" #',
+        'colour = "red" # with one of everything.',
+        "no table or key 'colour'; there are: action, camera",
+    ),
+    (
+        "arming =",
+        "armimg =",
+        'armimg = "anyone"',
+        "[limits] has no key 'armimg' (did you mean 'arming'?); there are",
+    ),
+    (
+        "enable = 26",
+        "enabel = 26",
+        "enabel = 26",
+        "[output.drive] has no key 'enabel' (did you mean 'enable'?)",
+    ),
+    (
+        "enable = 26",
+        "left_us = 1000",
+        "left_us = 1000",
+        "'left_us' belongs to the driver servo, not to [output.",
+    ),
+    (
+        "enable = 26",
+        "channel = 3",
+        "channel = 3",
+        "belongs to what goes over pca9685 and sysfs, not to",
+    ),
+    ("trigger = 23", "a = 5\ntrigger = 23", "a = 5", "'a' belongs to the driver encoder, not to"),
+    (
+        "flip = true",
+        'path = "x"',
+        'path = "x"',
+        "'path' belongs to the driver file and pipe, not to [camera]",
+    ),
+    # Wrong and missing values.
+    ('body = "car"', "body = { a = 1 }", "body = ", "that can be printed, not a table"),
+    (
+        'name = "rover"',
+        "name = 5",
+        "name = 5",
+        "name of [robot] must be a text of 1 to 64 characters that",
+    ),
+    (
+        'name = "rover"',
+        'name = " "',
+        'name = " "',
+        "must be a text of 1 to 64 characters that can be printed",
+    ),
+    (
+        'name = "rover"',
+        'name = "a\\u0007"',
+        'name = "a\\u0007"',
+        "that can be printed, not the text",
+    ),
+    (
+        'name = "rover"',
+        f'name = "{"r" * 65}"',
+        'name = "rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr',
+        "not the text 'rrrrrrrrrrrrrrrr",
+    ),
+    (
+        'name = "rover"\n',
+        "",
+        "[robot]",
+        "[robot] lacks the key 'name', a text of 1 to 64 characters",
+    ),
+    (
+        "control_hz = 25",
+        'control_hz = "25 Hz"',
+        'control_hz = "25 Hz"',
+        "a number from 1 to 100 (hertz), not the text",
+    ),
+    ("control_hz = 25", "control_hz = nan", "control_hz = nan", "from 1 to 100 (hertz), not nan"),
+    ("control_hz = 25", "control_hz = 0.5", "control_hz = 0.5", "from 1 to 100 (hertz), not 0.5"),
+    (
+        "control_hz = 25",
+        "control_hz = 2026-11-03",
+        "control_hz = 2026-11-03",
+        "not the date 2026-11-03",
+    ),
+    ("control_hz = 25", "control_hz = 12:00:00", "control_hz = 12:00:00", "not the time 12:00:00"),
+    (
+        "control_hz = 25",
+        f"control_hz = {'9' * 400}",
+        "control_hz = 9",
+        "not a number too large to write",
+    ),
+    (
+        "2026-11-03",
+        "2026-11-03T12:00:00",
+        "calibrated = 2026-11-03T12:00:00",
+        "must be a date, such as 2026-11-03, not the",
+    ),
+    (
+        "propels = true",
+        'propels = "yes"',
+        'propels = "yes"',
+        "propels of [action.throttle] must be true or false",
+    ),
+    (
+        'levels = "three"',
+        'levels = "thre"',
+        'levels = "thre"',
+        "one of 'any', 'three', not 'thre' (did you mean 'three'?)",
+    ),
+    ('levels = "three"', "levels = 3", "levels = 3", "must be one of 'any', 'three', not 3"),
+    (
+        "seconds = 0.5",
+        "seconds = true",
+        "seconds = true",
+        "seconds of [[reset]] number 2 must be a number above",
+    ),
+    (
+        "size = [128, 128]",
+        "size = [128]",
+        "size = [128]",
+        "[width, height] in pixels, each an even number from",
+    ),
+    (
+        "size = [128, 128]",
+        "size = [128, 127]",
+        "size = [128, 127]",
+        "each an even number from 16 to 1920, not a list of 2",
+    ),
+    (
+        "size = [128, 128]",
+        "size = [128, 4000]",
+        "size = [128, 4000]",
+        "each an even number from 16 to 1920",
+    ),
+    (
+        "size = [128, 128]",
+        "size = 128",
+        "size = 128",
+        "size of [camera] must be [width, height] in pixels",
+    ),
+    (
+        "mix.throttle = 0.5",
+        'mix = "throttle"',
+        'mix = "throttle"',
+        "must be a table of numbers from -10 to 10 by",
+    ),
+    (
+        "mix = { arm = 1.0 }",
+        "mix = { arm = true }",
+        "mix = { arm = true }",
+        "by name of action, and the one of arm is true",
+    ),
+    (
+        "mix = { arm = 1.0 }",
+        "mix = { arm = nan }",
+        "mix = { arm = nan }",
+        "and the one of arm is nan",
+    ),
+    ("[stop]", "[[stop]]", "[[stop]]", "[stop] must be a table, not a list of 1"),
+    (
+        "[sensor.chip]\n",
+        "[sensor]\nchip = 5\n[sensor.chop]\n",
+        "chip = 5",
+        "[sensor.chip] must be a table",
+    ),
+    (
+        "[[reset]]\nvalues = { throttle = -0.4 }\nseconds = 1\n\n[[reset]]\nseconds = 0.5\n"
+        "[reset.values]\narm = 0.5\n",
+        "[reset]\nseconds = 1\n",
+        "[reset]",
+        "written [[reset]], with two",
+    ),
+    # A unit that is missing or another one.
+    ("stop_distance_m", "stop_distance", "stop_distance = 0.3", "write 'stop_distance_m' (metres)"),
+    (
+        "stop_distance_m",
+        "stop_distance_cm",
+        "stop_distance_cm = 0.3",
+        "lacks its unit or has another one: write",
+    ),
+    ("slew_per_s", "slew", "slew = 2", "'slew' of [action.throttle] lacks its unit"),
+    ("left_us", "left", "left = 2000", "write 'left_us' (microseconds)"),
+    ("wheel_m", "wheel", "wheel = 0.21", "write 'wheel_m' (metres)"),
+    ("control_hz", "control", "control = 25", "write 'control_hz' (hertz)"),
+    # Pins.
+    (
+        "enable = 26",
+        "enable = 28",
+        "enable = 28",
+        'a BCM pin from 0 to 27, such as 22, "GPIO22" or "BOARD15"',
+    ),
+    ("enable = 26", "enable = -2", "enable = -2", ", or -1 for none, not -2"),
+    ("enable = 26", "enable = true", "enable = true", "enable of [output.drive] must be a BCM pin"),
+    (
+        "enable = 26",
+        'enable = "BOARD6"',
+        'enable = "BOARD6"',
+        "or -1 for none, and BOARD6 is ground",
+    ),
+    ("enable = 26", 'enable = "BOARD17"', 'enable = "BOARD17"', "and BOARD17 is 3.3 V"),
+    (
+        "enable = 26",
+        'enable = "BOARD41"',
+        'enable = "BOARD41"',
+        "the header has the places 1 to 40",
+    ),
+    ("enable = 26", 'enable = "GPIO28"', 'enable = "GPIO28"', "a BCM pin from 0 to 27"),
+    ("enable = 26", 'enable = "P1"', 'enable = "P1"', "a BCM pin from 0 to 27"),
+    ("a = 16", "a = -1", "a = -1", "a of [sensor.wheel] must be a BCM pin from 0 to 27"),
+    ("12,  # Left.", "99,", "pins = [", 'or "BOARD15", and 99 is none'),
+    ('pins = [\n    12,  # Left.\n    "GPIO13",\n]', "pins = []", "pins = []", "not an empty list"),
+    (
+        "enable = 26",
+        "enable = 22",
+        "enable = 22",
+        "GPIO22 is used twice: by forward of [output.drive] (line 24) and by enable of [outp",
+    ),
+    (
+        "echo = 24",
+        'echo = "BOARD13"',
+        'echo = "BOARD13"',
+        "GPIO27 is used twice: by backward of [output.drive] (line 25) and by echo of [sens",
+    ),
+    (
+        '"GPIO13"',
+        "12",
+        "pins = [",
+        "by pins of [sensor.bumper] (line 67) and by pins of [sensor.bumper]",
+    ),
+    (
+        "pin = 19",
+        "pin = 5",
+        "pin = 5",
+        "by phase of [output.brush] (line 53) and by pin of [enable]",
+    ),
+    (
+        "pin = 21",
+        "pin = 19",
+        "pin = 19",
+        "by pin of [enable] (line 116) and by pin of [emergency_button]",
+    ),
+    (
+        "pin = 21",
+        "pin = 25",
+        "pin = 25",
+        "GPIO25 is used twice: by output_enable of [output.arm] (line 42)",
+    ),
+    (
+        "pin = 21",
+        "pin = 3",
+        "pin = 3",
+        "GPIO3 is used twice: by bus of [output.steer] (line 29) and by",
+    ),
+    (
+        "phase = 5",
+        "phase = 2",
+        "phase = 2",
+        "GPIO2 is used twice: by bus of [output.steer] (line 29) and",
+    ),
+    # Channels, buses and chips.
+    (
+        "channel = 1\n",
+        "channel = 0\n",
+        "channel = 0",
+        "channel 0 of the PCA9685 at 0x40 of I2C bus 1 is used",
+    ),
+    (
+        "address = 0x41",
+        "",
+        "[sensor.pack]",
+        "address 0x40 of I2C bus 1 is used twice: by address of [output.ste",
+    ),
+    (
+        "channel = 1\n",
+        "channel = 1\nhz = 60\n",
+        "hz = 60",
+        "has one hz for all its channels, 50 or 60",
+    ),
+    (
+        "channel = 0\nleft_us",
+        "channel = 0\noutput_enable = 7\nleft_us",
+        "output_enable = 25",
+        "one output_enable for",
+    ),
+    (
+        "mix = { arm = 1.0 }",
+        'mix = { arm = 1.0 }\n[output.x]\ndriver = "esc"\nover = "sysfs"\nchannel = 0\n'
+        "mix = { throttle = 1.0 }",
+        "channel = 0",
+        "channel 0 of PWM chip 0 is used twice",
+    ),
+    # Drivers.
+    ('"hbridge"', '"hbrigde"', 'driver = "hbrigde"', "not 'hbrigde' (did you mean 'hbridge'?)"),
+    (
+        'driver = "hbridge"\n',
+        "",
+        "[output.drive]",
+        "[output.drive] lacks the key 'driver', one of 'hbridge'",
+    ),
+    ('"encoder"', '"coder"', 'driver = "coder"', "not 'coder' (did you mean 'encoder'?)"),
+    ('"v4l2"', '"v4l"', 'driver = "v4l"', "'pattern', not 'v4l' (did you mean 'v4l2'?)"),
+    (
+        'over = "sysfs"',
+        'over = "gpiozero"',
+        'over = "gpiozero"',
+        "in steps of 200 µs, and 1.4 ms out of a neutral of",
+    ),
+    (
+        '"hbridge"',
+        '"gpiozero.Servo"',
+        'driver = "gpiozero.Servo"',
+        "cannot be 'gpiozero.Servo': gpiozero makes the pulses",
+    ),
+    (
+        'over = "sysfs"\n',
+        "",
+        "[output.pump]",
+        "lacks the key 'over', one of 'pca9685', 'lgpio', 'sysfs'",
+    ),
+    (
+        'over = "sysfs"\nchannel = 0',
+        'over = "lgpio"',
+        "[output.pump]",
+        "lacks the key 'pin', a BCM pin",
+    ),
+    # Actions that make no sense.
+    (
+        "low = -0.5",
+        "low = 0.5\nhigh = 0.5",
+        "high = 0.5",
+        "may only move from low = 0.5 to high = 0.5, which",
+    ),
+    (
+        "low = -0.5",
+        "one_sided = true\nlow = -0.5",
+        "low = -0.5",
+        "must be 0 to 1, because it is one-sided",
+    ),
+    (
+        "low = -0.5",
+        "low = -1.5",
+        "low = -1.5",
+        "low of [action.throttle] must be a number from -1 to 1",
+    ),
+    (
+        "rest = 0.25",
+        "rest = 0.25\nhigh = 0.2",
+        "rest = 0.25",
+        "rest of [action.arm] must lie between low and",
+    ),
+    (
+        "low = -0.5",
+        "rest = 0.1",
+        "rest = 0.1",
+        "rest of [action.throttle] must be 0, because it propels",
+    ),
+    (
+        "slew_per_s = 2",
+        "slew_per_s = 0",
+        "slew_per_s = 0",
+        "must be a number above 0 (per second), not 0",
+    ),
+    (
+        "slew_per_s = 2",
+        "slew_per_s = nan",
+        "slew_per_s = nan",
+        "must be a number above 0 (per second), not nan",
+    ),
+    (
+        "slew_per_s = 2",
+        f"slew_per_s = 1{'0' * 400}",
+        "slew_per_s = 100000000000000000000000000",
+        "not a number too large to write",
+    ),
+    (
+        'levels = "three"',
+        "threshold = 0",
+        "threshold = 0",
+        "must be a number above 0 and up to 1, not 0",
+    ),
+    ('unit = "deg"\n', "", "gain = 90", "gain of [action.arm] needs a unit, such as unit = 'deg'"),
+    (
+        "[action.arm]",
+        '[action."left arm"]',
+        '[action."left arm"]',
+        "the name 'left arm' must begin with a letter",
+    ),
+    (
+        "[action.arm]",
+        "[action.7]",
+        "[action.7]",
+        "the name '7' must begin with a letter and have at most 32",
+    ),
+    # Outputs that make no sense.
+    (
+        "mix = { arm = 1.0 }",
+        "mix = {}",
+        "mix = {}",
+        "is empty, so nothing moves it; there are: steering, th",
+    ),
+    (
+        "mix = { arm = 1.0 }\n",
+        "",
+        "[output.arm]",
+        "[output.arm] lacks the key 'mix', a table of numbers from",
+    ),
+    (
+        "mix = { arm = 1.0 }",
+        "mix = { amr = 1.0 }",
+        "mix = { amr = 1.0 }",
+        "names no action: 'amr' (did you mean 'arm'?); there are: arm",
+    ),
+    (
+        "mix = { arm = 1.0 }",
+        "mix = { arm = 0.0 }",
+        "mix = { arm = 0.0 }",
+        "takes nothing of 'arm': leave it out",
+    ),
+    (
+        "[output.drive]",
+        "[action.wave]\n[output.drive]",
+        "[action.wave]",
+        "[action.wave] moves nothing: no mix of",
+    ),
+    ('part = "wheels"', 'part = "wheel"', 'part = "wheel"', "one of 'wheels', 'left track'"),
+    (
+        "mix = { throttle = 1 }",
+        "mix = { arm = 1 }",
+        "mix = { arm = 1 }",
+        "moves the wheels, so an action in its mix",
+    ),
+    (
+        "enable = 26",
+        "offset = 0.1",
+        "offset = 0.1",
+        "would be at 0.1 at rest, and must be at 0 because it driv",
+    ),
+    (
+        "mix = { throttle = 1 }",
+        "mix = { throttle = 1, arm = 1 }",
+        "[output.drive]",
+        "would be at 0.25 at rest",
+    ),
+    (
+        "mix.throttle = 0.5",
+        "mix.arm = 0.5",
+        "[output.pump]",
+        "[output.pump] would be at 0.125 at rest",
+    ),
+    (
+        "right_us = 1000",
+        "right_us = 1500",
+        "[output.steer]",
+        "centre_us of [output.steer] must lie between left_us",
+    ),
+    (
+        "right_us = 1000",
+        "right_us = 400",
+        "right_us = 400",
+        "must be a whole number from 500 to 2500 (microseconds)",
+    ),
+    (
+        "right_us = 1000",
+        "right_us = 1e3",
+        "right_us = 1e3",
+        "whole number from 500 to 2500 (microseconds), not 1000.0",
+    ),
+    (
+        'over = "sysfs"',
+        'over = "sysfs"\nhz = 400\nforward_us = 2500',
+        "hz = 400",
+        "no time for a pulse of",
+    ),
+    (
+        "start = 0.1",
+        "start = 0.5\nfull = 0.5",
+        "start = 0.5",
+        "start of [output.brush] must be below full",
+    ),
+    # Stops, limits and the rest.
+    (
+        "deadline_ms = 200",
+        "deadline_ms = 1001",
+        "deadline_ms = 1001",
+        "from 20 to 1000 (milliseconds), not 1001",
+    ),
+    (
+        "deadline_ms = 200",
+        "deadline_ms = 19",
+        "deadline_ms = 19",
+        "from 20 to 1000 (milliseconds), not 19",
+    ),
+    (
+        "deadline_ms = 200",
+        "deadline_ms = 39",
+        "deadline_ms = 39",
+        "must be at least 40 ms, the time from one command",
+    ),
+    (
+        "deadline_ms = 200",
+        "camera_stale_ms = 99",
+        "camera_stale_ms = 99",
+        "at least 100 ms, the time of two pictures at",
+    ),
+    (
+        "deadline_ms = 200",
+        "camera_stale_ms = 0",
+        "camera_stale_ms = 0",
+        "from 50 to 5000 (milliseconds), not 0",
+    ),
+    ("flip = true", "fps = 3", "[limits]", "camera_stale_ms of [limits] must be at least 667 ms"),
+    (
+        '[camera]\ndriver = "v4l2"\nsize = [128, 128]\nflip = true\n\n[limits]',
+        "[limits]\ncamera_stale_ms = 500",
+        "camera_stale_ms = 500",
+        "camera_stale_ms of [limits] needs a [camera]",
+    ),
+    (
+        '[sensor.pack]\ndriver = "ina219"\naddress = 0x41\n',
+        "",
+        "low_battery_v = 6.6",
+        "low_battery_v of [limits] needs a sensor that measures battery, such as one with the",
+    ),
+    (
+        "velocity = 2",
+        "collision = 10",
+        "collision = 10",
+        "collision of [reward] must be a number from -1e+06 to 0",
+    ),
+    (
+        "throttle = -0.4",
+        "throttle = -0.6",
+        "values = { throttle = -0.6 }",
+        "throttle of [[reset]] number 1 must be -0.5 to 1",
+    ),
+    (
+        "throttle = -0.4",
+        "thrott = -0.4",
+        "values = { thrott = -0.4 }",
+        "no action: 'thrott' (did you mean 'throttle'?); there are",
+    ),
+    (
+        "arm = 0.5\n",
+        "arm = 2\n",
+        "[reset.values]",
+        "values of [[reset]] number 2 must be a table of numbers from",
+    ),
+    (
+        "hold_ms = 50",
+        "hold_ms = 10",
+        "hold_ms = 10",
+        "must be a whole number from 30 to 1000 (milliseconds)",
+    ),
+    # No TOML at all.
+    (
+        'name = "rover"',
+        'name = "rover',
+        'name = "rover',
+        "this is no TOML: illegal character '\\n' at column 14",
+    ),
+    (
+        'name = "rover"',
+        "name = rover",
+        "name = rover",
+        "this is no TOML: invalid value at column 8",
+    ),
+    (
+        "[stop]",
+        "[limits]",
+        "[limits]",
+        "this is no TOML: cannot declare ('limits',) twice at column 8",
+    ),
+    ("", "[end", "[end", "this is no TOML: expected ']' at the end of a table declaration"),
+    ("", f"x = {'9' * 5000}", "x = 9", "a number has too many digits"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "begin", "words"),
+    MISTAKES,
+    ids=lambda value: str(value)[:40] if isinstance(value, str) else "",
+)
+def test_mistake_is_named(old: str, new: str, begin: str, words: str) -> None:
+    """The line leads to the mistake, and the words out of it."""
+    text = changed(old, new)
+    with pytest.raises(ProfileError) as caught:
+        read(text)
+    match = re.fullmatch(r"rover\.toml, line ([0-9]+): (.*)\.", str(caught.value))
+    assert match is not None
+    assert text.split("\n")[int(match[1]) - 1].startswith(begin)
+    assert words in match[2]
+
+
+@given(
+    cut=st.integers(0, len(EVERYTHING)),
+    length=st.integers(0, 12),
+    put=st.sampled_from(
+        ["", "0", "-1", "nan", "[", "]", "{}", '"', "=", "\n", ".", "x", "true", "é"]
+    ),
+)
+def test_no_text_is_a_crash(cut: int, length: int, put: str) -> None:
+    """Whatever slips in or falls out, it is a profile or one sentence."""
+    said = ""
+    try:
+        read(EVERYTHING[:cut] + put + EVERYTHING[cut + length :])
+    except ProfileError as error:
+        said = str(error)
+    assert re.fullmatch(r"|rover\.toml, line [0-9]+: [^\n]*\.", said)
+
+
+def test_nested_too_deeply() -> None:
+    """Brackets without end are refused, not a crash."""
+    with pytest.raises(ProfileError, match=r"rover\.toml is no profile: it is nested too deeply\."):
+        read("x = " + "[" * 5000)
+
+
+def test_a_whole_table_is_missing() -> None:
+    """A robot must have a name, and something to command."""
+    with pytest.raises(ProfileError, match=r"line 1: \[robot\] lacks the key 'name'"):
+        read("")
+    with pytest.raises(ProfileError, match="line 1: a robot needs an action"):
+        read('[robot]\nname = "x"\nbody = "y"\n')
+    with pytest.raises(ProfileError, match=r"\[output\] must be a table"):
+        read('output = 3\n[robot]\nname = "x"\nbody = "y"\n[action.a]\n')
+    with pytest.raises(ProfileError, match=r"\[\[reset\]\] number 1 must be a table, not true"):
+        read("reset = [true]\n" + EVERYTHING.split("[[reset]]", maxsplit=1)[0])
+
+
+def test_too_many_numbers() -> None:
+    """A command has at most 64 numbers."""
+    actions = "".join(f"[action.a{i}]\n" for i in range(65))
+    with pytest.raises(ProfileError, match="a robot has at most 64 actions, not 65"):
+        read('[robot]\nname = "x"\nbody = "y"\n' + actions)
+
+
+@pytest.mark.parametrize("key", ["hold_ms", "ramp_ms"])
+def test_a_stop_may_not_let_the_robot_drive_on(key: str) -> None:
+    """A track that is part steering may not keep its value, unless the steering propels, too."""
+    tank = shipped_profiles()["tank"].read_text() + f"\n[stop]\n{key} = 100\n"
+    read(tank)
+    with pytest.raises(ProfileError, match=rf"{key} of \[stop\] would keep \[output.left\] driv"):
+        read(tank.replace("propels = true", "", 1))

@@ -1,0 +1,24 @@
+"""The table of the header against gpiozero's."""
+
+from __future__ import annotations
+
+from gpiozero.pins.data import PLUS_J8
+
+from shapechanger.robot.profile.pins import BCM_OF_BOARD, bcm
+
+
+def test_header_is_the_one_of_gpiozero() -> None:
+    """The places on the header, from a source of its own."""
+    pins: dict[int, dict[str, str]] = PLUS_J8[2]
+    theirs = {
+        place: int(names["gpio"].removeprefix("GPIO"))
+        for place, names in pins.items()
+        if "gpio" in names
+    }
+    assert theirs == BCM_OF_BOARD
+
+
+def test_the_pins_of_2017() -> None:
+    """BOARD 15/13 drive and 11/7 steer, which are BCM 22/27 and 17/4."""
+    assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
+    assert bcm("GPIO22") == bcm(22) == 22

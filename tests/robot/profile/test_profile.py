@@ -1,0 +1,152 @@
+"""What a profile becomes for the guard, the daemon and the workstation."""
+
+from __future__ import annotations
+
+import datetime
+import math
+
+import pytest
+
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
+from shapechanger.robot.profile import load_profile, shipped_profiles
+from tests.robot.profile.texts import EVERYTHING, changed, read
+
+
+def test_everything_is_read() -> None:
+    """Each table arrives where it belongs, with its defaults."""
+    profile = read()
+    assert (profile.name, profile.body, profile.control_hz) == ("rover", "car", 25.0)
+    assert profile.calibrated == datetime.date(2026, 11, 3)
+    assert profile.actions == (
+        ActionPlan("steering", levels="three"),
+        ActionPlan("throttle", low=-0.5, propels=True, slew_per_s=2.0),
+        ActionPlan("arm", rest=0.25, unit="deg", gain=90.0),
+    )
+    assert profile.camera == CameraPlan(
+        "v4l2", (128, 128), flip=True, settings={"device": "/dev/video0"}
+    )
+    assert profile.image_size == (128, 128)
+    assert profile.limits == LimitPlan(
+        deadline_ms=200,
+        camera_stale_ms=500,
+        stop_distance_m=0.3,
+        low_battery_v=6.6,
+        high_temperature_c=80.0,
+    )
+    assert (profile.max_observation_age_ms, profile.arming) == (400, "anyone")
+    assert profile.stop == StopPlan(then="release")
+    assert profile.reward_weights() == {
+        "velocity": 2.0,
+        "collision": -10.0,
+        "stall": -1.0,
+        "collision_ends_episode": 0.0,
+    }
+    # What a step does not name is at rest.
+    assert profile.reset_routine() == (((0.0, -0.4, 0.25), 1.0), ((0.0, 0.0, 0.5), 0.5))
+
+
+def test_drivers_find_all_their_settings() -> None:
+    """A driver finds every key that it has, and a pin always as a BCM number."""
+    settings = {output.name: output.settings for output in read().outputs}
+    assert settings["drive"] == {
+        "forward": 22, "backward": 27, "enable": 26, "pwm_hz": 50, "start": 0.0, "full": 1.0,
+    }  # fmt: skip
+    assert settings["steer"] == {
+        "over": "pca9685", "hz": 50, "bus": 1, "address": 0x40, "channel": 0, "output_enable": 25,
+        "left_us": 2000, "centre_us": 1500, "right_us": 1000, "travel_deg_per_s": math.inf,
+    }  # fmt: skip
+    assert settings["pump"] == {
+        "over": "sysfs", "hz": 50, "chip": 0, "channel": 0,
+        "backward_us": 1000, "neutral_us": 1500, "forward_us": 2000,
+        "arm_s": 2.5, "reverse": "direct", "brake_ms": 200,
+    }  # fmt: skip
+    sensors = {sensor.name: (sensor.measures, sensor.settings) for sensor in read().sensors}
+    assert sensors["bumper"] == ("bump", {"pins": [12, 13], "pull": "up"})
+    assert sensors["wheel"][1] == {"a": 16, "b": 20, "counts_per_turn": 20.0, "wheel_m": 0.21}
+
+
+def test_what_one_output_says_of_its_chip_holds_for_all() -> None:
+    """A PCA9685 has one output-enable line, so it is said once."""
+    outputs = {output.name: output for output in read().outputs}
+    assert outputs["steer"].settings["output_enable"] == 25
+    assert outputs["arm"].settings["output_enable"] == 25
+
+
+def test_guard_plan_crosses_as_json() -> None:
+    """What the guard reads is what the profile says."""
+    plan = read().guard_plan()
+    assert GuardPlan.from_json(plan.to_json()) == plan
+    assert (plan.enable_pin, plan.enable_hold_ms, plan.stop_pin) == (19, 50, 21)
+
+
+def test_layouts_name_every_number() -> None:
+    """Angles are in SI units, and the range is the whole one whatever the caps."""
+    profile = read()
+    assert profile.action_layout() == Layout(
+        (
+            Feature("steering", "1", -1.0, 1.0, Element("actuator", "steering")),
+            Feature("throttle", "1", -1.0, 1.0, Element("actuator", "throttle")),
+            Feature(
+                "arm", "1", -1.0, 1.0, Element("actuator", "arm"),
+                gain=math.radians(90.0), gain_unit="rad",
+            ),
+        )
+    )  # fmt: skip
+    assert [str(feature) for feature in profile.state_layout()] == [
+        "speed [m/s]",
+        "distance [m]",
+        "bump [1]",
+        "yaw_rate [rad/s]",
+        "acceleration_x [m/s²]",
+        "acceleration_y [m/s²]",
+        "battery [V]",
+        "temperature [°C]",
+        "steering/applied [1]",
+        "throttle/applied [1]",
+        "arm/applied [1]",
+    ]
+    assert profile.state_layout()["speed"].element == Element("sensor", "wheel")
+
+
+def test_a_speed_may_come_from_the_profile() -> None:
+    """Without an encoder the state has a speed where the profile says how fast an action is."""
+    car = shipped_profiles()["car"].read_text()
+    assert "speed" not in load_profile(shipped_profiles()["car"]).state_layout()
+    told = read(changed("propels = true", 'propels = true\nunit = "m/s"\ngain = 1.5', car))
+    assert told.state_layout()["speed"].element == Element("actuator", "throttle")
+    assert told.action_layout()["throttle"].gain_unit == "m/s"
+
+
+def test_layout_of_a_tendon_has_one_side() -> None:
+    """A tendon cannot push."""
+    finger = load_profile(shipped_profiles()["finger"])
+    assert set(finger.action_layout().low) == {0.0}
+    assert set(finger.state_layout().low) == {0.0}
+
+
+def test_a_robot_may_have_next_to_nothing() -> None:
+    """No camera, no sensor, no limits: the defaults are safe, and nothing is asked for."""
+    text = EVERYTHING.split("[action.steering]", maxsplit=1)[0]
+    profile = read(
+        text + '[action.turn]\n[output.turn]\ndriver = "hbridge"\nforward = 4\nbackward = 5\n'
+        "mix = { turn = 1.0 }\n"
+    )
+    assert profile.camera is profile.image_size is profile.enable is profile.stop_pin is None
+    assert profile.limits == LimitPlan()
+    assert profile.arming == "person"
+    assert profile.guard_plan().enable_pin is None
+    assert profile.reset_routine() == ()
+
+
+def test_a_pin_may_be_left_unconnected_in_so_many_words() -> None:
+    """-1 is the same as no key."""
+    without, with_none = (read(changed("enable = 26\n", new)) for new in ("", "enable = -1\n"))
+    assert without == with_none
+
+
+@pytest.mark.parametrize("ending", ["\r\n", "\n"])
+def test_lines_may_end_as_on_any_system(ending: str) -> None:
+    """A profile that was edited on Windows is the same profile."""
+    assert read(EVERYTHING.replace("\n", ending)) == read()

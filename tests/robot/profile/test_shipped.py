@@ -1,0 +1,143 @@
+"""The profiles that come with the package, and what they make of a command."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.guard.mix import output_values
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile import load_profile, shipped_profiles
+from tests.robot.profile.texts import HOVERCRAFT, changed, read
+
+NAMES = ("boat", "boat-twin", "car", "car-esc", "cat", "finger", "tank", "truck")
+PLANS = {name: load_profile(path).guard_plan() for name, path in shipped_profiles().items()}
+SIDE = st.floats(-1.0, 1.0)
+
+
+def values(plan: GuardPlan, actions: Sequence[float]) -> dict[str, float]:
+    """The value of each output by name."""
+    names = [output.name for output in plan.outputs]
+    return dict(zip(names, output_values(plan, actions), strict=True))
+
+
+def test_every_profile_is_there() -> None:
+    """Each body of the field has one, under its own name."""
+    assert tuple(shipped_profiles()) == NAMES
+    assert {name: plan.name for name, plan in PLANS.items()} == {name: name for name in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_comment_belongs_to_the_wiring(name: str) -> None:
+    """A person who wires the robot finds a comment on the top and one at the first output."""
+    text = shipped_profiles()[name].read_text()
+    assert text.startswith("# ")
+    assert len(re.findall(r"# .", text)) >= 5
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("cat", "finger")])
+def test_vehicles_take_the_same_command(name: str) -> None:
+    """Steering first, then throttle, as everywhere in the field."""
+    assert [action.name for action in PLANS[name].actions][:2] == ["steering", "throttle"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_drives_at_rest(name: str) -> None:
+    """At rest every motor is at 0, and a vehicle looks straight ahead."""
+    plan = PLANS[name]
+    at_rest = values(plan, [action.rest for action in plan.actions])
+    propelling = {action.name for action in plan.actions if action.propels}
+    for output in plan.outputs:
+        if propelling & output.mix.keys() or output.part in ("steering", "rudder"):
+            assert at_rest[output.name] == 0.0
+
+
+@given(steering=SIDE, throttle=SIDE)
+def test_tracks_and_twin_propellers_mix(steering: float, throttle: float) -> None:
+    """It is left = clip(throttle + steering), right = clip(throttle - steering)."""
+    expected = {
+        "left": max(-1.0, min(1.0, throttle + steering)),
+        "right": max(-1.0, min(1.0, throttle - steering)),
+    }
+    assert values(PLANS["tank"], [steering, throttle]) == pytest.approx(expected, abs=1e-12)
+    assert values(PLANS["boat-twin"], [steering, throttle]) == pytest.approx(expected, abs=1e-12)
+
+
+@given(steering=SIDE, throttle=SIDE)
+def test_cars_and_boats_keep_the_sign(steering: float, throttle: float) -> None:
+    """-1 is left and backward, 1 right and forward, on every output."""
+    for name, drive, steer in (
+        ("car", "drive", "steer"),
+        ("car-esc", "drive", "steer"),
+        ("truck", "drive", "steer"),
+        ("boat", "propeller", "rudder"),
+    ):
+        plan = PLANS[name]
+        rest = [action.rest for action in plan.actions[2:]]
+        outputs = values(plan, [steering, throttle, *rest])
+        assert outputs[drive] * throttle >= 0.0
+        assert outputs[steer] * steering >= 0.0
+        assert abs(outputs[drive]) <= abs(throttle)
+
+
+def test_full_power_of_2017() -> None:
+    """60 % on the drive and 40 % on the steering."""
+    assert values(PLANS["car"], [1.0, 1.0]) == {"drive": 0.6, "steer": 0.4}
+    assert values(PLANS["car"], [-1.0, -1.0]) == {"drive": -0.6, "steer": -0.4}
+
+
+def test_a_cat_stands_as_in_2017() -> None:
+    """55, 92 and 55 degrees, four times."""
+    degrees = [85.0 + action.gain * action.rest for action in PLANS["cat"].actions]
+    assert degrees == pytest.approx([55.0, 92.0, 55.0] * 4, abs=0.01)
+    assert [output.settings["channel"] for output in PLANS["cat"].outputs] == list(range(12))
+
+
+@given(pull=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
+def test_tendons_pull_one_to_one(pull: list[float]) -> None:
+    """Slack is one end of a servo's travel, taut the other one, and no tendon moves another."""
+    outputs = values(PLANS["finger"], pull)
+    assert list(outputs) == ["EIP", "DI", "PI", "FDP", "FDS", "LUM", "EDC"]
+    assert list(outputs.values()) == pytest.approx([2.0 * p - 1.0 for p in pull])
+
+
+def test_a_vehicle_that_the_code_has_never_seen() -> None:
+    """A hovercraft is one TOML and no code."""
+    profile = read(HOVERCRAFT)
+    plan = profile.guard_plan()
+    assert profile.action_layout().names == ("steering", "throttle", "lift")
+    assert list(profile.action_layout().low) == [-1.0, -1.0, 0.0]
+    assert values(plan, [-0.5, 0.25, 1.0]) == {
+        "fan": 0.25,
+        "lift_fan": 1.0,
+        "left_rudder": -0.5,
+        "right_rudder": -0.4,
+    }
+    assert set(values(plan, [0.0, 0.0, 0.0]).values()) == {0.0}
+
+
+def test_swapped_pins_are_another_plan() -> None:
+    """Which pin drives is what the profile says, and nothing else."""
+    text = shipped_profiles()["car"].read_text()
+    swapped = changed("forward = 22", "forward = 27", text)
+    with pytest.raises(ProfileError, match="GPIO27 is used twice"):
+        read(swapped)
+    swapped = changed("backward = 27", "backward = 22", swapped)
+    drive, before = read(swapped).guard_plan().outputs[0], PLANS["car"].outputs[0]
+    assert (drive.settings["forward"], drive.settings["backward"]) == (27, 22)
+    assert (before.settings["forward"], before.settings["backward"]) == (22, 27)
+
+
+def test_commented_sensors_of_the_car_work() -> None:
+    """Who takes the # away gets the sensors that the comment promises."""
+    text = shipped_profiles()["car"].read_text()
+    lines = text.split("\n")
+    begin = lines.index("# [sensor.wheel]")
+    sensors = [line.removeprefix("# ") for line in lines[begin : lines.index("[reward]")]]
+    whole = "\n".join([*lines[:begin], *sensors, *lines[lines.index("[reward]") :]])
+    assert [sensor.measures for sensor in read(whole).sensors] == ["speed", "bump"]

@@ -1,0 +1,132 @@
+"""Writing a first profile, and changing one."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import OutputError, ProfileError, UnknownName
+from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
+from shapechanger.robot.profile.edit import rewrite
+from tests.robot.profile.texts import EVERYTHING
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Path:
+    """The file of a profile with everything."""
+    path = tmp_path / "rover.toml"
+    path.write_text(EVERYTHING)
+    return path
+
+
+@pytest.mark.parametrize("kind", shipped_profiles())
+def test_a_first_profile_differs_by_its_name(kind: str, tmp_path: Path) -> None:
+    """Everything else is as it was shipped, comments too."""
+    path = write_profile(kind, tmp_path / "new" / "my.toml", 'Ann\'s "7" \\ ü')
+    profile = load_profile(path)
+    assert profile.name == 'Ann\'s "7" \\ ü'
+    shipped = shipped_profiles()[kind].read_text().split("\n")
+    differing = [
+        line
+        for line, before in zip(path.read_text().split("\n"), shipped, strict=True)
+        if line != before
+    ]
+    assert len(differing) == 1
+
+
+def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
+    """Refused in words: a file that exists, a folder that cannot be, a name that is none."""
+    path = tmp_path / "car.toml"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match=r"Cannot write .*: it exists"):
+        write_profile("car", path, "car")
+    assert path.read_text() == "mine"
+    with pytest.raises(OutputError, match=r"Cannot write .*: it exists|Not a directory"):
+        write_profile("car", path / "car.toml", "car")
+    with pytest.raises(OutputError, match=r"Cannot write .*: File name too long"):
+        write_profile("car", tmp_path / ("x" * 300), "car")
+    with pytest.raises(UnknownName, match=r"No kind of robot matches 'kar'. Did you mean .car.\?"):
+        write_profile("kar", tmp_path / "kar.toml", "car")
+    with pytest.raises(ProfileError, match=r"name of .robot. must be a text"):
+        write_profile("car", tmp_path / "new.toml", "")
+    assert not (tmp_path / "new.toml").exists()
+
+
+def test_changes_keep_comments(rover: Path) -> None:
+    """What calibration writes is all that changes."""
+    rover.chmod(0o640)
+    profile = rewrite(
+        rover,
+        {
+            "output.steer.centre_us": 1480,
+            "output.steer.left_us": 1900,
+            "action.throttle.slew_per_s": 3.5,
+            "robot.calibrated": datetime.date(2026, 11, 21),
+            "sensor.bumper.pins": [12, 7],
+            "output.drive.mix": {"throttle": 0.9},
+        },
+    )
+    assert profile == load_profile(rover)
+    before, after = EVERYTHING.split("\n"), rover.read_text().split("\n")
+    assert set(after) - set(before) == {
+        "centre_us = 1480",
+        "left_us = 1900",
+        "slew_per_s = 3.5",
+        "calibrated = 2026-11-21",
+        "pins = [12, 7]",
+        "mix = {throttle = 0.9}",
+    }
+    assert after[0] == before[0]
+    assert stat.S_IMODE(rover.stat().st_mode) == 0o640
+    assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
+
+
+def test_a_comment_behind_a_value_stays(tmp_path: Path) -> None:
+    """A new number stands before the comment that explains it."""
+    path = write_profile("car", tmp_path / "car.toml", "car")
+    rewrite(path, {"action.throttle.slew_per_s": 2.0, "output.drive.mix": {"throttle": 0.5}})
+    text = path.read_text()
+    assert "slew_per_s = 2.0                  # A quarter of a second" in text
+    assert "# Full throttle is 60 %" in text
+
+
+def test_a_change_through_a_link_changes_what_it_leads_to(rover: Path, tmp_path: Path) -> None:
+    """The link stays a link."""
+    link = tmp_path / "link.toml"
+    link.symlink_to(rover)
+    assert rewrite(link, {"robot.name": "new"}).name == "new"
+    assert link.is_symlink()
+    assert load_profile(rover).name == "new"
+
+
+def test_a_change_that_breaks_the_profile_is_refused(rover: Path) -> None:
+    """The file stays as it was, and nothing else is left in the folder."""
+    with pytest.raises(ProfileError, match="must lie between left_us and right_us"):
+        rewrite(rover, {"output.steer.centre_us": 2400})
+    with pytest.raises(UnknownName, match=r"No table of rover.toml matches 'stear'. Did you mean"):
+        rewrite(rover, {"output.stear.centre_us": 1500})
+    with pytest.raises(UnknownName, match=r"No table of rover.toml matches 'name'"):
+        rewrite(rover, {"robot.name.x": 1500})
+    with pytest.raises(ProfileError, match=r"\[robot\] has no key 'nam'"):
+        rewrite(rover, {"robot.nam": "x"})
+    assert rover.read_text() == EVERYTHING
+    assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
+
+
+@pytest.mark.parametrize("step", ["fsync", "copymode", "replace"])
+def test_a_full_disk_loses_nothing(step: str, rover: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever fails, the old file is there, whole, and alone."""
+
+    def fails(*_: object) -> None:
+        raise OSError(28, os.strerror(28))
+
+    where = {"fsync": "os.fsync", "copymode": "shutil.copymode", "replace": "pathlib.Path.replace"}
+    monkeypatch.setattr(where[step], fails)
+    with pytest.raises(OutputError, match=r"Cannot write .*rover\.toml: No space left on device"):
+        rewrite(rover, {"robot.name": "new"})
+    assert rover.read_text() == EVERYTHING
+    assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]

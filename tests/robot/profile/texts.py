@@ -1,0 +1,190 @@
+"""A profile with one of everything, to break in one place at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shapechanger.robot.profile import Profile, read_profile
+
+__all__ = ["EVERYTHING", "HOVERCRAFT", "PATH", "changed", "read"]
+
+PATH = Path("rover.toml")
+
+EVERYTHING = """\
+# A rover with one of everything.
+[robot]
+name = "rover"
+body = "car"
+control_hz = 25
+calibrated = 2026-11-03
+
+[action.steering]
+levels = "three"
+
+[action.throttle]
+low = -0.5
+propels = true
+slew_per_s = 2
+
+[action.arm]
+rest = 0.25
+unit = "deg"
+gain = 90
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = "BOARD15"
+backward = "GPIO27"
+enable = 26
+mix = { throttle = 1 }
+
+[output.steer]
+driver = "servo"
+part = "steering"
+over = "pca9685"
+channel = 0
+left_us = 2000
+right_us = 1000
+mix = { steering = 0.5 }
+
+[output.arm]
+driver = "servo"
+over = "pca9685"
+channel = 1
+output_enable = 25
+mix = { arm = 1.0 }
+
+[output.pump]
+driver = "esc"
+over = "sysfs"
+channel = 0
+mix.throttle = 0.5
+
+[output.brush]
+driver = "phase_enable"
+phase = 5
+enable = 6
+start = 0.1
+mix = { throttle = 1.0 }
+
+[sensor.wheel]
+driver = "encoder"
+a = 16
+b = 20
+counts_per_turn = 20
+wheel_m = 0.21
+
+[sensor.bumper]
+driver = "switch"
+pins = [
+    12,  # Left.
+    "GPIO13",
+]
+
+[sensor.front]
+driver = "hcsr04"
+trigger = 23
+echo = 24
+
+[sensor.imu]
+driver = "mpu6050"
+
+[sensor.pack]
+driver = "ina219"
+address = 0x41
+
+[sensor.chip]
+driver = "cpu_temperature"
+
+[camera]
+driver = "v4l2"
+size = [128, 128]
+flip = true
+
+[limits]
+deadline_ms = 200
+stop_distance_m = 0.3
+low_battery_v = 6.6
+high_temperature_c = 80
+arming = "anyone"
+
+[stop]
+then = "release"
+
+[reward]
+velocity = 2
+collision_ends_episode = false
+
+[[reset]]
+values = { throttle = -0.4 }
+seconds = 1
+
+[[reset]]
+seconds = 0.5
+[reset.values]
+arm = 0.5
+
+[enable]
+pin = 19
+hold_ms = 50
+
+[emergency_button]
+pin = 21
+"""
+
+HOVERCRAFT = """\
+[robot]
+name = "skimmer"
+body = "hovercraft"
+
+[action.steering]
+
+[action.throttle]
+low = 0.0
+propels = true
+
+[action.lift]
+one_sided = true
+
+[output.fan]
+driver = "esc"
+part = "propeller"
+over = "lgpio"
+pin = 18
+reverse = "none"
+mix = { throttle = 1.0 }
+
+[output.lift_fan]
+driver = "hbridge"
+forward = 5
+backward = 6
+mix = { lift = 1.0 }
+
+[output.left_rudder]
+driver = "servo"
+part = "rudder"
+over = "lgpio"
+pin = 12
+mix = { steering = 1.0 }
+
+[output.right_rudder]
+driver = "servo"
+part = "rudder"
+over = "lgpio"
+pin = 13
+mix = { steering = 0.8 }
+"""
+
+
+def changed(old: str, new: str, text: str = EVERYTHING) -> str:
+    """A text with its only `old` replaced; at the end where `old` is empty."""
+    if not old:
+        return text + new
+    assert text.count(old) == 1, old
+    return text.replace(old, new)
+
+
+def read(text: str = EVERYTHING) -> Profile:
+    """The profile that a text says."""
+    return read_profile(text, PATH)

@@ -1,0 +1,149 @@
+"""What the doctor finds on a robot, before it drives."""
+
+import socket
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+from shapechanger.robot.setup.doctor import UNIT, Finding, examine_robot
+
+_CAMERA = CameraPlan("pattern")
+_MOTOR = OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}, settings={"forward": 22})
+_SERVO = OutputPlan(
+    "steering",
+    "servo",
+    "steering",
+    settings={"over": "pca9685", "bus": 1, "output_enable": -1},
+)
+_CAR = GuardPlan("car", (ActionPlan("throttle", propels=True),), (_MOTOR,))
+
+
+class _Camera:
+    """Gives one picture, an error, or nothing at all."""
+
+    def __init__(self, gives: Frame | RobotError | None) -> None:
+        self._gives = gives
+        self._closed = threading.Event()
+
+    def read(self) -> Frame:
+        if self._gives is None:
+            self._closed.wait()
+            raise RobotError("The camera was closed.")
+        if isinstance(self._gives, RobotError):
+            raise self._gives
+        return self._gives
+
+    def close(self) -> None:
+        self._closed.set()
+
+
+def _found(
+    root: Path,
+    guard: GuardPlan = _CAR,
+    camera: CameraPlan | None = None,
+    gives: Frame | RobotError | None = None,
+) -> dict[str, Finding]:
+    findings = examine_robot(guard, camera, 0, root, lambda _: _Camera(gives))
+    return {finding.check: finding for finding in findings}
+
+
+def _write(root: Path, name: str, text: str) -> None:
+    path = root / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+@pytest.mark.parametrize(
+    ("line", "level"),
+    [
+        ("dtparam=strict_gpiod", "good"),
+        ("dtparam=i2c_arm=on,strict_gpiod=on  # Pins of the dead go low.", "good"),
+        ("#dtparam=strict_gpiod", "missing"),
+        ("dtparam=strict_gpiod=off", "missing"),
+        ("dtparam=i2c_arm=on", "missing"),
+    ],
+)
+def test_strict_gpiod_is_looked_for_in_the_boot_configuration(
+    tmp_path: Path, line: str, level: str
+) -> None:
+    """Without it the kernel keeps a pin high when the process that set it dies."""
+    _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
+    assert _found(tmp_path)["strict_gpiod"].level == level
+
+
+def test_away_from_a_pi_the_doctor_says_that_it_cannot_tell(tmp_path: Path) -> None:
+    """A workstation has no boot configuration, and that is no mistake."""
+    found = _found(tmp_path)
+    assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
+    assert "--twin" in found["computer"].sentence
+
+
+@pytest.mark.parametrize(
+    ("unit", "level", "says"),
+    [
+        ("Restart=always\nExecStopPost=/x/shapechanger robot safe-pins car.toml\n", "good", ""),
+        (
+            "Restart=on-failure\nExecStopPost=shapechanger robot safe-pins car.toml\n",
+            "missing",
+            "R",
+        ),
+        ("Restart=always\n", "missing", "ExecStopPost"),
+    ],
+)
+def test_the_systemd_unit_must_restart_and_make_safe(
+    tmp_path: Path, unit: str, level: str, says: str
+) -> None:
+    """A unit that only starts the robot leaves its pins to chance after a crash."""
+    _write(tmp_path, f"etc/systemd/system/{UNIT}", f"[Service]\n{unit}")
+    finding = _found(tmp_path)["systemd"]
+    assert finding.level == level
+    assert says in finding.sentence
+
+
+def test_what_hardware_would_make_safe_is_asked_for(tmp_path: Path) -> None:
+    """A servo board without OE and motors without a one-shot outlive their processes."""
+    found = _found(tmp_path, replace(_CAR, outputs=(_SERVO,)))
+    assert {found["enable line"].level, found["output enable"].level} == {"missing"}
+    assert _found(tmp_path, replace(_CAR, enable_pin=18))["enable line"].level == "good"
+
+
+def test_devices_are_looked_for_where_outputs_need_them(tmp_path: Path) -> None:
+    """A car on an H-bridge needs the pins, and no bus."""
+    guard = replace(_CAR, outputs=(_MOTOR, _SERVO))
+    _write(tmp_path, "dev/gpiochip0", "")
+    sentences = {
+        f.sentence: f.level for f in examine_robot(guard, None, 0, tmp_path) if f.check == "devices"
+    }
+    assert sorted(sentences.values()) == ["good", "missing"]
+    assert any("raspi-config" in sentence and "i2c-1" in sentence for sentence in sentences)
+
+
+def test_a_camera_shows_a_picture_or_says_why_not(tmp_path: Path) -> None:
+    """Blind means stop, so better to know before."""
+    frame = Frame(b"\xff\xd8", 0)
+    assert _found(tmp_path, camera=_CAMERA, gives=frame)["camera"].level == "good"
+    broken = _found(tmp_path, camera=_CAMERA, gives=RobotError("It burns."))["camera"]
+    assert (broken.level, broken.sentence) == ("missing", "pattern: It burns.")
+
+
+def test_a_camera_that_hangs_does_not_hang_the_doctor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cameras that stop feeding are common (picamera2#1004)."""
+    monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", 0.01)
+    assert "no picture" in _found(tmp_path, camera=_CAMERA)["camera"].sentence
+
+
+def test_a_port_in_use_is_named(tmp_path: Path) -> None:
+    """Two daemons on one port is a common slip."""
+    with socket.socket() as taken:
+        taken.bind(("", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        ports = [f for f in examine_robot(_CAR, None, port, tmp_path) if f.check == "port"]
+    assert [f.level for f in ports] == ["missing"]

@@ -1,0 +1,42 @@
+"""What the guard loads of the twin."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import shapechanger
+from shapechanger.twin.start import start_board
+from tests.twin.robots import CAR
+
+_BARE = """
+import sys, types
+package = types.ModuleType("shapechanger")
+package.__path__ = [sys.argv[1]]
+sys.modules["shapechanger"] = package
+from shapechanger.robot.hardware import connect
+hardware = connect("shapechanger.twin.hardware:connect", sys.argv[2])
+hardware.pin_factory()
+hardware.i2c(1)
+hardware.servo_pins()
+hardware.close()
+print(*sorted({name.partition(".")[0] for name in sys.modules}))
+"""
+
+
+def test_the_guard_loads_only_gpiozero(tmp_path: Path) -> None:
+    """Under the guard's bare package, in isolated mode, the twin needs nothing heavy."""
+    source = str(Path(shapechanger.__file__).parent)
+    with start_board(CAR, "real", tmp_path) as board:
+        command = [sys.executable, "-I", "-c", _BARE, source, board.socket_path]
+        run = subprocess.run(command, check=True, capture_output=True, text=True)
+    theirs = set(run.stdout.split()) - set(sys.stdlib_module_names)
+    assert {name for name in theirs if not name.startswith("_")} <= {
+        "colorzero",
+        "gpiozero",
+        "shapechanger",
+        "pkg_resources",
+        "importlib_resources",
+        "importlib_metadata",
+    }

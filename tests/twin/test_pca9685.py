@@ -1,0 +1,120 @@
+"""The PCA9685 by its registers."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+from gpiozero import DigitalOutputDevice
+
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.twin.chips.pca9685 import Pca9685
+from shapechanger.twin.hardware import connect
+from shapechanger.twin.ledger import read_ledger
+from shapechanger.twin.levels import Channel
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.start import start_board
+from shapechanger.twin.wiring import Wiring
+from tests.twin.robots import ACTIONS, process, servo
+
+_ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 3, "output_enable": 24}
+_SERVO_CAR = GuardPlan("car", ACTIONS, (servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),))
+
+_AWAKE_50_HZ = """
+import sys
+from shapechanger.twin.hardware import connect
+from gpiozero import DigitalOutputDevice
+hardware = connect(sys.argv[1])
+enable = DigitalOutputDevice(24, initial_value=False, pin_factory=hardware.pin_factory())
+bus = hardware.i2c(1)
+bus.write_byte_data(0x40, 0xFE, 121)
+bus.write_byte_data(0x40, 0x00, 0x21)
+bus.write_i2c_block_data(0x40, 0x06 + 4 * 3, [0, 0, 307 & 0xFF, 307 >> 8])
+print("pulses", flush=True)
+sys.stdin.read()
+"""
+
+
+def _awake(chip: Pca9685) -> None:
+    chip.write(0xFE, [121])
+    chip.write(0x00, [0x21])
+
+
+def test_pulses_are_decoded_from_the_registers() -> None:
+    """122 steps of the oscillator a count give 50 Hz, and 307 of 4096 counts 1.5 ms."""
+    chip = Pca9685()
+    assert all(pulse.us == 0.0 for pulse in chip.channels)
+    _awake(chip)
+    chip.write(0x06, [0, 0, 307 & 0xFF, 307 >> 8])
+    assert chip.channels[0].us == pytest.approx(307 * 122 / 25.0)
+    assert chip.channels[0].hz == pytest.approx(50.03, abs=0.01)
+    assert chip.read(0x06, 4) == [0, 0, 51, 1]
+
+
+def test_bits_for_full_off_and_full_on() -> None:
+    """Bit 4 of the last register is off, whatever the others say; so for all channels at once."""
+    chip = Pca9685()
+    _awake(chip)
+    chip.write(0xFA, [0, 0x10, 0, 0])
+    assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.channels)
+    chip.write(0xFD, [0x10])
+    assert all(pulse.us == 0.0 for pulse in chip.channels)
+
+
+def test_the_frequency_is_set_while_it_sleeps() -> None:
+    """The chip ignores a new frequency while it is awake."""
+    chip = Pca9685()
+    _awake(chip)
+    chip.write(0xFE, [3])
+    assert chip.read(0xFE, 1) == [121]
+
+
+def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
+    """After a sleep the channels wait for RESTART, as the data sheet says."""
+    chip = Pca9685()
+    _awake(chip)
+    chip.write(0x06, [0, 0, 51, 1])
+    chip.write(0x00, [0x31])
+    assert chip.channels[0].us == 0.0
+    chip.write(0x00, [0x21])
+    assert chip.channels[0].us == 0.0
+    assert chip.read(0x00, 1) == [0xA1]
+    chip.write(0x00, [0xA1])
+    assert chip.channels[0].us > 0.0
+    assert chip.read(0x00, 1) == [0x21]
+
+
+def test_without_auto_increment_a_block_lands_in_one_register() -> None:
+    """A driver that forgets the bit sees its servo not move."""
+    chip = Pca9685()
+    chip.write(0x00, [0x01])
+    chip.write(0x06, [0, 0, 51, 1])
+    assert chip.read(0x06, 4) == [1, 1, 1, 1]
+    assert chip.channels[0].us == 0.0
+
+
+def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:
+    """A PCA9685 keeps pulsing for ever; its output enable, with a pull-up, ends that."""
+    with (
+        start_board(_SERVO_CAR, "real", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        with process(_AWAKE_50_HZ, board.socket_path) as robot:
+            robot.send_signal(signal.SIGKILL)
+        wiring, levels = Wiring(_SERVO_CAR), operator.levels()
+        assert levels.channels[Channel(1, 0x40, 3)].us == pytest.approx(1498.16)
+        assert wiring.read(levels, 0)["steer"].value == pytest.approx(0.0, abs=0.01)
+        lines = [line for line in read_ledger(board.ledger_path) if line.channel == 3]
+        assert [(line.us, line.hz) for line in lines] == [(1498.16, 50.029)]
+
+        hardware = connect(board.socket_path)
+        enable = DigitalOutputDevice(24, pin_factory=hardware.pin_factory())
+        enable.on()
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        with pytest.raises(OSError, match="Remote I/O"):
+            hardware.i2c(1).read_byte_data(0x41, 0)
+        operator.break_chip(1, 0x40)
+        with pytest.raises(OSError, match="Remote I/O"):
+            hardware.i2c(1).write_byte_data(0x40, 0, 0)
+        hardware.close()

@@ -1,0 +1,141 @@
+"""gpiozero's own devices on the twin's pins, from processes that live and die."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+from gpiozero import DigitalOutputDevice, Motor, PWMOutputDevice
+
+from shapechanger.errors import RobotError
+from shapechanger.twin.hardware import connect
+from shapechanger.twin.ledger import read_ledger
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.start import start_board
+from tests.twin.robots import CAR, process
+
+_MOTOR = """
+import sys
+from gpiozero import Motor, DigitalOutputDevice
+from shapechanger.twin.hardware import connect
+hardware = connect(sys.argv[1])
+factory = hardware.pin_factory()
+lamp = DigitalOutputDevice(25, initial_value=True, pin_factory=factory)
+motor = Motor(22, 27, pin_factory=factory)
+for device in (motor.forward_device, motor.backward_device):
+    device.frequency = 50
+motor.value = float(sys.argv[2])
+print("runs", flush=True)
+sys.stdin.read()
+hardware.close()
+"""
+
+
+def test_a_motor_of_another_process_turns(tmp_path: Path) -> None:
+    """The board sees what gpiozero does in another process, with its time and its process."""
+    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "-0.4") as robot:
+            assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.4}
+        last = [line for line in read_ledger(board.ledger_path) if line.pin == 27 and line.duty]
+        assert [(line.duty, line.hz, line.pid) for line in last[:1]] == [(0.4, 50, robot.pid)]
+
+
+@pytest.mark.parametrize(("value", "possible"), [("0.4", {0.0, 1.0}), ("1", {1.0}), ("0", {0.0})])
+def test_killed_pins_keep_their_level(tmp_path: Path, value: str, possible: set[float]) -> None:
+    """The kernel keeps the level of a pin whose process dies, and software PWM stops anywhere."""
+    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, value) as robot:
+            robot.send_signal(signal.SIGKILL)
+            robot.wait()
+            levels = operator.levels()
+        assert levels.duties[25] == 1.0
+        assert levels.duties[22] in possible
+        assert levels.duties[27] == 0.0
+        ledger = read_ledger(board.ledger_path)
+        gone = [line.kind for line in ledger].index("gone")
+        assert ledger[gone].pid == robot.pid
+        after = [(line.kind, line.pin, line.hz) for line in ledger[gone + 1 :]]
+        assert after == [("pin", 22, 0), ("pin", 25, 0), ("pin", 27, 0)]
+
+
+def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
+    """A pin at 40 % is high in 40 of 100 deaths: full power for ever."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        high = 0
+        for _ in range(200):
+            hardware = connect(board.socket_path)
+            device = PWMOutputDevice(22, pin_factory=hardware.pin_factory())
+            device.value = 0.4
+            hardware._link._socket.close()  # As a death does, without a goodbye.
+            high += operator.levels().duties[22] == 1.0
+            device.close()
+        assert 50 < high < 110
+
+
+def test_a_polite_end_leaves_outputs_low(tmp_path: Path) -> None:
+    """Who closes its pins leaves low outputs, and nobody is reported dead."""
+    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "0.7") as robot:
+            robot.communicate("")
+        assert set(operator.levels().duties.values()) == {0.0}
+        assert "gone" not in {line.kind for line in read_ledger(board.ledger_path)}
+
+
+@pytest.mark.parametrize(("asked", "done"), [(0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)])
+def test_pwm_has_whole_percent(tmp_path: Path, asked: float, done: float) -> None:
+    """As gpiozero over lgpio: the duty is cut to whole percent, the frequency to whole hertz."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        device = PWMOutputDevice(18, frequency=50.9, pin_factory=hardware.pin_factory())
+        device.value = asked
+        assert operator.levels().duties[18] == done
+        assert device.frequency == 50
+        assert device.value == done
+        hardware.close()
+
+
+def test_a_pin_has_one_owner(tmp_path: Path) -> None:
+    """A pin that a living process holds is busy, and free when that has died."""
+    with start_board(CAR, "real", tmp_path) as board:
+        second = connect(board.socket_path)
+        with (
+            process(_MOTOR, board.socket_path, "0.5"),
+            pytest.raises(RobotError, match="GPIO22 is busy"),
+        ):
+            second.pin_factory().pin(22)
+        taken_over = DigitalOutputDevice(22, pin_factory=second.pin_factory())
+        taken_over.on()
+        second.close()
+
+
+def test_opening_a_pin_lets_it_go(tmp_path: Path) -> None:
+    """A new process first makes a pin an input, so that a stuck one falls to its pull-down."""
+    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "1"):
+            pass
+        assert operator.levels().duties[22] == 1.0
+        hardware = connect(board.socket_path)
+        Motor(22, 27, pin_factory=hardware.pin_factory())
+        assert operator.levels().duties[22] == 0.0
+        released = [line for line in read_ledger(board.ledger_path) if line.released]
+        assert [line.pin for line in released] == [22, 27]
+        hardware.close()
+
+
+def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
+    """Pulses have whole microseconds; without the process there is a level and no pulse."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        hardware.servo_pins().pulse(12, 1503, 50)
+        assert operator.levels().pulses[12] == (1503, 50)
+        hardware._link._socket.close()
+        levels = operator.levels()
+        assert 12 not in levels.pulses
+        assert levels.duties[12] in (0.0, 1.0)
+
+
+def test_no_board_is_said_in_words(tmp_path: Path) -> None:
+    """Whoever names the wrong socket is told so."""
+    with pytest.raises(RobotError, match="No twin's board answers"):
+        connect(str(tmp_path / "nothing"))
