@@ -137,6 +137,21 @@ def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
     env.close()
 
 
+def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
+    """The robot tells of it even when it is over; the bumper's own word is not counted again."""
+    robot = run(reward={"collision_ends_episode": 0.0})
+    env = made(robot)
+    env.reset(seed=0)
+    env.step(REST)
+    robot.say(m.Event(name="bump", text="It bumped into something.", at_ns=0))
+    *_, info = env.step(REST)
+    assert info["reward_collision"] == -10.0
+    assert info["events"] == ("It bumped into something.",)
+    robot.stand_at(WALL)
+    assert env.step(REST)[4]["reward_collision"] == 0.0
+    env.close()
+
+
 def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
     """No term, and a source that says so; the number itself is named in info."""
     robot = run(absent=("speed", "stall"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 import time
@@ -29,7 +30,8 @@ def servo(
 ) -> OutputPlan:
     """A servo from 1000 to 2000 us."""
     settings = {"hz": 50, "left_us": 1000.0, "centre_us": 1500.0, "right_us": 2000.0}
-    return OutputPlan(name, "servo", part, mix, 0.0, {**settings, **over})
+    more = {"travel_deg_per_s": math.inf}
+    return OutputPlan(name, "servo", part, mix, 0.0, {**settings, **more, **over})
 
 
 def esc(

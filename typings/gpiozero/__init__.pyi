@@ -1,7 +1,8 @@
 # Written by hand: the part of gpiozero 2.0.1.post3 that Shapechanger uses, from its source.
 
 from collections.abc import Callable
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from gpiozero.pins import Factory, Pin
 
@@ -17,6 +18,13 @@ class Device:
     def close(self) -> None: ...
     @property
     def closed(self) -> bool: ...
+    def __enter__(self) -> Self: ...
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_value: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None: ...
 
 class GPIODevice(Device):
     @property

@@ -15,9 +15,9 @@ class Schedule:
     """Ticks of equal distance, in step with the robot.
 
     A step that ends a little late because this machine is slow is made up for by a shorter one, so
-    that the mean rate holds. Where the robot's observation came after the tick, the ticks go on from
-    there: two clocks are never equally fast, and the one who waits follows the other. A step that
-    misses its deadline is not made up for either, because two commands in quick succession are
+    that the mean rate holds. Where the robot's observation came after the tick, the ticks go on
+    from there: two clocks are never equally fast, and the one who waits follows the other. A step
+    that misses its deadline is not made up for either, because two commands in quick succession are
     worse than one that was late.
 
     Args:

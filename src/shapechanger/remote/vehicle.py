@@ -30,6 +30,8 @@ OnReset = Literal["operator", "routine"] | Callable[[int | None], object]
 _NS_PER_S: Final = 1e9
 # s. How long a robot that waits for us, and so never hurries, may take for a step.
 _LOCKSTEP_S: Final = 10.0
+# Name of the event of a bump.
+_BUMP: Final = "bump"
 _QUANTITIES: Final = ("speed", "collision", "stall")
 
 
@@ -64,7 +66,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
 
     ## Info
     `action_applied` and `stop_reason`: what the robot does, and why it is not what it was told;
-    `refused`: why it refused the command of this step; `latency`, s, see `latencies`; `frame_age`,
+    `refused`: why it refused the command of this step; `events`: what happened, in sentences;
+    `latency`, s, see `latencies`; `frame_age`,
     s, and `frame_repeated`; `deadline_missed`: steps of this episode that ended half a period late
     or more; `armed`, `emergency`; `absent`: numbers of the state that nothing measures now, which
     are the middle of their range.
@@ -204,6 +207,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._last, self._last_view = received, view
         self._collided = bool(self._collision(received.message)[0])
         self._missed, self._has_stepped = 0, False
+        robot.events()  # What happened before is not of this episode.
         return view.observation, self._info(received, view)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -231,10 +235,13 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             return self._cut(last, str(failure))
         late = self._schedule.advance(received.received_at)
         self._missed += late and self._pace == "realtime"
-        collided, terms = self._judge(last.message, received.message)
+        events = robot.events()
+        bumped = any(event.name == _BUMP for event in events)
+        collided, terms = self._judge(last.message, received.message, bumped)
         info = self._info(received, view)
         info |= terms
         info["reward_terms"] = terms
+        info["events"] = tuple(event.text for event in events)
         info["refused"] = robot.refusal(seq)
         info["latency"] = latencies(last.message, seq, sent_at, received)
         info["truncated_because"] = _interruption(received.message)
@@ -310,13 +317,20 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return found
 
     def _judge(
-        self, before: Observation, seen: Observation
+        self, before: Observation, seen: Observation, bumped: bool
     ) -> tuple[bool | None, dict[str, float]]:
-        """Whether it newly collided, and the terms of the reward."""
+        """Whether it newly collided, and the terms of the reward.
+
+        Args:
+            before: The observation before.
+            seen: The one after.
+            bumped: Whether there was a bump, which may be over by now.
+        """
         touches = self._collision(seen)[0]
         stall = self._senses.quantity(seen, "stall")
-        collided = None if touches is None else bool(touches) and not self._collided
-        self._collided = bool(touches)
+        hits = bool(touches) or bumped
+        collided = None if touches is None else hits and not self._collided
+        self._collided = hits
         dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
         speed = self._senses.quantity(seen, "speed")
         stalled = None if stall is None else bool(stall)
@@ -334,10 +348,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         """The end of an episode of which nothing more is known."""
         view = self._senses.view(last)
         info = self._info(last, view)
-        terms = dict.fromkeys(self._judge(last.message, last.message)[1], 0.0)
+        terms = dict.fromkeys(self._judge(last.message, last.message, False)[1], 0.0)
         info |= terms
         info |= {
             "reward_terms": terms,
+            "events": (),
             "refused": "",
             "latency": {},
             "truncated_because": because,

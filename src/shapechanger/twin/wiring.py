@@ -57,6 +57,9 @@ class Wiring:
         plan: What is wired.
         one_shot_ms: How long the enable line's one-shot holds after each edge of `plan.enable_pin`;
             None where none is fitted.
+
+    Raises:
+        RobotError: If the twin does not know what an output is wired to.
     """
 
     def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:
@@ -75,6 +78,7 @@ class Wiring:
             self._outputs[output.name] = _Output(output, max(-1.0, min(1.0, rest)), propels)
             if (pin := _output_enable(output)) >= 0:
                 self._high.add(pin)
+        self.read(Levels(), 0)  # Says in words what it does not know.
 
     @property
     def propelling(self) -> tuple[str, ...]:

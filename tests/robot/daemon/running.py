@@ -136,6 +136,12 @@ class Running:
         self.pictures += 1
         self.camera.put(Frame(picture(self.pictures), self.clock.now_ns()))
 
+    @staticmethod
+    def transport(client: Client) -> asyncio.Transport:
+        """What a client's bytes go through, to treat it badly."""
+        connection: Any = client.socket
+        return connection._conn.transport
+
     @property
     def url(self) -> str:
         """Where the page is."""
@@ -162,7 +168,8 @@ class Running:
 
     async def armed(self, client: Client) -> None:
         """Let a person take the command and arm."""
-        assert (await client.take()).mine
+        while not (await client.take()).mine:
+            pass
         await client.say(Arm())
         await until(lambda: self.guard.state.armed, "the guard is armed")
 
@@ -182,10 +189,16 @@ async def running(
     ready, tell = os.pipe()
     daemon = process.Daemon(plan, clock, guard.daemon_fd, ready_fd=tell)
     task = asyncio.create_task(daemon.run())
-    line = await asyncio.to_thread(os.read, ready, 4096)
-    os.close(ready)
-    if not line:
+    reading = asyncio.create_task(asyncio.to_thread(os.read, ready, 4096))
+    await asyncio.wait((reading, task), return_when=asyncio.FIRST_COMPLETED)
+    if not reading.done():  # The daemon could not begin.
+        os.close(tell)
+        await reading
+        os.close(ready)
+        guard.close()
         task.result()
+    line = await reading
+    os.close(ready)
     async with aiohttp.ClientSession() as session:
         port = json.loads(line)["port"]
         robot = Running(plan, clock, guard, camera, port, daemon, task, session)

@@ -89,11 +89,11 @@ class _World(RuleBasedStateMachine):
         follows: bool,
         is_good: bool,
     ) -> None:
-        """Any command; half of them number themselves as they should, and a quarter are good."""
+        """Any command; half number themselves as they should, half are good but for their age."""
         if follows:
             session, seq = max(self.newest[0], 0), self.newest[1] + 1
         if is_good:
-            age_ns, ttl_ms, frame_age_ns, values = 0, 1_000, 0, (values * 2)[:2]
+            ttl_ms, frame_age_ns, values = 1_000, 0, (values * 2)[:2]
         issued_ns = self.now_ns - age_ns
         frame_ns = None if frame_age_ns is None else self.now_ns - frame_age_ns
         order = Order("command", session, seq, issued_ns, ttl_ms, frame_ns, tuple(values))

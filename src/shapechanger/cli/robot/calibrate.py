@@ -1,15 +1,54 @@
-"""To come."""
+"""`shapechanger robot calibrate`: a person jogs each output, and the profile learns from it."""
 
 from __future__ import annotations
 
+import datetime
 from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+from shapechanger.errors import RobotError
 
 __all__ = ["Calibrate"]
 
 
 @dataclass(frozen=True)
 class Calibrate:
-    """To come."""
+    """Find the ends and the middle of servos, the direction of motors and the way of a wheel."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile; what is found is written into it, and its comments stay."""
+    twin: bool = False
+    """Practise on the twin: nothing real moves, and what is found is written all the same."""
+    cap: float = 0.4
+    """Largest value that a motor is jogged with, 0 to 1."""
 
     def run(self) -> None:
-        """To come."""
+        """Jog, ask, and write what was found, all at once."""
+        from shapechanger.cli.robot.jogging import Calibration
+        from shapechanger.robot.profile.edit import rewrite
+        from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
+        from shapechanger.teleop.terminal import Terminal
+
+        if not 0.0 < self.cap <= 1.0:
+            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
+        path = find_profile(self.profile)
+        if path in shipped_profiles().values():
+            raise RobotError(
+                f"{path.stem} comes with Shapechanger and is not changed: "
+                f"`shapechanger robot init {path.stem}` writes one of your own."
+            )
+        profile = load_profile(path)
+        console = plain_console()
+        with Terminal() as terminal:
+            changes = Calibration(profile, terminal, console, self.cap, twin=self.twin).run()
+        if not changes:
+            console.print("Nothing was found, and nothing was written.")
+            return
+        changes["robot.calibrated"] = datetime.date.today()
+        rewrite(path, changes)
+        for name, value in changes.items():
+            console.print(f"{name} = {value}")
+        console.print(f"wrote {path}")

@@ -132,6 +132,8 @@ class Connection:
         while (data := await self._read()) is not None:
             self._session.receive(data)
             await self._time.settle()
+            if self._session.outbox:
+                await asyncio.sleep(0)  # Whoever asks faster than it is answered waits.
 
     async def _answer(self) -> None:
         session = self._session

@@ -26,11 +26,18 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
         What failed, in words.
     """
     failures: list[str] = []
+    opened: list[tuple[str, OutputDriver]] = []
     for output in drives_first(plan).outputs:
         try:
-            open_output(output, hardware).close()
+            opened.append((output.name, open_output(output, hardware)))
         except Exception as error:  # Whatever it is, the next output must be safe too.
             failures.append(f"Output {output.name}: {str(error) or type(error).__name__}")
+    # Closed only when all are at rest: lgpio takes 100 ms for each handle that it closes.
+    for name, driver in opened:
+        try:
+            driver.close()
+        except Exception as error:  # As above.
+            failures.append(f"Output {name}: {str(error) or type(error).__name__}")
     if plan.enable_pin is not None:
         try:
             enable_device(plan.enable_pin, hardware).close()

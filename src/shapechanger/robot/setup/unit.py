@@ -1,4 +1,4 @@
-"""The systemd unit of a robot: starts it with the computer, and makes its pins safe when it ends."""
+"""The systemd unit of a robot: starts it with the computer, and leaves its pins safe."""
 
 from __future__ import annotations
 

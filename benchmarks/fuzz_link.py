@@ -1,0 +1,197 @@
+"""Throw mutated messages at a robot: no crash, no accepted command, and memory stays flat.
+
+`python benchmarks/fuzz_link.py --count 1000000` mutates messages of every kind (flipped bits, cuts,
+splices, lengths that lie, deep nesting, huge numbers) and hands them to a session of the daemon, as
+its WebSocket would. The robot has a driver, so an order can go through; the fuzzer's own client has
+no right to any but an emergency stop. With `--sockets N` it also sends N of them to a daemon that
+listens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from shapechanger.errors import LinkError
+from shapechanger.layout import Feature, Layout
+from shapechanger.link.messages import (
+    VERSION,
+    Acknowledge,
+    Arm,
+    Command,
+    Disarm,
+    EmergencyStop,
+    Hello,
+    Ping,
+    Release,
+    Take,
+    encode,
+)
+from shapechanger.robot.daemon.cockpit import Cockpit
+from shapechanger.robot.daemon.limits import MessageRate
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.session import Door, Session
+from shapechanger.robot.guard.wire import Order
+
+__all__ = ["fuzz", "main", "mutated", "resident_kb"]
+
+ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+PLAN = DaemonPlan(
+    robot="fuzzed", body="car", action_layout=ACTIONS.to_json(), state_layout=ACTIONS.to_json()
+)
+KEY = bytes(range(16))
+
+SEEDS = [
+    encode(message)
+    for message in (
+        Hello(version=VERSION, proof=bytes(32), name="fuzzer"),
+        Command(seq=1, answers=1, values=(0.25, 0.5)),
+        Command(seq=2**40, answers=3, values=(1.0,) * 12, ttl_ms=100, scale=0.5),
+        Acknowledge(seq=1),
+        Take(),
+        Release(),
+        Arm(emergency=1),
+        Disarm(),
+        EmergencyStop(reason="fuzz"),
+        Ping(token=3),
+    )
+]
+
+# Beginnings of msgpack values that say more than follows, and values at the edge of what is one.
+LIES = [
+    b"\xdd\xff\xff\xff\xff",
+    b"\xdf\xff\xff\xff\xff",
+    b"\xc6\xff\xff\xff\xff",
+    b"\xdb\xff\xff\xff\xff",
+    b"\xc9\xff\xff\xff\xff\x01",
+    b"\xcf\xff\xff\xff\xff\xff\xff\xff\xff",
+    b"\xd3\x80\x00\x00\x00\x00\x00\x00\x00",
+    b"\xcb\x7f\xf0\x00\x00\x00\x00\x00\x00",
+    b"\xcb\x7f\xf8\x00\x00\x00\x00\x00\x00",
+    b"\xc1",
+    b"\xc0",
+]
+
+
+def mutated(rng: random.Random) -> bytes:
+    """One message that was valid once, mostly."""
+    data = bytearray(rng.choice(SEEDS))
+    for _ in range(rng.choice((1, 1, 1, 2, 4, 8))):
+        where = rng.randrange(len(data) + 1)
+        match rng.randrange(7):
+            case 0 if data:
+                bit = rng.randrange(8 * len(data))
+                data[bit // 8] ^= 1 << bit % 8
+            case 1:
+                del data[where:]
+            case 2:
+                other = rng.choice(SEEDS)
+                data[where:] = other[rng.randrange(len(other)) :]
+            case 3:
+                data[where : where + rng.randrange(9)] = rng.choice(LIES)
+            case 4:
+                data[where:where] = rng.choice((b"\x91", b"\x81\xa1x")) * rng.randrange(2_000)
+            case 5:
+                data[where : where + rng.randrange(4)] = rng.randbytes(rng.randrange(16))
+            case _:
+                del data[where : where + rng.randrange(1, 4)]
+    return bytes(data)
+
+
+def resident_kb() -> int:
+    """Memory of this process that is in use, kB."""
+    status = Path("/proc/self/status").read_text()
+    return int(status.split("VmRSS:")[1].split()[0])
+
+
+def _drained(session: Session) -> None:
+    while session.outbox.take() is not None:
+        pass
+
+
+def fuzz(
+    count: int, seed: int = 0, progress: Callable[[int], None] = lambda _: None
+) -> collections.Counter[str]:
+    """Hand so many messages to sessions that are strangers, or known and not in command.
+
+    Returns:
+        How many ended the connection, how many were understood, and how many orders of each kind
+        the guard got.
+
+    Raises:
+        AssertionError: If a command came through, or a stranger was let in.
+    """
+    rng = random.Random(seed)
+    counts: collections.Counter[str] = collections.Counter()
+    orders: list[Order] = []
+    now_ns = 1_000_000_000
+    cockpit = Cockpit(PLAN, lambda: now_ns, orders.append)
+    owner = Session(0, cockpit, Door())
+    owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
+    owner.receive(encode(Take()))
+    known: Session | None = None
+    for number in range(1, count + 1):
+        now_ns += 1_000_000
+        data = mutated(rng)
+        if number % 4 == 0:  # A stranger at a door with a key.
+            stranger = Session(number, cockpit, Door(KEY))
+            try:
+                stranger.introduce(data)
+            except LinkError:
+                counts["strangers refused"] += 1
+            else:
+                raise AssertionError(f"A stranger was let in with {data!r}.")
+            continue
+        if known is None:
+            known = Session(number, cockpit, Door(), MessageRate(1e9))
+            known.introduce(encode(Hello(version=VERSION, proof=b"", name="known")))
+            known.observe()
+        try:
+            known.receive(data)
+        except LinkError:
+            counts["connections ended"] += 1
+            known.close()
+            known = None
+        else:
+            counts["understood"] += 1
+            _drained(known)
+        _drained(owner)
+        for order in orders:
+            counts[f"order {order.kind}"] += 1
+            if order.kind in ("command", "arm"):
+                raise AssertionError(f"{order} came through, by {data!r}.")
+        orders.clear()
+        if number % 50_000 < 4:
+            progress(number)
+    if not cockpit.lease.holds(0):
+        raise AssertionError("The owner lost the command.")
+    return counts
+
+
+def main() -> None:
+    """Fuzz, and print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    fuzz(5_000, asked.seed + 1)  # So that what is loaded once is loaded.
+    began, before_kb, most_kb = time.perf_counter(), resident_kb(), 0
+
+    def watch(_: int) -> None:
+        nonlocal most_kb
+        most_kb = max(most_kb, resident_kb())
+
+    counts = fuzz(asked.count, asked.seed, watch)
+    took_s = time.perf_counter() - began
+    for name, number in sorted(counts.items()):
+        print(f"{name}: {number}")
+    print(f"{asked.count} messages in {took_s:.0f} s ({asked.count / took_s:.0f}/s)")
+    print(f"resident: {before_kb} kB before, {most_kb} kB at most, {resident_kb()} kB after")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,218 @@
+"""Jogging a robot's outputs one after the other, over its own link and under all of its rules."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, Literal, Protocol
+
+from rich.console import Console
+
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.errors import RobotError
+from shapechanger.layout import Layout
+from shapechanger.remote.client import RobotClient
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.profile.edit import rewrite
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.setup.calibration import (
+    PULSES,
+    Jogging,
+    motor_changes,
+    pulse_changes,
+    wheel_changes,
+    widened,
+)
+
+__all__ = ["Calibration", "Keys"]
+
+_STEP: Final = 0.02
+_START_STEP: Final = 0.05
+_MOTORS: Final = ("hbridge", "phase_enable")
+
+
+class Keys(Protocol):
+    """Where keys come from, such as a terminal."""
+
+    def keys(self, wait_s: float) -> list[str]:
+        """The keys that were pressed; waits so long for the first one."""
+        ...
+
+
+class Calibration:
+    """One round over all outputs and encoders of a robot.
+
+    Args:
+        profile: The robot.
+        keys: Where keys come from.
+        console: Where to ask.
+        cap: Largest value that a motor is jogged with.
+        twin: Whether on the twin.
+    """
+
+    def __init__(
+        self, profile: Profile, keys: Keys, console: Console, cap: float, *, twin: bool
+    ) -> None:
+        self._profile = profile
+        self._keys = keys
+        self._console = console
+        self._cap = cap
+        self._twin = twin
+
+    def run(self) -> dict[str, Any]:
+        """Go over everything.
+
+        Returns:
+            What to write into the profile, by dotted name.
+
+        Raises:
+            RobotError: If what was found cannot be.
+        """
+        changes: dict[str, Any] = {}
+        self._console.print(
+            "Lift the robot so that nothing can drive away. Enter accepts, N skips, Q ends."
+        )
+        for output in self._profile.outputs:
+            if not output.mix:
+                continue
+            if output.driver in PULSES:
+                changes |= self._pulses(output)
+            elif output.driver in _MOTORS:
+                changes |= self._motor(output)
+        for sensor in self._profile.sensors:
+            if sensor.driver == "encoder":
+                changes |= self._wheel(sensor.name, float(_number(sensor.settings["wheel_m"])))
+        return changes
+
+    def _pulses(self, output: OutputPlan) -> dict[str, Any]:
+        wide = widened(output)
+        low_key, _, high_key = PULSES[output.driver]
+        settings = {
+            f"output.{output.name}.{key}": wide.settings[key] for key in (low_key, high_key)
+        }
+        names = {"servo": ("full left", "straight", "full right")}.get(
+            output.driver, ("its slowest backward", "surely at rest", "its fastest forward")
+        )
+        self._console.print(f"\n{output.name}: A and D move it, Enter where it is …")
+        with self._served(settings) as robot:
+            jogger = _Jogger(robot, self._profile, output, self._keys)
+            found: list[float] = []
+            for name in names:
+                self._console.print(f"  … {name}")
+                value = jogger.find(1.0)
+                if value is None:
+                    return {}
+                found.append(value)
+        return dict(pulse_changes(wide, Jogging(*found)))
+
+    def _motor(self, output: OutputPlan) -> dict[str, Any]:
+        self._console.print(f"\n{output.name}: D raises its duty; Enter when it begins to move …")
+        with self._served({f"output.{output.name}.start": 0.0}) as robot:
+            jogger = _Jogger(robot, self._profile, output, self._keys, step=_START_STEP)
+            value = jogger.find(self._cap)
+        if value is None or value == 0.0:
+            return {}
+        self._console.print("  … did it go forward, or right? Y or N")
+        went = self._answer()
+        return motor_changes(output, went, abs(value) * _number(output.settings["full"]))
+
+    def _wheel(self, name: str, wheel_m: float) -> dict[str, Any]:
+        self._console.print(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
+        with self._served({}) as robot:
+            state = Layout.from_json(robot.welcome.state_layout)
+            place = state.slices["speed"].start
+            travelled_m, before_ns = 0.0, None
+            seen = None
+            while True:
+                newer = seen.seq if seen else 0
+                robot.acknowledge()
+                seen = robot.observation(newer).message
+                if before_ns is not None:
+                    travelled_m += seen.state[place] * (seen.state_ns - before_ns) / 1e9
+                before_ns = seen.state_ns
+                for key in self._keys.keys(0.0):
+                    if key == "enter":
+                        return dict(wheel_changes(name, wheel_m, 1.0, travelled_m))
+                    if key in {"n", "q"}:
+                        return {}
+
+    @contextmanager
+    def _served(self, settings: dict[str, Any]) -> Iterator[RobotClient]:
+        """The robot with other settings, served and armed for a person."""
+        with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
+            path = Path(folder) / "profile.toml"
+            path.write_bytes(self._profile.path.read_bytes())
+            profile = rewrite(path, settings) if settings else load_profile(path)
+            # Nobody looks through the camera while calibrating, so it may be missing.
+            files = Path(folder) / "robot"
+            files.mkdir()
+            with (
+                run_robot(profile, twin=self._twin, folder=files) as robot,
+                robot.client(role="person", frames=False, name="calibrate") as client,
+            ):
+                client.take()
+                client.arm()
+                yield client
+
+    def _answer(self) -> Literal["forward", "backward"]:
+        while True:
+            for key in self._keys.keys(1.0):
+                if key in {"y", "n"}:
+                    return "forward" if key == "y" else "backward"
+
+
+class _Jogger:
+    """Moves one output by keys, and holds it where it is."""
+
+    def __init__(
+        self,
+        robot: RobotClient,
+        profile: Profile,
+        output: OutputPlan,
+        keys: Keys,
+        step: float = _STEP,
+    ) -> None:
+        self._robot = robot
+        self._keys = keys
+        self._step = step
+        # The action that moves this output most.
+        self._action = max(output.mix, key=lambda name: abs(output.mix[name]))
+        self._names = [action.name for action in profile.actions]
+        self._rests = [action.rest for action in profile.actions]
+        self._weight = output.mix[self._action]
+
+    def find(self, cap: float) -> float | None:
+        """Jog until Enter.
+
+        Returns:
+            The value of the output then; None where the person skips.
+        """
+        value = 0.0
+        self._robot.acknowledge()
+        newest = self._robot.newest
+        seq = newest.message.seq if newest else 0
+        while True:
+            seen = self._robot.observation(seq).message
+            seq = seen.seq
+            if not seen.armed:
+                raise RobotError(f"The robot stopped: {seen.stop_reason}")
+            values = list(self._rests)
+            values[self._names.index(self._action)] = math.copysign(value, self._weight * value)
+            self._robot.command(values, answers=seq)
+            for key in self._keys.keys(0.0):
+                if key == "enter":
+                    return value * abs(self._weight)
+                if key in {"n", "q"}:
+                    return None
+                value += {"d": self._step, "a": -self._step}.get(key, 0.0)
+                value = min(max(value, -cap), cap)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, int | float):
+        return float(value)
+    raise RobotError(f"{value!r} is no number.")

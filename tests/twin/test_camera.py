@@ -1,0 +1,131 @@
+"""The front camera: pictures with their time, into a pipe that nobody may have opened."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import time
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.barcode import read_barcode
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.twin.camera import CameraFault, FrontCameraPipe
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.start import RunningBoard, start_board
+from shapechanger.twin.world.driving import DrivingWorld
+from tests.twin.robots import CAR, until
+
+_CAMERA = CameraPlan("pipe", fps=20.0)
+
+
+def _open(board: RunningBoard) -> BinaryIO:
+    assert board.fifo_path is not None
+    return os.fdopen(os.open(board.fifo_path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0)
+
+
+def _pictures(data: bytes) -> list[tuple[int, bytes]]:
+    """Each picture with the time in its comment."""
+    found = re.finditer(
+        rb"\xff\xd8\xff\xfe..captured_ns=(\d+)\xff.*?\xff\xd9(?=\xff\xd8|$)", data, re.S
+    )
+    return [(int(one[1]), one[0]) for one in found]
+
+
+def test_pictures_say_when_they_were_taken(tmp_path: Path) -> None:
+    """In a comment of the JPEG and in the picture itself, 20 a second on the twin's clock."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+        _open(board) as pipe,
+    ):
+        start = operator.advance(0.0)
+        operator.advance(1.0)
+        pictures = _pictures(pipe.read(1 << 20))
+    assert [t for t, _ in pictures] == [start + 50_000_000 * i for i in range(21)]
+    for t, jpeg in pictures:
+        image = simplejpeg.decode_jpeg(jpeg, "RGB")
+        assert image.shape == (120, 160, 3)
+        assert read_barcode(image) == t
+
+
+def test_nobody_needs_to_read(tmp_path: Path) -> None:
+    """Without a reader pictures are dropped, and whoever comes later gets new ones only."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        operator.advance(5.0)
+        with _open(board) as pipe:
+            now = operator.advance(0.1)
+            assert all(t > now - 110_000_000 for t, _ in _pictures(pipe.read(1 << 20)))
+        operator.advance(1.0)
+        with _open(board):
+            operator.advance(100.0)  # More than the pipe holds: it is full, and time goes on.
+
+
+def test_in_real_time_only_the_latest_waits(tmp_path: Path) -> None:
+    """A reader that was away gets one picture, and not a queue of old ones."""
+    with (
+        start_board(CAR, "real", tmp_path, CameraPlan("pipe", fps=100.0)) as board,
+        _open(board) as pipe,
+        select_on(pipe) as poll,
+    ):
+        until(lambda: bool(poll.poll(0)))
+        first_ns = time.monotonic_ns()
+        until(lambda: time.monotonic_ns() > first_ns + 100_000_000)
+        assert len(_pictures(pipe.read(1 << 20))) == 1
+
+
+def select_on(pipe: BinaryIO) -> select.epoll:
+    """What tells whether a pipe can be read."""
+    poll = select.epoll()
+    poll.register(pipe, select.EPOLLIN)
+    return poll
+
+
+@pytest.mark.parametrize("how", ["off", "freeze", "garbage", "short"])
+def test_the_camera_fails(tmp_path: Path, how: CameraFault) -> None:
+    """Nothing new comes that is a whole picture, and afterwards it does again."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+        _open(board) as pipe,
+    ):
+        operator.advance(0.2)
+        newest = _pictures(pipe.read(1 << 20))[-1]
+        operator.break_camera(how)
+        operator.advance(0.3)
+        broken = pipe.read(1 << 20)
+        whole = set(_pictures(broken or b""))
+        assert whole <= ({newest} if how == "freeze" else set())
+        assert bool(broken) == (how != "off")
+        operator.break_camera("")
+        operator.advance(0.2)
+        assert _pictures(pipe.read(1 << 20))[-1][0] > newest[0]
+
+
+def test_it_is_fast(tmp_path: Path) -> None:
+    """At least 100 pictures a second of 160 by 120, with JPEG; measured: some 1500."""
+    world = DrivingWorld({"wheels"}, (160, 120), seed=1)
+    path = str(tmp_path / "none")
+    camera = FrontCameraPipe(path, 20.0, 80, latest_only=True, start_ns=0, seed=0)
+    start = time.perf_counter()
+    sizes = [len(camera.draw(world, i)) for i in range(50)]
+    assert time.perf_counter() - start < 0.5
+    assert np.mean(sizes) < 8000
+
+
+def test_what_is_not_there_cannot_fail(tmp_path: Path) -> None:
+    """A twin without a camera says so."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with pytest.raises(RobotError, match="no camera"):
+            operator.break_camera("off")
+        with pytest.raises(RobotError, match="without a camera"):
+            board.camera_plan(_CAMERA)

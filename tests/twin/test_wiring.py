@@ -1,0 +1,102 @@
+"""From the levels of pins back to what the drivers were told, for each driver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import open_output
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.twin.hardware import connect
+from shapechanger.twin.levels import Levels, Pulse
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.start import start_board
+from shapechanger.twin.wiring import Wiring
+from tests.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
+
+_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1}
+_PHASE = OutputPlan(
+    "phase",
+    "phase_enable",
+    "wheels",
+    {"throttle": 1.0},
+    0.0,
+    {"phase": 5, "enable": 6, "pwm_hz": 50, "start": 0.2, "full": 0.9},
+)
+_ENABLED = replace(DRIVE, settings={**DRIVE.settings, "enable": 18})
+_OUTPUTS = {
+    "hbridge": DRIVE,
+    "hbridge with enable": _ENABLED,
+    "hbridge with start": hbridge("drive", "wheels", (22, 27), {"throttle": 1.0}, start=0.3),
+    "phase": _PHASE,
+    "servo on a pin": servo("servo", "steering", {"steering": 1.0}, over="lgpio", pin=12),
+    "servo on a chip": servo("servo", "steering", {"steering": 1.0}, **_CHIP),
+    "servo the other way round": servo(
+        "servo", "steering", {"steering": 1.0}, left_us=1900.0, right_us=1200.0, **_CHIP
+    ),
+    "esc on a chip": esc("esc", "wheels", {"throttle": 1.0}, arm_s=0.0, reverse="direct", **_CHIP),
+}
+
+
+@pytest.mark.parametrize("kind", _OUTPUTS)
+def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
+    """The wiring is the inverse of the driver, to the step of what is between them."""
+    output = _OUTPUTS[kind]
+    plan = GuardPlan("robot", ACTIONS, (output,))
+    wiring = Wiring(plan)
+    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        driver = open_output(output, hardware)
+        for value in (0.0, 0.05, 0.3, 1.0, -0.05, -0.7, -1.0, 0.0):
+            driver.write(value, 10**9)
+            read = wiring.read(operator.levels(), 10**9)[output.name]
+            assert read.value == pytest.approx(value, abs=0.02), value
+            if "steering" not in output.mix:
+                assert read.at_rest == (value == 0.0)
+        driver.release()
+        read = wiring.read(operator.levels(), 10**9)[output.name]
+        assert read.value == (None if output.driver == "servo" else 0.0)
+        assert read.at_rest
+        driver.close()
+        hardware.close()
+
+
+def test_only_what_throttles_propels() -> None:
+    """The mix says so, not the name."""
+    assert Wiring(CAR).propelling == ("drive",)
+    swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
+    assert Wiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
+
+
+def test_wrong_pins_turn_the_wrong_motor() -> None:
+    """The wiring is what is there: pins swapped in the served profile steer instead of driving."""
+    levels = Levels()
+    levels.drive(17, 0.8, 0)
+    read = Wiring(CAR, None).read(levels, 0)
+    assert (read["drive"].value, read["steer"].value) == (0.0, 0.8)
+
+
+def test_the_one_shot_gives_power_to_motors_only() -> None:
+    """100 ms after the last edge the bridge has no power; a servo keeps its pulses."""
+    turn = servo("turn", "steering", {"steering": 1.0}, over="lgpio", pin=12)
+    wiring = Wiring(replace(CAR, outputs=(DRIVE, turn)), 100.0)
+    levels = Levels()
+    levels.drive(22, 1.0, 0)
+    levels.pulse(12, Pulse(2000, 50))
+    assert wiring.read(levels, 0)["drive"].value == 0.0
+    levels.drive(25, 1.0, 50_000_000)
+    assert wiring.read(levels, 149_000_000)["drive"].value == 1.0
+    assert wiring.read(levels, 150_000_000)["drive"].value == 0.0
+    assert wiring.read(levels, 150_000_000)["turn"].value == 1.0
+
+
+def test_what_the_twin_does_not_know_is_refused(tmp_path: Path) -> None:
+    """In words, before anything is started."""
+    kernel = servo("turn", "steering", {"steering": 1.0}, over="sysfs", chip=0, channel=0)
+    with pytest.raises(RobotError, match="no servos over 'sysfs'"):
+        start_board(replace(CAR, outputs=(kernel,)), "twin", tmp_path)
+    with pytest.raises(RobotError, match="too long for a socket"):
+        start_board(CAR, "twin", tmp_path / ("long" * 40))
