@@ -3,8 +3,8 @@
 `python benchmarks/fuzz_link.py --count 1000000` mutates messages of every kind (flipped bits, cuts,
 splices, lengths that lie, deep nesting, huge numbers) and hands them to a session of the daemon, as
 its WebSocket would. The robot has a driver, so an order can go through; the fuzzer's own client has
-no right to any but an emergency stop. With `--sockets N` it also sends N of them to a daemon that
-listens.
+no right to any but an emergency stop. A few thousand go through a real socket in
+`tests/robot/daemon/test_fuzz.py`.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ import gymnasium as gym
 import pytest
 
 from shapechanger.envs import CATALOGUE, register_all
+from shapechanger.envs.catalogue import REMOTE_VEHICLE
 
 _IDS = (
     "shapechanger/InvertedPendulum-v1",
@@ -67,7 +68,7 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     )
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
-    assert tuple(ids.split()) == _IDS
+    assert tuple(ids.split()) == (*_IDS, REMOTE_VEHICLE)
 
 
 def test_without_the_simulator_the_message_says_what_to_install() -> None:

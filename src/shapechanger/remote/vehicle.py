@@ -67,10 +67,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     ## Info
     `action_applied` and `stop_reason`: what the robot does, and why it is not what it was told;
     `refused`: why it refused the command of this step; `events`: what happened, in sentences;
-    `latency`, s, see `latencies`; `frame_age`,
-    s, and `frame_repeated`; `deadline_missed`: steps of this episode that ended half a period late
-    or more; `armed`, `emergency`; `absent`: numbers of the state that nothing measures now, which
-    are the middle of their range.
+    `latency`, s, see `latencies`; `frame_age`, s, and `frame_repeated`; `deadline_missed`: steps of
+    this episode that ended half a period late or more; `armed`, `emergency`; `absent`: numbers of
+    the state that nothing measures now, which are the middle of their range.
 
     Args:
         robot: Name of a robot that is remembered, or its address as HOST or HOST:PORT.

@@ -7,7 +7,7 @@ import select
 import socket
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from shapechanger.errors import RobotError
 from shapechanger.twin import wire
@@ -43,7 +43,7 @@ class Link:
         self.levels: dict[int, int] = {}
         self.on_edge: Edge | None = None
         answer = self.ask(op="hello", role=role, pid=os.getpid())
-        self.clock: str = answer["clock"]
+        self.clock: Literal["real", "twin"] = answer["clock"]
         self.now_ns: int = answer["t"]
 
     @property

@@ -15,25 +15,52 @@ from typing import Final, Literal
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.twin.link import Link
 from shapechanger.twin.wiring import ONE_SHOT_MS, Wiring
 
-__all__ = ["HARDWARE", "RunningBoard", "start_board"]
+__all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
 
 HARDWARE: Final = "shapechanger.twin.hardware:connect"
 """Where a robot's processes get the twin's hardware; its argument is the board's socket."""
 
+_SOCKET: Final = "board.socket"
+_LEDGER: Final = "ledger.jsonl"
+_FIFO: Final = "camera.mjpeg"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
 _LONGEST_SOCKET: Final = 100  # Bytes; Linux takes 107.
 
 
-class RunningBoard:
-    """A board that runs. It ends with `close`, or when this process does.
+class BoardAt:
+    """Where a board can be reached.
 
     Attributes:
         socket_path: Where it listens; the argument of `HARDWARE`.
         ledger_path: Its ledger.
         fifo_path: Where its pictures come out; None without a camera.
+    """
+
+    def __init__(self, socket_path: str, ledger_path: Path, fifo_path: Path | None) -> None:
+        self.socket_path = socket_path
+        self.ledger_path = ledger_path
+        self.fifo_path = fifo_path
+
+    @property
+    def hardware(self) -> tuple[str, str]:
+        """Where a robot's processes get their hardware, with its argument."""
+        return HARDWARE, self.socket_path
+
+    def camera_plan(self, plan: CameraPlan) -> CameraPlan:
+        """The camera of a profile, but reading the pictures of this board."""
+        if self.fifo_path is None:
+            raise RobotError("This twin was started without a camera.")
+        return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
+
+
+class RunningBoard(BoardAt):
+    """A board that was started here. It ends with `close`, or when this process does.
+
+    Attributes:
         process: The process.
     """
 
@@ -45,10 +72,8 @@ class RunningBoard:
         ledger_path: Path,
         fifo_path: Path | None,
     ) -> None:
+        super().__init__(socket_path, ledger_path, fifo_path)
         self.process = process
-        self.socket_path = socket_path
-        self.ledger_path = ledger_path
-        self.fifo_path = fifo_path
         self._owner = owner
 
     def __enter__(self) -> RunningBoard:
@@ -62,17 +87,6 @@ class RunningBoard:
     ) -> None:
         self.close()
 
-    @property
-    def hardware(self) -> tuple[str, str]:
-        """Where a robot's processes get their hardware, with its argument."""
-        return HARDWARE, self.socket_path
-
-    def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """The camera of a profile, but reading the pictures of this board."""
-        if self.fifo_path is None:
-            raise RobotError("This twin was started without a camera.")
-        return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
-
     def outlive_exec(self) -> None:
         """Let the board run on when this process becomes another program by exec."""
         self._owner.set_inheritable(True)
@@ -85,6 +99,23 @@ class RunningBoard:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
+    """The board that runs in a folder, and its clock; None if none does."""
+    folder = Path(folder).absolute()
+    socket_path = folder / _SOCKET
+    if not socket_path.is_socket():
+        return None
+    try:
+        link = Link(str(socket_path), "operator")
+    except RobotError:
+        return None
+    clock = link.clock
+    link.close()
+    fifo_path = folder / _FIFO
+    found = BoardAt(str(socket_path), folder / _LEDGER, fifo_path if fifo_path.is_fifo() else None)
+    return found, clock
 
 
 def start_board(
@@ -110,7 +141,7 @@ def start_board(
     """
     Wiring(wiring, one_shot_ms)  # Says in words what it does not know.
     folder = Path(folder).absolute()
-    socket_path, ledger_path = folder / "board.socket", folder / "ledger.jsonl"
+    socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
     if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
         raise RobotError(f"The path {socket_path} is too long for a socket.")
     ours, theirs = socket.socketpair()
@@ -125,7 +156,7 @@ def start_board(
             command += ["--one-shot-ms", str(one_shot_ms)]
         fifo_path = None
         if camera is not None:
-            fifo_path = folder / "camera.mjpeg"
+            fifo_path = folder / _FIFO
             os.mkfifo(fifo_path)
             command += ["--fifo", str(fifo_path), "--fps", str(camera.fps)]
             command += ["--size", "{}x{}".format(*camera.size)]

@@ -58,6 +58,11 @@ class Wiring:
         one_shot_ms: How long the enable line's one-shot holds after each edge of `plan.enable_pin`;
             None where none is fitted.
 
+    Attributes:
+        plan: What is wired.
+        outputs: The outputs by name.
+        propelling: Names of the outputs that make the robot go.
+
     Raises:
         RobotError: If the twin does not know what an output is wired to.
     """
@@ -78,17 +83,11 @@ class Wiring:
             self._outputs[output.name] = _Output(output, max(-1.0, min(1.0, rest)), propels)
             if (pin := _output_enable(output)) >= 0:
                 self._high.add(pin)
+        self.outputs: Mapping[str, OutputPlan] = {
+            name: output.plan for name, output in self._outputs.items()
+        }
+        self.propelling = tuple(name for name, output in self._outputs.items() if output.propels)
         self.read(Levels(), 0)  # Says in words what it does not know.
-
-    @property
-    def propelling(self) -> tuple[str, ...]:
-        """Names of the outputs that make the robot go."""
-        return tuple(name for name, output in self._outputs.items() if output.propels)
-
-    @property
-    def outputs(self) -> Mapping[str, OutputPlan]:
-        """The outputs by name."""
-        return {name: output.plan for name, output in self._outputs.items()}
 
     def idle_level(self, pin: int) -> int:
         """Level of a pin that nobody drives.

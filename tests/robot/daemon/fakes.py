@@ -33,8 +33,9 @@ class FakeGuard:
 
     def close(self) -> None:
         """Die."""
-        asyncio.get_running_loop().remove_reader(self._socket)
-        self._socket.close()
+        if self._socket.fileno() >= 0:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
 
     def tick(self) -> None:
         """Read all orders, and say what follows."""

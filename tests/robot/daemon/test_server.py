@@ -87,7 +87,7 @@ def test_a_wrong_key_is_refused_in_words_and_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Five times; then not even the right one is looked at for a minute."""
-    plan, key = secured
+    plan, _ = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
 
     async def script(robot: Running) -> None:
@@ -455,7 +455,8 @@ def test_who_does_not_read_is_dropped_and_holds_up_nobody(
     monkeypatch.setattr(connection, "_SEND_S", 0.5)
 
     async def script(robot: Running) -> None:
-        slow = await robot.connect().__aenter__()
+        connecting = robot.connect()
+        slow = await connecting.__aenter__()
         await slow.greet(role="person")
         assert (await slow.take()).mine
         robot.transport(slow).pause_reading()
@@ -478,6 +479,7 @@ def test_who_does_not_read_is_dropped_and_holds_up_nobody(
             assert worst < 1.0
             assert (await client.take()).mine
         robot.transport(slow).abort()
+        await connecting.__aexit__(None, None, None)
 
     play(script, car_plan(control_hz=200.0))
 

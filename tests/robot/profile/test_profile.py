@@ -98,6 +98,8 @@ def test_layouts_name_every_number() -> None:
         "speed [m/s]",
         "distance [m]",
         "bump [1]",
+        "stall [1]",
+        "collision [1]",
         "yaw_rate [rad/s]",
         "acceleration_x [m/s²]",
         "acceleration_y [m/s²]",

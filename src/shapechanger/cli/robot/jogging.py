@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
@@ -125,15 +125,14 @@ class Calibration:
         with self._served({}) as robot:
             state = Layout.from_json(robot.welcome.state_layout)
             place = state.slices["speed"].start
-            travelled_m, before_ns = 0.0, None
-            seen = None
+            travelled_m = 0.0
+            robot.acknowledge()
+            seen = robot.observation().message
             while True:
-                newer = seen.seq if seen else 0
-                robot.acknowledge()
-                seen = robot.observation(newer).message
-                if before_ns is not None:
-                    travelled_m += seen.state[place] * (seen.state_ns - before_ns) / 1e9
                 before_ns = seen.state_ns
+                robot.acknowledge()
+                seen = robot.observation(seen.seq).message
+                travelled_m += seen.state[place] * (seen.state_ns - before_ns) / 1e9
                 for key in self._keys.keys(0.0):
                     if key == "enter":
                         return dict(wheel_changes(name, wheel_m, 1.0, travelled_m))
@@ -141,7 +140,7 @@ class Calibration:
                         return {}
 
     @contextmanager
-    def _served(self, settings: dict[str, Any]) -> Iterator[RobotClient]:
+    def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
         """The robot with other settings, served and armed for a person."""
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder) / "profile.toml"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Literal, Self
+from typing import IO, Any, Final, Literal, Self
 
 from shapechanger.errors import RobotError
 from shapechanger.remote.client import RobotClient
@@ -107,7 +107,8 @@ class RunningRobot:
 
     def said(self) -> str:
         """What its processes said so far, for people to read."""
-        return (self.folder / "log.txt").read_text(errors="replace")
+        path = self.folder / "log.txt"
+        return path.read_text(errors="replace") if path.exists() else ""
 
     def await_restart(self, timeout_s: float = _READY_S) -> None:
         """Wait until its daemon can be reached again after a restart.
@@ -150,6 +151,7 @@ def run_robot(
     clock: Literal["real", "twin"] = "real",
     seed: int = 0,
     folder: Path | None = None,
+    log: IO[bytes] | None = None,
     arguments: tuple[str, ...] = (),
 ) -> RunningRobot:
     """Serve a robot on a free port of 127.0.0.1, as `shapechanger robot serve` does.
@@ -159,7 +161,8 @@ def run_robot(
         twin: Whether on its twin.
         clock: Where a twin's time comes from.
         seed: Seed of a twin's world.
-        folder: Folder for its files, which must be empty; a new one if not given.
+        folder: Folder for its files; a new one if not given. A twin that runs there is used.
+        log: Where its processes say what happens; a file in the folder if not given.
         arguments: More arguments of `serve`.
 
     Raises:
@@ -176,13 +179,14 @@ def run_robot(
     if twin:
         command += ["--twin", "--clock", clock, "--seed", str(seed)]
         command += ["--twin-folder", str(folder)]
-    with (folder / "log.txt").open("wb") as log:
+    with contextlib.ExitStack() as stack:
+        said = log or stack.enter_context((folder / "log.txt").open("wb"))
         supervisor = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
+            stdout=said,
+            stderr=said,
             # So that Ctrl-C reaches whoever drives first, who then ends the robot.
-            process_group=0 if os.name == "posix" else None,
+            process_group=0,
         )
     return RunningRobot(folder, supervisor)

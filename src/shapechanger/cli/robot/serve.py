@@ -15,7 +15,8 @@ from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.serving import TwinOptions
+    from shapechanger.robot.profile.profile import Profile
+    from shapechanger.twin.start import BoardAt, RunningBoard
 
 __all__ = ["Serve"]
 
@@ -41,7 +42,7 @@ class Serve:
     """With --twin: seed of the world."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
-    given."""
+    given. A twin that runs there already is used as it is."""
     insecure: bool = False
     """Speak without TLS. The key is still needed."""
     credentials: Path | None = None
@@ -55,14 +56,13 @@ class Serve:
 
     def run(self) -> None:
         """Become the robot's supervisor; this returns only with an error."""
-        from shapechanger.cli.robot.serving import ServeOptions, serve_plan, start_twin
-        from shapechanger.robot.guard import start
-        from shapechanger.robot.guard.serve_plan import plan_fd
+        from shapechanger.cli.robot.serving import ServeOptions, serve_plan
+        from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
         from shapechanger.robot.profile.load import find_profile, load_profile
 
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
-        board = start_twin(profile, self._twin_options()) if self.twin else None
+        board, started = self._board(profile) if self.twin else (None, None)
         try:
             plan = serve_plan(
                 profile,
@@ -81,14 +81,13 @@ class Serve:
             if board is not None:
                 plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
             sys.stdout.flush()
-            if board is not None:
-                board.outlive_exec()
+            if started is not None:
+                started.outlive_exec()
             # In place of this process, which has loaded much that a supervisor has no use for.
-            program = [plan.python, "-I", start.__file__, "supervise"]
-            os.execv(plan.python, [*program, "--plan-fd", str(plan_fd(plan))])
+            os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
         finally:
-            if board is not None:
-                board.close()
+            if started is not None:
+                started.close()
 
     def _refuse_contradictions(self) -> None:
         """Refuse what has a meaning on a twin only."""
@@ -101,8 +100,18 @@ class Serve:
             if given and not self.twin:
                 raise RobotError(f"{option} means something with --twin only.")
 
-    def _twin_options(self) -> TwinOptions:
-        from shapechanger.cli.robot.serving import TwinOptions
+    def _board(self, profile: Profile) -> tuple[BoardAt, RunningBoard | None]:
+        """The twin's board, and the same where it was started here."""
+        from shapechanger.cli.robot.serving import TwinOptions, start_twin
+        from shapechanger.twin.start import find_board
 
         folder = self.twin_folder or Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
-        return TwinOptions(folder, self.clock, self.wired_as, self.seed)
+        found = find_board(folder)
+        if found is None:
+            options = TwinOptions(folder, self.clock, self.wired_as, self.seed)
+            started = start_twin(profile, options)
+            return started, started
+        board, clock = found
+        if clock != self.clock:
+            raise RobotError(f"The twin in {folder} runs on --clock {clock}.")
+        return board, None

@@ -19,12 +19,14 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.start import RunningBoard, start_board
+from shapechanger.twin.start import BoardAt, RunningBoard, start_board
 
 __all__ = ["ServeOptions", "TwinOptions", "credentials_of", "serve_plan", "start_twin"]
 
 _EVERYWHERE: Final = "0.0.0.0"
 _HERE: Final = "127.0.0.1"
+# While the twin draws a picture its time stands still, and a guard that waits for it is not dead.
+_TWIN_PATIENCE_MS: Final = 10_000
 
 
 @dataclass(frozen=True)
@@ -36,12 +38,14 @@ class TwinOptions:
         clock: Whether time passes by itself, or only when somebody asks for it.
         wired_as: Profile of what is really attached; "" for the one that is served.
         seed: Seed of the world.
+        one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
     """
 
     folder: Path
     clock: Literal["real", "twin"] = "real"
     wired_as: str = ""
     seed: int = 0
+    one_shot: bool = True
 
 
 @dataclass(frozen=True)
@@ -95,13 +99,14 @@ def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
         folder=options.folder,
         camera=profile.camera,
         seed=options.seed,
+        one_shot_ms=float(wiring.enable_hold_ms) if options.one_shot else None,
     )
 
 
 def serve_plan(
     profile: Profile,
     options: ServeOptions,
-    board: RunningBoard | None = None,
+    board: BoardAt | None = None,
     clock: Literal["real", "twin"] = "real",
 ) -> ServePlan:
     """What the processes of a robot need.
@@ -144,4 +149,5 @@ def serve_plan(
         return ServePlan(guard, daemon.to_dict())
     camera = board.camera_plan(profile.camera) if profile.camera else None
     daemon = msgspec.structs.replace(daemon, camera=camera, clock=clock)
-    return ServePlan(guard, daemon.to_dict(), board.hardware)
+    patience_ms = _TWIN_PATIENCE_MS if clock == "twin" else 0
+    return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)

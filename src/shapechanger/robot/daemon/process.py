@@ -23,12 +23,12 @@ from shapechanger.robot.daemon.credentials import check_exposure, read_key, serv
 from shapechanger.robot.daemon.discovery import Announcement
 from shapechanger.robot.daemon.frames import FrameChecks, FrameReader
 from shapechanger.robot.daemon.guard_port import GuardPort
+from shapechanger.robot.daemon.heartbeat import beat
 from shapechanger.robot.daemon.log import start_log
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
 from shapechanger.robot.daemon.session import Door
 from shapechanger.robot.daemon.timekeeper import Timekeeper
-from shapechanger.robot.guard.channel import Heartbeat
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.guard.wire import GuardState
 from shapechanger.robot.hardware import Clock, connect
@@ -69,7 +69,7 @@ class Daemon:
             on_lost=lambda: self.end("The guard is gone."),
         )
         self._cockpit = Cockpit(plan, clock.now_ns, self._port.send)
-        self._heartbeat = None if heartbeat_fd is None else Heartbeat(heartbeat_fd, _BEAT_S)
+        self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
 
     async def run(self) -> str:
@@ -110,8 +110,6 @@ class Daemon:
                 await announcement.close()
             beating.cancel()
             await asyncio.gather(beating, return_exceptions=True)
-            if self._heartbeat is not None:
-                self._heartbeat.close()
         return self._why
 
     def end(self, why: str = "") -> None:
@@ -124,12 +122,9 @@ class Daemon:
 
     async def _beat(self) -> None:
         """Show the supervisor that the event loop turns."""
-        while self._heartbeat is not None:
-            self._heartbeat.beat()
-            if self._heartbeat.lost:
-                self.end("The supervisor is gone.")
-                return
-            await asyncio.sleep(_BEAT_S)
+        if self._heartbeat_fd is not None:
+            await beat(self._heartbeat_fd, _BEAT_S)
+            self.end("The supervisor is gone.")
 
     def _camera(self, plan: CameraPlan, loop: asyncio.AbstractEventLoop) -> FrameReader:
         """Start to read the camera; of what piles up while the loop is busy, the newest counts."""

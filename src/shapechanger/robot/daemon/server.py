@@ -30,6 +30,7 @@ _MAX_STRANGERS: Final = 8  # Connections that have not said hello yet.
 _MAX_SOCKETS: Final = 64  # Connections of any kind, pages too.
 _WRONG_KEY_S: Final = 0.5
 _HANDSHAKE_S: Final = 5.0
+_GOODBYE_S: Final = 0.2  # A daemon that ends has nothing left to say.
 _SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few pictures.
 _UNANSWERED_MS: Final = 4_000  # After which what was sent counts as lost.
 _ALIVE_NS: Final = 1_000_000_000
@@ -67,7 +68,7 @@ class Server:
         self._strangers = 0
         self._wrong_keys = WrongKeys()
         self._runner = web.AppRunner(
-            self._app(), access_log=None, handle_signals=False, shutdown_timeout=1.0
+            self._app(), access_log=None, handle_signals=False, shutdown_timeout=_GOODBYE_S
         )
         self._listener: asyncio.Server | None = None
 

@@ -154,7 +154,7 @@ class Profile:
             )
             for action in self.actions
         )
-        return Layout((*state_features(self.sensors, self.actions), *applied))
+        return Layout((*state_features(self.sensors, self.actions, self.limits), *applied))
 
     def reward_weights(self) -> dict[str, float]:
         """The weights of the task by name, as in `Welcome.reward`; a truth is 1 or 0."""

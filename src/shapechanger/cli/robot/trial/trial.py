@@ -19,11 +19,13 @@ from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.network import BadNetwork
 from shapechanger.twin.operator import Operator
 from shapechanger.twin.oracle import Command, Interval, propelled, time_to_rest, unauthorised
+from shapechanger.twin.start import RunningBoard, start_board
 from shapechanger.twin.wiring import Wiring
 
 __all__ = ["Trial", "TrialResult", "has"]
 
 _COMMANDS: Final = 8
+_DRIVES_S: Final = 5.0
 # How long after the promise is looked at whether everything stays at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
@@ -74,8 +76,10 @@ class Trial:
     def __init__(self, profile: Profile, *, one_shot: bool = True) -> None:
         self._profile = profile
         self._plan: GuardPlan = profile.guard_plan()
-        self._wiring = Wiring(self._plan, self._plan.enable_hold_ms if one_shot else None)
+        self._one_shot_ms = float(self._plan.enable_hold_ms) if one_shot else None
+        self._wiring = Wiring(self._plan, self._one_shot_ms)
         self._robot: RunningRobot | None = None
+        self._board: RunningBoard | None = None
         self._folder: TemporaryDirectory[str] | None = None
 
     def __enter__(self) -> Self:
@@ -96,6 +100,9 @@ class Trial:
         if self._robot is not None:
             self._robot.close()
             self._robot = None
+        if self._board is not None:
+            self._board.close()
+            self._board = None
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
@@ -111,10 +118,12 @@ class Trial:
             robot.operator() as operator,
             BadNetwork(robot.port) as network,
         ):
+            _calm(robot)
             operator.place(0)
             began_ns = time.monotonic_ns()
             with Driver(robot.known_at(f"127.0.0.1:{network.port}")) as driver:
                 driver.await_commands(_COMMANDS)
+                self._await_drive(operator)
                 if fault.then == "starts afresh":
                     robot.forget_ready()
                 scene = Scene(robot, driver, network, operator)
@@ -130,6 +139,14 @@ class Trial:
     def _running(self) -> RunningRobot:
         if self._robot is None:
             self._folder = TemporaryDirectory(prefix="shapechanger-trial-")
+            # Its own, so that it outlives all processes of the robot, as hardware does.
+            self._board = start_board(
+                self._plan,
+                clock="real",
+                folder=self._folder.name,
+                camera=self._profile.camera,
+                one_shot_ms=self._one_shot_ms,
+            )
             self._robot = run_robot(self._profile, folder=Path(self._folder.name))
         return self._robot
 
@@ -138,6 +155,15 @@ class Trial:
             self.close()
         elif fault.then == "starts afresh" and self._robot is not None:
             self._robot.await_restart()
+
+    def _await_drive(self, operator: Operator) -> None:
+        """Wait until it moves; a camera that was just mended may take a while to be read again."""
+        until_s = time.monotonic() + _DRIVES_S
+        while time.monotonic() < until_s:
+            outputs = self._wiring.read(operator.levels(), time.monotonic_ns())
+            if not all(outputs[name].at_rest for name in self._wiring.propelling):
+                return
+            time.sleep(_LOOK_S)
 
     def _await_rest(self, operator: Operator, limit_ms: float) -> None:
         """Wait until the robot has been at rest for a while, or surely breaks its promise."""
@@ -179,3 +205,13 @@ class Trial:
             RobotError: If none runs.
         """
         return self._running().ledger_path
+
+
+def _calm(robot: RunningRobot) -> None:
+    """Let a person end what the last trial left behind: an emergency stop, and being armed."""
+    with robot.client(role="person", frames=False, name="trial") as person:
+        person.take()
+        person.arm()
+        person.disarm()
+        person.release()
+        person.ping()

@@ -1,0 +1,73 @@
+"""The announcement on the local network."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import Any
+
+import pytest
+
+from shapechanger.robot.daemon import discovery
+from shapechanger.robot.daemon.discovery import SERVICE, Announcement
+from tests.robot.daemon.plans import car_plan
+
+
+class FakeZeroconf:
+    """Remembers what was announced."""
+
+    def __init__(self) -> None:
+        self.announced: list[Any] = []
+        self.closed = False
+
+    async def async_register_service(self, info: Any, allow_name_change: bool) -> None:
+        """Announce."""
+        self.announced.append(info)
+
+    async def async_unregister_all_services(self) -> None:
+        """Take it back."""
+        self.announced.clear()
+
+    async def async_close(self) -> None:
+        """End."""
+        self.closed = True
+
+
+def test_it_says_who_where_and_which_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everything that `shapechanger robot find` shows."""
+    fake = FakeZeroconf()
+    monkeypatch.setattr(discovery, "AsyncZeroconf", lambda: fake)
+
+    async def play() -> None:
+        plan = car_plan(robot="New Bright v1.0", host="192.0.2.7")
+        announcement = Announcement(plan, 5001, b"\xab" * 32)
+        assert await announcement.start()
+        (info,) = fake.announced
+        assert info.type == SERVICE
+        assert info.name == f"New Bright v1 0.{SERVICE}"
+        assert (info.port, info.parsed_addresses()) == (5001, ["192.0.2.7"])
+        assert info.properties == {
+            b"id": b"New Bright v1.0",
+            b"body": b"car",
+            b"v": b"1",
+            b"fp": b"ab" * 32,
+        }
+        await announcement.close()
+        assert fake.closed
+
+    asyncio.run(play())
+
+
+def test_a_network_that_does_not_let_it_is_no_reason_to_stop(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It is said in words."""
+
+    def broken() -> None:
+        raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(discovery, "AsyncZeroconf", broken)
+    with caplog.at_level(logging.WARNING):
+        assert not asyncio.run(Announcement(car_plan(), 5001, b"").start())
+    assert "not announced" in caplog.text
+    assert "Network is unreachable" in caplog.text

@@ -1,0 +1,43 @@
+"""A little of `benchmarks/fuzz_link.py` with each run of the tests."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+
+import aiohttp
+import pytest
+
+from benchmarks.fuzz_link import fuzz, mutated
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import running
+
+
+def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
+    """Strangers stay outside, and who does not command gives no command."""
+    counts = fuzz(5_000, seed=1)
+    assert counts["strangers refused"] == 1_250
+    assert counts["connections ended"] > 1_000
+    assert counts["understood"] > 10
+
+
+def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The daemon answers each with a reason or not at all, and serves the next one as ever."""
+    rng = random.Random(2)
+
+    async def play() -> None:
+        async with running(car_plan(), monkeypatch) as robot:
+            for _ in range(150):
+                async with robot.client() as client:
+                    try:
+                        for _ in range(20):
+                            await client.socket.send_bytes(mutated(rng))
+                    except (ConnectionError, aiohttp.ClientError):
+                        continue
+            async with robot.client(role="person") as client:
+                await robot.armed(client)
+                assert (await client.drive(1, 0.0, 0.5)).applied_seq == 1
+            moving = [order for order in robot.guard.orders if order.kind == "command"]
+            assert [order.values for order in moving] == [(0.0, 0.5)]
+
+    asyncio.run(play())

@@ -1,0 +1,116 @@
+"""The daemon as a process of its own, as the supervisor starts it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from tests.robot.daemon.plans import car_plan
+
+
+@dataclass
+class Started:
+    """A daemon's process, and the other ends of its sockets."""
+
+    process: subprocess.Popen[bytes]
+    guard: socket.socket
+    heart: socket.socket
+    port: int
+
+    def ended(self) -> tuple[int, str]:
+        """Its exit status and what it said."""
+        assert self.process.stderr is not None
+        with self.process.stderr as stderr:
+            return self.process.wait(20.0), stderr.read().decode()
+
+
+@pytest.fixture
+def started() -> Iterator[Started]:
+    """A daemon that serves."""
+    daemon = car_plan(camera=None).to_dict()
+    guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
+    plan = plan_fd(ServePlan(guard_plan, daemon))
+    guard, guard_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    heart, heart_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ready, ready_end = os.pipe()
+    ends = {"plan": plan, "guard": guard_end.fileno(), "heartbeat": heart_end.fileno()}
+    ends["ready"] = ready_end
+    arguments = [part for name, fd in ends.items() for part in (f"--{name}-fd", str(fd))]
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "shapechanger.robot.daemon",
+            *arguments,
+            "--ready-fd",
+            str(ready_end),
+        ],
+        pass_fds=tuple(ends.values()),
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    for fd in (plan, ready_end):
+        os.close(fd)
+    guard_end.close()
+    heart_end.close()
+    with os.fdopen(ready, "rb") as told:
+        port = json.loads(told.readline())["port"]
+    heart.settimeout(20.0)
+    yield Started(process, guard, heart, port)
+    for end in (guard, heart):
+        end.close()
+    process.kill()
+    process.wait()
+    if process.stderr is not None:
+        process.stderr.close()
+
+
+def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> None:
+    """Exit status 0, and the guard sees the end of the socket."""
+    assert started.heart.recv(16) == b"."
+    with socket.create_connection(("127.0.0.1", started.port), 20.0):
+        pass
+    started.process.send_signal(signal.SIGTERM)
+    assert started.guard.recv(16) == b""
+    status, said = started.ended()
+    assert status == 0
+    assert "listens at 127.0.0.1" in said
+
+
+def test_it_ends_with_the_guard(started: Started) -> None:
+    """In words, for the supervisor to start both again."""
+    started.guard.close()
+    status, said = started.ended()
+    assert status == 1
+    assert "The guard is gone." in said
+
+
+def test_it_ends_with_the_supervisor(started: Started) -> None:
+    """Nobody would be there to stop it."""
+    started.heart.close()
+    status, said = started.ended()
+    assert status == 1
+    assert "The supervisor is gone." in said
+
+
+def test_a_log_that_nobody_can_write_does_not_end_it(started: Started) -> None:
+    """As with a full disk behind stderr: it goes on serving, and ends when asked."""
+    assert started.process.stderr is not None
+    started.process.stderr.close()
+    for _ in range(20):
+        with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
+            request = b"GET /link HTTP/1.1\r\nHost: x\r\n\r\n"
+            client.sendall(request)
+            assert client.recv(4096).startswith(b"HTTP/1.1 400")
+    started.process.send_signal(signal.SIGTERM)
+    assert started.process.wait(20.0) == 0
