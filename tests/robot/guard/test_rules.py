@@ -130,6 +130,14 @@ def test_ending_disarms() -> None:
     assert rules.tick(_T0).seq is None
 
 
+def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
+    """Who takes the robot from a program finds it standing, and may drive at once."""
+    rules = _driving(quick_car())
+    assert not rules.offer(Order("halt"), _T0)
+    assert rules.tick(_T0).seq is None
+    assert rules.arming.armed
+
+
 def test_an_emergency_stop_latches_until_somebody_who_knows_of_it_arms() -> None:
     """One that came while the order to arm was on its way is not ended by it."""
     rules = _driving(quick_car())

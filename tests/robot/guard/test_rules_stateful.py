@@ -146,6 +146,12 @@ class _World(RuleBasedStateMachine):
         if kind == "emergency":
             self.emergency, self.emergencies = True, self.emergencies + 1
 
+    @rule()
+    def halt(self) -> None:
+        """Somebody else takes the command: what was said last acts no more."""
+        assert not self.rules.offer(Order("halt"), self.now_ns)
+        self.acting = None
+
     @rule(
         bump=st.booleans(),
         distance=st.sampled_from([0.1, 1.0]),

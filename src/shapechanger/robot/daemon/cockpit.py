@@ -117,6 +117,8 @@ class Cockpit:
         lost = self.lease.take(who)
         reason = f"{who.name} commands."
         if lost is not None:
+            # What the other one said last must not act on: whoever took it wants that ended.
+            self.give_order(Order(kind="halt"))
             reason = f"{who.name}, a person, took the command from {lost.name}."
         self._tell_lease(reason)
 

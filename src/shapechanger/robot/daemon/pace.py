@@ -12,9 +12,10 @@ from shapechanger.robot.daemon.timekeeper import Timekeeper
 
 __all__ = ["Pacer"]
 
-# A picture that comes as often as commands do may be a little late; it is worth waiting for, since
-# an observation without it would use up the client's credit.
-_GRACE: Final = 1.25
+# A camera that is about as fast as commands sets the pace: each observation then has a new picture.
+# One that is a little late is worth waiting for, since an observation without it would use up the
+# client's credit.
+_ABOUT: Final = 1.25
 
 
 class Pacer:
@@ -31,7 +32,10 @@ class Pacer:
         self._cockpit = cockpit
         self._time = time
         self._period_s = 1.0 / cockpit.plan.control_hz
-        self._sent_s = float("-inf")
+        camera = cockpit.plan.camera
+        ratio = 0.0 if camera is None else camera.fps / cockpit.plan.control_hz
+        self._by_pictures = 1.0 / _ABOUT <= ratio <= _ABOUT
+        self._due_s = 0.0
 
     async def next(self) -> Observation:
         """The next observation, once it is due and the client has credit for it."""
@@ -47,7 +51,6 @@ class Pacer:
                 await self._wait_until_due()
         else:
             await self._wait_until_due()
-        self._sent_s = asyncio.get_running_loop().time()
         return session.observe()
 
     def _moves_time(self) -> bool:
@@ -56,14 +59,23 @@ class Pacer:
         return lease.holder is None or lease.holds(self._session.who.session)
 
     async def _wait_until_due(self) -> None:
-        """Wait for a new picture, or until one period has gone by."""
-        grace = 1.0 if self._cockpit.newest is None else _GRACE
-        due_s = self._sent_s + grace * self._period_s
+        """Wait until one period after the last observation was due, or for the picture in it."""
         loop = asyncio.get_running_loop()
-        while not self._session.has_new_frame and loop.time() < due_s:
+        while (not self._comes_with_picture()) and loop.time() < self._due_s:
             self._session.news.clear()
             try:
-                async with asyncio.timeout_at(due_s):
+                async with asyncio.timeout_at(self._due_s):
                     await self._session.news.wait()
             except TimeoutError:
-                return
+                break
+        now_s = loop.time()
+        if self._by_pictures and self._cockpit.newest is not None:
+            self._due_s = now_s + _ABOUT * self._period_s
+        else:
+            # From when it was due and not from now, so that being late does not add up; but a
+            # client that was away gets no burst.
+            was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
+            self._due_s = was_s + self._period_s
+
+    def _comes_with_picture(self) -> bool:
+        return self._by_pictures and self._session.has_new_frame

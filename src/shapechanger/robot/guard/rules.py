@@ -113,6 +113,8 @@ class Rules:
         match order.kind:
             case "command":
                 return self._offer_command(order, now_ns)
+            case "halt":
+                self._command = None
             case "arm":
                 return self._arm(order, now_ns)
             case "disarm":

@@ -16,7 +16,7 @@ __all__ = ["MAX_DATAGRAM", "GuardState", "Order", "decode_order", "decode_state"
 MAX_DATAGRAM: Final = 16 * 1024
 """Bytes of the largest datagram."""
 
-_KINDS: Final = ("command", "arm", "disarm", "emergency", "end")
+_KINDS: Final = ("command", "halt", "arm", "disarm", "emergency", "end")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +24,9 @@ class Order:
     """What the daemon asks of the guard.
 
     Attributes:
-        kind: "command" moves; "arm" lets commands move, and ends an emergency stop; "disarm" ends
-            that; "emergency" stops until armed again; "end" ends the guard.
+        kind: "command" moves; "halt" takes the newest command back and leaves the robot armed;
+            "arm" lets commands move, and ends an emergency stop; "disarm" ends that; "emergency"
+            stops until armed again; "end" ends the guard.
         session: Number of the lease that it belongs to; commands of an older one are refused.
         seq: Number of a command; each is larger than the one before in its session.
         issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
@@ -38,7 +39,7 @@ class Order:
         reason: Why, in words, for "disarm" and "emergency".
     """
 
-    kind: Literal["command", "arm", "disarm", "emergency", "end"]
+    kind: Literal["command", "halt", "arm", "disarm", "emergency", "end"]
     session: int = 0
     seq: int = 0
     issued_ns: int = 0
