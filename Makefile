@@ -42,7 +42,7 @@ check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(RUN) -m pyright
 
 bench: $(INSTALLED_DEV)  ## measure every number that the project promises
-	$(RUN) benchmarks/run.py
+	$(RUN) -m benchmarks.run
 
 clean:  ## remove what the other targets made, but keep results/
 	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \

@@ -1,6 +1,6 @@
 """Throw mutated messages at a robot: no crash, no accepted command, and memory stays flat.
 
-`python benchmarks/fuzz_link.py --count 1000000` mutates messages of every kind (flipped bits, cuts,
+`python -m benchmarks.fuzz_link --count 1000000` mutates messages of every kind (flipped bits, cuts,
 splices, lengths that lie, deep nesting, huge numbers) and hands them to a session of the daemon, as
 its WebSocket would. The robot has a driver, so an order can go through; the fuzzer's own client has
 no right to any but an emergency stop. A few thousand go through a real socket in

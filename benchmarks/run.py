@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,31 +24,14 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks import robots
+from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.effective import fingerprint
 
 RESULTS = Path(__file__).parent / "results"
 ROUNDS = 30
-
-
-@dataclass(frozen=True)
-class Row:
-    """One number beside what was promised.
-
-    Attributes:
-        name: What was measured.
-        value: What came out.
-        spread: How far the rounds lay apart, or what else the number needs to be read.
-        target: What was promised.
-        met: Whether it was kept.
-    """
-
-    name: str
-    value: str
-    spread: str
-    target: str
-    met: bool
 
 
 def times_ms(work: Callable[[], object]) -> list[float]:
@@ -134,7 +117,14 @@ def demo() -> list[Row]:
     ]
 
 
-SUITES: dict[str, Callable[[], list[Row]]] = {"bodies": bodies, "demo": demo}
+SUITES: dict[str, Callable[[], list[Row]]] = {
+    "bodies": bodies,
+    "demo": demo,
+    "robot-link": robots.link,
+    "robot-fuzz": robots.fuzz,
+    "robot-hold": robots.hold,
+    "robot-faults": robots.faults,
+}
 
 
 def main() -> None:
@@ -147,7 +137,7 @@ def main() -> None:
             table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
         RESULTS.mkdir(exist_ok=True)
         facts = {
-            "command": f"python benchmarks/run.py {name}",
+            "command": f"python -m benchmarks.run {name}",
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
             "python": platform.python_version(),
             "versions": {

@@ -76,6 +76,7 @@ class Operating:
                     "duties": list(levels.duties.items()),
                     "pulses": [[pin, *pulse] for pin, pulse in levels.pulses.items()],
                     "channels": [[*at, *pulse] for at, pulse in levels.channels.items()],
+                    "edges_ns": list(levels.edges_ns.items()),
                     "t": self._now_ns(),
                 }
             case "where":

@@ -100,6 +100,7 @@ class Operator:
             duties=dict(answer["duties"]),
             pulses={pin: Pulse(us, hz) for pin, us, hz in answer["pulses"]},
             channels={Channel(b, a, n): Pulse(us, hz) for b, a, n, us, hz in answer["channels"]},
+            edges_ns=dict(answer["edges_ns"]),
         )
 
     def where(self) -> Whereabouts:

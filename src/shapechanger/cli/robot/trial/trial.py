@@ -39,7 +39,7 @@ class TrialResult:
         fault: Name of the fault.
         stopped_ms: From the fault until all that propels is at rest for good; infinite for never.
         limit_ms: What is promised.
-        drove: Whether it moved before the fault, without which the trial means nothing.
+        drove: Whether it was driving when the fault came, without which the trial means nothing.
         unauthorised: When something propelled without a fresh command.
     """
 
@@ -193,7 +193,7 @@ class Trial:
             fault=fault.name,
             stopped_ms=1e3 * time_to_rest(ledger, self._wiring, at_ns),
             limit_ms=limit_ms,
-            drove=any(i.start_ns < at_ns for i in moved),
+            drove=any(i.start_ns < at_ns < i.end_ns for i in moved),
             unauthorised=tuple(i for i in strangers if i.end_ns > began_ns),
         )
 

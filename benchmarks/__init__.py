@@ -1,0 +1,1 @@
+"""Measurements of every number that Shapechanger promises."""

@@ -1,0 +1,165 @@
+"""A daemon with a guard and a camera that cost nothing: what is left is the link itself.
+
+There is always a newer picture, so that each command is answered at once with an observation that
+carries one, as the daemon does on a robot whenever its camera has been faster than the client.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import simplejpeg
+from numpy.typing import NDArray
+
+from shapechanger.layout import Feature, Layout
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.known import KnownRobot
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.daemon.credentials import make_credentials
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.guard import wire
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.twin.camera import with_capture_time
+
+__all__ = ["EchoRobot", "main"]
+
+_HZ = 100.0
+# A robot takes 500 messages a second from a client, and ends the connection of one that says more.
+_PAUSE_S = 0.005
+_PICTURE_S = 0.003
+
+
+class EchoRobot:
+    """The daemon in one process, its guard and camera in a second, the client in this one."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        folder = Path(self._folder.name)
+        os.mkfifo(folder / "camera.mjpeg")
+        ours, daemons = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        credentials = make_credentials(folder / "credentials", "echo")
+        actions = Layout((Feature("steering", "1", -1, 1), Feature("throttle", "1", -1, 1)))
+        daemon = DaemonPlan(
+            robot="echo",
+            body="car",
+            action_layout=actions.to_json(),
+            state_layout=Layout((Feature("speed", "m/s"),)).to_json(),
+            camera=CameraPlan("pipe", fps=_HZ, settings={"path": str(folder / "camera.mjpeg")}),
+            control_hz=_HZ,
+            arming="anyone",
+            port=0,
+            certificate=str(credentials.certificate),
+            private_key=str(credentials.private_key),
+            key_file=str(credentials.key_file),
+            discovery=False,
+            ready_file=str(folder / "ready.json"),
+        )
+        guard = GuardPlan("echo", (ActionPlan("steering"), ActionPlan("throttle")), ())
+        plan = plan_fd(ServePlan(guard, daemon.to_dict()))
+        with ours, daemons:
+            self._echo = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(ours.fileno()), str(folder / "camera.mjpeg")],
+                pass_fds=(ours.fileno(),),
+            )
+            command = [sys.executable, "-m", "shapechanger.robot.daemon"]
+            command += ["--plan-fd", str(plan), "--guard-fd", str(daemons.fileno())]
+            self._daemon = subprocess.Popen(
+                command, pass_fds=(plan, daemons.fileno()), stderr=subprocess.DEVNULL
+            )
+        os.close(plan)
+        ready = folder / "ready.json"
+        while not ready.exists():
+            time.sleep(0.01)
+        port = int(ready.read_text().split('"port": ')[1].split(",")[0])
+        key = credentials.key_file.read_text().strip()
+        self._known = KnownRobot("echo", f"127.0.0.1:{port}", key, credentials.fingerprint.hex())
+
+    def __enter__(self) -> Self:
+        """The robot itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End it."""
+        for process in (self._daemon, self._echo):
+            process.kill()
+            process.wait()
+        self._folder.cleanup()
+
+    def round_trips(self, count: int) -> NDArray[np.float64]:
+        """Seconds from handing over a command to having the picture that answers it."""
+        times: list[float] = []
+        with RobotClient.connect(self._known) as client:
+            client.take()
+            client.arm()
+            seen = client.ask()
+            while len(times) < count:
+                began = time.perf_counter()
+                seen = client.exchange((0.0, 0.5), seen)
+                if seen.message.frame is not None:
+                    times.append(time.perf_counter() - began)
+                time.sleep(_PAUSE_S)
+        return np.asarray(times)
+
+
+def main(guard_fd: int, fifo: Path) -> None:
+    """Be the guard and the camera: a state and a new picture every 3 ms, and after each order."""
+    rng = np.random.default_rng(0)
+    small = rng.integers(0, 256, (15, 20, 3), dtype=np.uint8)
+    pictures = [
+        simplejpeg.encode_jpeg(
+            np.ascontiguousarray(np.roll(small, n, 1).repeat(8, 0).repeat(8, 1)), quality=80
+        )
+        for n in range(20)
+    ]
+    with socket.socket(fileno=guard_fd) as daemon, io.FileIO(fifo, "w") as camera:
+        daemon.settimeout(_PICTURE_S)
+        n = 0
+        order = wire.Order("disarm")
+        while True:
+            with contextlib.suppress(TimeoutError):
+                data = daemon.recv(wire.MAX_DATAGRAM)
+                if not data:
+                    return
+                order = wire.decode_order(data)
+            now_ns = time.monotonic_ns()
+            state = wire.GuardState(
+                at_ns=now_ns,
+                armed=True,
+                emergency=False,
+                emergencies=0,
+                stop_reason="",
+                applied=order.values or (0.0, 0.0),
+                applied_session=order.session,
+                applied_seq=order.seq,
+                applied_ns=now_ns,
+                refused="",
+                refused_seq=None,
+                outputs={},
+                quantities={"speed": 0.5},
+                sources={"speed": "wheel"},
+                bumps=0,
+            )
+            daemon.send(wire.encode(state))
+            n += 1
+            camera.write(with_capture_time(pictures[n % len(pictures)], now_ns))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,71 @@
+"""Whatever goes wrong, the robot stops: each fault is made on a twin, and its ledger is judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot.trial.faults import FAULTS, Fault
+from shapechanger.cli.robot.trial.trial import Trial, TrialResult
+from shapechanger.twin.ledger import Transition, read_ledger
+from tests.robots import write_profile
+
+TOLERANCE = 10.0
+"""How much longer than promised a stop may take on a machine that does other things too."""
+
+TRIALS = 2
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
+    """A robot for all faults; one that ends it is followed by a new one."""
+    with Trial(write_profile(tmp_path_factory.mktemp("faults"))) as made:
+        yield made
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_robot_stops(trial: Trial, name: str) -> None:
+    """In time, and never drives without a fresh command of the one who may."""
+    fault = FAULTS[name]
+    for _ in range(TRIALS):
+        result = trial.run(fault)
+        assert result.drove
+        assert result.stopped_ms <= TOLERANCE * result.limit_ms, result
+        # Beyond the deadline of the last command an output may be as late as a stop may.
+        late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
+        assert sum(late_ms) <= (TOLERANCE - 1.0) * result.limit_ms, result
+        print(f"{name}: {result.stopped_ms:.1f} of {result.limit_ms:.0f} ms, late {late_ms}")
+
+
+def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:
+    """The levels at which pins stay, of which their process is gone."""
+    gone = [line.pid for line in ledger if line.kind == "gone"]
+    return {
+        line.pin: line.duty
+        for line in ledger
+        if line.kind == "pin"
+        and line.pin in pins
+        and line.duty is not None
+        and not line.hz
+        and line.pid in gone
+    }
+
+
+def test_without_the_one_shot_the_pins_stay_as_they_were(tmp_path: Path) -> None:
+    """The weakness that is published: nobody is left, and no hardware takes the power away."""
+    fault = FAULTS["guard and supervisor killed"]
+    levels: dict[int, float] = {}
+    with Trial(write_profile(tmp_path), one_shot=False) as trial:
+        seen: list[TrialResult] = []
+        watched = _before_it_is_gone(
+            fault, lambda: levels.update(frozen(read_ledger(trial.ledger_path), (22, 27)))
+        )
+        seen.append(trial.run(watched))
+    assert seen[0].drove
+    assert levels[22] in {0.0, 1.0}
+    assert levels[27] == 0.0
+    # Software PWM stops at the level of its moment: high means full power, for ever.
+    assert math.isinf(seen[0].stopped_ms) == (levels[22] == 1.0)

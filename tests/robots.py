@@ -1,0 +1,193 @@
+"""Profiles of robots that tests serve on a twin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.profile.profile import Profile
+
+__all__ = [
+    "BLIND_CAR",
+    "CAR",
+    "HOVERCRAFT",
+    "SWAPPED_ROLES",
+    "SWAPPED_WAYS",
+    "changed",
+    "write_profile",
+]
+
+CAR = """\
+# The car of 2017, with everything that can protect it.
+
+[robot]
+name = "test-car"
+body = "car"
+control_hz = 20
+
+[action.steering]
+levels = "three"
+threshold = 0.33
+
+[action.throttle]
+propels = true
+slew_per_s = 8.0
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = 22
+backward = 27
+mix = { throttle = 0.6 }
+
+[output.steer]
+driver = "hbridge"
+part = "steering"
+forward = 4
+backward = 17
+mix = { steering = 0.4 }
+
+[sensor.wheel]
+driver = "encoder"
+a = 5
+b = 6
+counts_per_turn = 20
+wheel_m = 0.21
+
+[sensor.bumper]
+driver = "switch"
+pins = [13, 12]
+
+[sensor.front]
+driver = "hcsr04"
+trigger = 23
+echo = 24
+
+[sensor.pack]
+driver = "ina219"
+
+[camera]
+driver = "picamera2"
+size = [160, 120]
+fps = 20
+
+[limits]
+deadline_ms = 250
+camera_stale_ms = 500
+low_battery_v = 6.6
+
+[reward]
+velocity = 1.0
+collision = -10.0
+stall = -1.0
+
+[enable]
+pin = 19
+
+[emergency_button]
+pin = 21
+"""
+"""A car with an encoder, a bumper, a distance sensor, a one-shot and an emergency button."""
+
+
+def changed(old: str, new: str, text: str = CAR) -> str:
+    """A text with its only `old` replaced."""
+    assert text.count(old) == 1, old
+    return text.replace(old, new)
+
+
+def write_profile(folder: Path, text: str = CAR) -> Profile:
+    """The profile, in a file of its own."""
+    name = next(line for line in text.splitlines() if line.startswith("name = "))
+    path = folder / f"{name.split(chr(34))[1]}.toml"
+    path.write_text(text)
+    return load_profile(path)
+
+
+_WAYS = "forward = 22\nbackward = 27\n"
+_DRIVE = f"[output.drive]\ndriver = \"hbridge\"\npart = \"wheels\"\n{_WAYS}"
+_SIDES = "forward = 4\nbackward = 17\n"
+_STEER = f"[output.steer]\ndriver = \"hbridge\"\npart = \"steering\"\n{_SIDES}"
+
+SWAPPED_WAYS = changed(_WAYS, "forward = 27\nbackward = 22\n")
+"""The car with the two pins of its drive swapped."""
+
+SWAPPED_ROLES = changed(
+    _STEER, _STEER.replace(_SIDES, _WAYS), changed(_DRIVE, _DRIVE.replace(_WAYS, _SIDES))
+)
+"""The car with the pins of its drive and of its steering swapped."""
+
+BLIND_CAR = """\
+# A car without any sensor.
+
+[robot]
+name = "blind-car"
+body = "car"
+control_hz = 20
+
+[action.steering]
+
+[action.throttle]
+propels = true
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = 22
+backward = 27
+mix = { throttle = 1.0 }
+
+[output.steer]
+driver = "hbridge"
+part = "steering"
+forward = 4
+backward = 17
+mix = { steering = 1.0 }
+"""
+
+HOVERCRAFT = """\
+# A vehicle of which no line of code has ever heard: a lift fan, a propeller and two rudders.
+
+[robot]
+name = "skimmer"
+body = "hovercraft"
+control_hz = 25
+
+[action.steering]
+
+[action.throttle]
+low = 0.0
+propels = true
+
+[action.lift]
+one_sided = true
+propels = false
+
+[output.fan]
+driver = "esc"
+part = "propeller"
+over = "lgpio"
+pin = 18
+reverse = "none"
+arm_s = 0.5
+mix = { throttle = 1.0 }
+
+[output.lift_fan]
+driver = "hbridge"
+forward = 5
+backward = 6
+mix = { lift = 1.0 }
+
+[output.left_rudder]
+driver = "servo"
+part = "rudder"
+over = "lgpio"
+pin = 12
+mix = { steering = 1.0 }
+
+[output.right_rudder]
+driver = "servo"
+over = "lgpio"
+pin = 13
+mix = { steering = -0.8 }
+"""
