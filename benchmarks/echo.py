@@ -37,8 +37,8 @@ __all__ = ["EchoRobot", "main"]
 
 _HZ = 100.0
 # A robot takes 500 messages a second from a client, and ends the connection of one that says more.
-_PAUSE_S = 0.005
-_PICTURE_S = 0.003
+_PAUSE_S = 0.0025
+_PICTURE_S = 0.002
 
 
 class EchoRobot:
@@ -119,7 +119,7 @@ class EchoRobot:
 
 
 def main(guard_fd: int, fifo: Path) -> None:
-    """Be the guard and the camera: a state and a new picture every 3 ms, and after each order."""
+    """Be the guard and the camera: a state and a new picture every 2 ms, and after each order."""
     rng = np.random.default_rng(0)
     small = rng.integers(0, 256, (15, 20, 3), dtype=np.uint8)
     pictures = [

@@ -10,7 +10,6 @@ from shapechanger.robot.profile.profile import Profile
 __all__ = [
     "BLIND_CAR",
     "CAR",
-    "HOVERCRAFT",
     "SWAPPED_ROLES",
     "SWAPPED_WAYS",
     "changed",
@@ -143,51 +142,4 @@ part = "steering"
 forward = 4
 backward = 17
 mix = { steering = 1.0 }
-"""
-
-HOVERCRAFT = """\
-# A vehicle of which no line of code has ever heard: a lift fan, a propeller and two rudders.
-
-[robot]
-name = "skimmer"
-body = "hovercraft"
-control_hz = 25
-
-[action.steering]
-
-[action.throttle]
-low = 0.0
-propels = true
-
-[action.lift]
-one_sided = true
-propels = false
-
-[output.fan]
-driver = "esc"
-part = "propeller"
-over = "lgpio"
-pin = 18
-reverse = "none"
-arm_s = 0.5
-mix = { throttle = 1.0 }
-
-[output.lift_fan]
-driver = "hbridge"
-forward = 5
-backward = 6
-mix = { lift = 1.0 }
-
-[output.left_rudder]
-driver = "servo"
-part = "rudder"
-over = "lgpio"
-pin = 12
-mix = { steering = 1.0 }
-
-[output.right_rudder]
-driver = "servo"
-over = "lgpio"
-pin = 13
-mix = { steering = -0.8 }
 """

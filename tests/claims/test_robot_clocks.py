@@ -1,0 +1,202 @@
+"""The same drives on the twin's clock and in real time: exact there, and soon enough here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot.running import RunningRobot, run_robot
+from shapechanger.link.messages import Observation
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.ledger import read_ledger
+from shapechanger.twin.wiring import Wiring
+from tests.robots import write_profile
+from tests.served import Clock, Served, driving
+
+DEADLINE_MS = 250
+STALE_MS = 500
+TICK_MS = 10.0
+LATE_MS = {"twin": TICK_MS, "real": 200.0}
+"""What comes on top of a limit: a tick of the guard, or ten times 20 ms on a busy machine."""
+
+DRIVE = (*[(0.0, 1.0)] * 15, *[(1.0, 0.5)] * 10, *[(-1.0, -0.5)] * 10, *[(0.0, 0.0)] * 5)
+"""Steering and throttle of 40 commands."""
+
+
+@pytest.fixture(scope="module")
+def profile(tmp_path_factory: pytest.TempPathFactory) -> Profile:
+    """The car with everything."""
+    return write_profile(tmp_path_factory.mktemp("profile"))
+
+
+@pytest.fixture(scope="module", params=["twin", "real"])
+def clock(request: pytest.FixtureRequest) -> Clock:
+    """Where time comes from."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def robot(profile: Profile, clock: Clock) -> Iterator[RunningRobot]:
+    """One robot for each clock."""
+    with run_robot(profile, clock=clock) as running:
+        yield running
+
+
+@pytest.fixture
+def car(robot: RunningRobot, clock: Clock) -> Iterator[Served]:
+    """The robot at its start, armed."""
+    with driving(robot, clock) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def wiring(profile: Profile) -> Wiring:
+    """What is attached, without the one-shot, which would hide that a pin is late."""
+    return Wiring(profile.guard_plan(), None)
+
+
+def stands(seen: Observation) -> bool:
+    """Whether nothing propels."""
+    return seen.action_applied[1] == 0.0
+
+
+def drives(seen: Observation) -> bool:
+    """Whether it goes forward."""
+    return seen.action_applied[1] > 0.0
+
+
+def test_forty_commands(car: Served, clock: Clock) -> None:
+    """Each is obeyed, in order; the wheels turn as the encoder says."""
+    start = car.operator.where()
+    times: list[int] = []
+    for number, values in enumerate(DRIVE, 1):
+        seen = car.step(*values)
+        assert seen.stop_reason == ""
+        assert seen.sources["speed"] == "wheel"
+        assert seen.applied_seq in {number, number - 1}
+        times.append(seen.state_ns)
+        if number == 15:
+            assert seen.action_applied == (0.0, 1.0)
+            speed, truth = car.state("speed"), car.operator.where().speed
+            assert speed == pytest.approx(truth, rel=0.15)
+            assert speed > 0.6
+        if number == 35:
+            assert seen.action_applied == (-1.0, -0.5)
+            assert car.operator.where().travelled_m - start.travelled_m > 0.3
+    periods = [after - before for before, after in zip(times, times[1:], strict=False)]
+    if clock == "twin":
+        assert set(periods) == {50_000_000}
+    assert min(periods) > 0
+
+
+def test_silence_ends_at_the_deadline(car: Served, clock: Clock, wiring: Wiring) -> None:
+    """By the ledger: not before the deadline of the last command, and at rest just after it."""
+    seen = car.drive(0.0, 1.0, steps=6)
+    assert seen.command_ns is not None
+    went_on_ms = (car.rest_ns(wiring) - seen.command_ns) / 1e6
+    assert DEADLINE_MS - TICK_MS <= went_on_ms <= DEADLINE_MS + LATE_MS[clock]
+
+
+def test_an_emergency_stop_latches(car: Served, clock: Clock) -> None:
+    """Until somebody who has seen it arms again."""
+    car.drive(0.0, 1.0, steps=3)
+    car.client.emergency_stop("a dog")
+    took = car.drive_until(lambda seen: seen.emergency and stands(seen), 0.0, 1.0)
+    assert took <= (2 if clock == "twin" else 20)
+    assert "a dog" in car.seen.stop_reason
+    for _ in range(5):
+        assert stands(car.step(0.0, 1.0))
+    car.client.arm()
+    car.seen = car.client.ask().message
+    assert not car.seen.emergency
+    car.drive_until(drives, 0.0, 1.0)
+
+
+def test_the_emergency_button_latches(car: Served) -> None:
+    """It cannot be armed while it is pressed, and is not armed when it comes up."""
+    car.drive(0.0, 1.0, steps=3)
+    car.operator.press_stop()
+    car.drive_until(lambda seen: seen.emergency and stands(seen), 0.0, 1.0)
+    assert "button" in car.seen.stop_reason
+    car.operator.press_stop(down=False)
+    assert stands(car.drive(0.0, 1.0, steps=3))
+    car.client.arm()
+    car.seen = car.client.ask().message
+    car.drive_until(drives, 0.0, 1.0)
+
+
+def test_the_bumper_keeps_it_from_going_forward_only(car: Served, clock: Clock) -> None:
+    """Backward it may go, and forward again once nothing is touched."""
+    car.drive(0.0, 1.0, steps=3)
+    car.operator.press_bumper()
+    took = car.drive_until(stands, 0.0, 1.0)
+    assert took <= (2 if clock == "twin" else 20)
+    assert "bumper" in car.seen.stop_reason
+    assert car.state("collision") == 1.0
+    car.drive_until(lambda seen: seen.action_applied[1] == -1.0, 0.0, -1.0)
+    car.operator.press_bumper(down=False)
+    car.drive_until(drives, 0.0, 1.0)
+
+
+def test_blind_means_stop(car: Served, clock: Clock, wiring: Wiring) -> None:
+    """When the newest picture is stale, though commands still come."""
+    car.drive(0.0, 0.4, steps=3)
+    car.operator.break_camera("off")
+    car.drive_until(stands, 0.0, 0.4)
+    assert "Blind" in car.seen.stop_reason
+    age_ms = (car.rest_ns(wiring) - car.seen.captured_ns) / 1e6
+    assert STALE_MS - TICK_MS <= age_ms <= STALE_MS + LATE_MS[clock]
+    car.operator.break_camera("")
+    car.client.arm()
+    car.seen = car.client.ask().message
+    car.drive_until(drives, 0.0, 0.4)
+
+
+def test_a_low_battery_keeps_it_at_rest_until_it_is_armed_again(car: Served) -> None:
+    """A battery recovers as soon as nothing moves, so that alone says nothing."""
+    car.drive(0.0, 0.4, steps=3)
+    car.operator.set_battery(6.0)
+    car.drive_until(stands, 0.0, 0.4)
+    assert "battery" in car.seen.stop_reason
+    car.operator.set_battery(None)
+    assert stands(car.drive(0.0, 0.4, steps=15))
+    car.client.arm()
+    car.seen = car.client.ask().message
+    car.drive_until(drives, 0.0, 0.4)
+
+
+def test_the_distance_ahead(car: Served) -> None:
+    """An echo of 1.2 m is 1.2 m."""
+    car.operator.set_distance(1.2)
+    car.drive_until(lambda _: abs(car.state("distance") - 1.2) < 0.02, 0.0, 0.0)
+    car.operator.set_distance(None)
+
+
+def recorded(profile: Profile, seed: int, folder: Path) -> tuple[list[str], list[bytes]]:
+    """Ledger and pictures of the forty commands."""
+    pictures: list[bytes] = []
+    with (
+        run_robot(profile, clock="twin", seed=seed, folder=folder) as robot,
+        driving(robot, "twin") as car,
+    ):
+        for values in DRIVE:
+            seen = car.step(*values)
+            pictures.append(seen.frame or b"")
+        lines = [repr(replace(line, pid=None)) for line in read_ledger(robot.ledger_path)]
+    return lines, pictures
+
+
+def test_the_twins_clock_repeats_itself(profile: Profile, tmp_path: Path) -> None:
+    """The same seed gives the same transitions at the same times, and the same pictures."""
+    folders = [tmp_path / name for name in ("a", "b", "c")]
+    for folder in folders:
+        folder.mkdir()
+    ledger, pictures = recorded(profile, 3, folders[0])
+    again_ledger, again_pictures = recorded(profile, 3, folders[1])
+    assert all(pictures)
+    assert again_ledger == ledger
+    assert again_pictures == pictures
+    assert recorded(profile, 4, folders[2])[1] != pictures

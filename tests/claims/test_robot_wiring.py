@@ -1,0 +1,53 @@
+"""Two pins that are swapped in a profile are noticed: the wrong motor of the twin turns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.twin.operator import Whereabouts
+from tests.robots import CAR, SWAPPED_ROLES, SWAPPED_WAYS, write_profile
+from tests.served import driving
+
+
+def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
+    """Where a car is before and after full throttle, and what its encoder says of its speed.
+
+    Args:
+        folder: An empty folder.
+        text: The profile that is served; what is wired is the true car.
+    """
+    (folder / "wired").mkdir()
+    wired = write_profile(folder / "wired")
+    served = write_profile(folder, text)
+    arguments = ("--wired-as", str(wired.path))
+    with (
+        run_robot(served, clock="twin", arguments=arguments) as robot,
+        driving(robot, "twin") as car,
+    ):
+        before = car.operator.where()
+        car.drive(0.0, 1.0, steps=8)
+        return before, car.operator.where(), car.state("speed")
+
+
+def test_the_true_profile_drives_forward(tmp_path: Path) -> None:
+    """Along its nose, by the truth and by its encoder."""
+    before, after, speed = driven(tmp_path, CAR)
+    assert after.travelled_m - before.travelled_m > 0.1
+    assert speed > 0.3
+
+
+def test_forward_and_backward_swapped(tmp_path: Path) -> None:
+    """It drives backward, and the encoder says so."""
+    before, after, speed = driven(tmp_path, SWAPPED_WAYS)
+    assert after.travelled_m - before.travelled_m < -0.1
+    assert speed < -0.3
+
+
+def test_drive_and_steering_swapped(tmp_path: Path) -> None:
+    """It steers on the spot."""
+    before, after, speed = driven(tmp_path, SWAPPED_ROLES)
+    assert after.travelled_m == pytest.approx(before.travelled_m, abs=0.01)
+    assert speed == pytest.approx(0.0, abs=0.01)
