@@ -77,7 +77,7 @@ def test_forty_commands(car: Served, clock: Clock) -> None:
         assert seen.stop_reason == ""
         assert seen.sources["speed"] == "wheel"
         assert seen.applied_seq in {number, number - 1}
-        times.append(seen.state_ns)
+        times.append(seen.sent_ns)
         if number == 15:
             assert seen.action_applied == (0.0, 1.0)
             speed, truth = car.state("speed"), car.operator.where().speed

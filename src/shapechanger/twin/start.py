@@ -137,11 +137,16 @@ def start_board(
         one_shot_ms: How long the one-shot of the enable line holds; None where none is fitted.
 
     Raises:
-        RobotError: If it does not start.
+        RobotError: If it does not start, or the folder is not as it must be.
     """
     Wiring(wiring, one_shot_ms)  # Says in words what it does not know.
     folder = Path(folder).absolute()
     socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
+    if not folder.is_dir():
+        raise RobotError(f"There is no folder {folder} for the twin: make it first.")
+    for left in (socket_path, ledger_path, folder / _FIFO):
+        if os.path.lexists(left):
+            raise RobotError(f"A twin has left {left}: give a folder without it.")
     if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
         raise RobotError(f"The path {socket_path} is too long for a socket.")
     ours, theirs = socket.socketpair()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shutil
+import socket
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 
@@ -16,9 +19,11 @@ from shapechanger.errors import RobotError
 
 if TYPE_CHECKING:
     from shapechanger.robot.profile.profile import Profile
-    from shapechanger.twin.start import BoardAt, RunningBoard
+    from shapechanger.twin.start import BoardAt
 
 __all__ = ["Serve"]
+
+_LAST_PORT: Final = 65535
 
 
 @dataclass(frozen=True)
@@ -62,8 +67,9 @@ class Serve:
 
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
-        board, started = self._board(profile) if self.twin else (None, None)
-        try:
+        # Whatever is undone is undone after an error only: the exec leaves everything as it is.
+        with contextlib.ExitStack() as undo:
+            board = self._board(profile, undo) if self.twin else None
             plan = serve_plan(
                 profile,
                 ServeOptions(
@@ -78,16 +84,13 @@ class Serve:
                 board,
                 self.clock,
             )
-            if board is not None:
-                plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
-            sys.stdout.flush()
-            if started is not None:
-                started.outlive_exec()
+            _require_free(str(plan.daemon["host"]), self.port)
+            with contextlib.suppress(OSError):  # A full disk takes words away, and no robot.
+                if board is not None:
+                    plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
+                sys.stdout.flush()
             # In place of this process, which has loaded much that a supervisor has no use for.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
-        finally:
-            if started is not None:
-                started.close()
 
     def _refuse_contradictions(self) -> None:
         """Refuse what has a meaning on a twin only."""
@@ -99,19 +102,50 @@ class Serve:
         for option, given in asked.items():
             if given and not self.twin:
                 raise RobotError(f"{option} means something with --twin only.")
+        if not 0 <= self.port <= _LAST_PORT:
+            raise RobotError(f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}.")
 
-    def _board(self, profile: Profile) -> tuple[BoardAt, RunningBoard | None]:
-        """The twin's board, and the same where it was started here."""
+    def _board(self, profile: Profile, undo: contextlib.ExitStack) -> BoardAt:
+        """The twin's board: the one that runs in the folder, or a new one.
+
+        Args:
+            profile: The robot.
+            undo: What takes back what was started here.
+
+        Raises:
+            RobotError: If it does not start, or runs on another clock.
+        """
         from shapechanger.cli.robot.serving import TwinOptions, start_twin
         from shapechanger.twin.start import find_board
 
-        folder = self.twin_folder or Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
+        folder = self.twin_folder
+        if folder is None:
+            folder = Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
+            undo.callback(shutil.rmtree, folder, ignore_errors=True)
         found = find_board(folder)
         if found is None:
             options = TwinOptions(folder, self.clock, self.wired_as, self.seed)
-            started = start_twin(profile, options)
-            return started, started
+            started = undo.enter_context(start_twin(profile, options))
+            started.outlive_exec()
+            return started
         board, clock = found
         if clock != self.clock:
             raise RobotError(f"The twin in {folder} runs on --clock {clock}.")
-        return board, None
+        return board
+
+
+def _require_free(host: str, port: int) -> None:
+    """Refuse an address that cannot be listened at, before anything starts for it."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        with socket.socket(family, kind, protocol) as listener:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind(address)
+            listener.listen(1)
+    except OSError as error:
+        raise RobotError(
+            f"{host} port {port} cannot be listened at: {error.strerror or error}. "
+            "Does the robot run already?"
+        ) from error

@@ -1,8 +1,8 @@
 """A program that drives at full throttle until it is stopped, in a process of its own.
 
-It is started as `python -m shapechanger.cli.robot.trial.driver`, reads from its standard input
-where the robot is, and writes each command that it has sent to its standard output: the time, in
-nanoseconds of the machine's monotonic clock, on a line of its own.
+It is started by path, reads from its standard input where the robot is, and writes each command
+that it has sent to its standard output: the time, in nanoseconds of the machine's monotonic clock, on
+a line of its own.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ class Driver:
 
     def __init__(self, robot: KnownRobot) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", __name__],
+            # By path, so that it loads nothing of the command line.
+            [sys.executable, "-P", __file__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

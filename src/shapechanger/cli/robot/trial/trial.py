@@ -24,11 +24,13 @@ from shapechanger.twin.wiring import Wiring
 
 __all__ = ["Trial", "TrialResult", "has"]
 
-_COMMANDS: Final = 8
+_COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
 # How long after the promise is looked at whether everything stays at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
+# A supervisor gives up after five restarts within a minute, which here would be a promise kept.
+_MOST_RESTARTS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,7 @@ class Trial:
         self._one_shot_ms = float(self._plan.enable_hold_ms) if one_shot else None
         self._wiring = Wiring(self._plan, self._one_shot_ms)
         self._robot: RunningRobot | None = None
+        self._restarts = 0
         self._board: RunningBoard | None = None
         self._folder: TemporaryDirectory[str] | None = None
 
@@ -100,6 +103,7 @@ class Trial:
         if self._robot is not None:
             self._robot.close()
             self._robot = None
+            self._restarts = 0
         if self._board is not None:
             self._board.close()
             self._board = None
@@ -151,10 +155,11 @@ class Trial:
         return self._robot
 
     def _recover(self, fault: Fault) -> None:
-        if fault.then == "is gone":
-            self.close()
-        elif fault.then == "starts afresh" and self._robot is not None:
+        if fault.then == "starts afresh" and self._robot is not None:
             self._robot.await_restart()
+            self._restarts += 1
+        if fault.then == "is gone" or self._restarts >= _MOST_RESTARTS:
+            self.close()
 
     def _await_drive(self, operator: Operator) -> None:
         """Wait until it moves; a camera that was just mended may take a while to be read again."""

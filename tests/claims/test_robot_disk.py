@@ -1,0 +1,27 @@
+"""A full disk takes the robot's words away, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.twin.wiring import Wiring
+from tests.robots import write_profile
+from tests.served import driving
+
+
+def test_a_full_disk(tmp_path: Path) -> None:
+    """It serves, drives, and stops on silence, though nothing can be written down."""
+    profile = write_profile(tmp_path)
+    with (
+        Path("/dev/full").open("wb") as full,
+        run_robot(profile, log=full) as robot,
+        driving(robot, "real") as car,
+    ):
+        car.drive_until(lambda seen: seen.action_applied[1] == 1.0, 0.0, 1.0)
+        told_ns = car.seen.command_ns
+        assert told_ns is not None
+        rest_ns = car.rest_ns(Wiring(profile.guard_plan(), None))
+        assert (rest_ns - told_ns) / 1e6 <= 250 + 200
+        car.client.arm()  # It still obeys, and says so.
+        assert robot.supervisor.poll() is None

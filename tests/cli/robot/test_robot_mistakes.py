@@ -1,0 +1,229 @@
+"""What is asked wrongly of `shapechanger robot` is refused in one sentence, and leaves nothing."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.robot.daemon.credentials import make_credentials
+from tests.robots import CAR, changed, write_profile
+from tests.twin.robots import until
+
+Run = Callable[..., tuple[int, str, str]]
+KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder to work in, with nobody's configuration and an empty temporary folder.
+
+    Its path is short: a socket's must be.
+    """
+    tmp_path = Path(tempfile.mkdtemp())
+    for name, variable in (("config", "XDG_CONFIG_HOME"), ("tmp", "TMPDIR")):
+        (tmp_path / name).mkdir()
+        monkeypatch.setenv(variable, str(tmp_path / name))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    yield tmp_path
+    shutil.rmtree(tmp_path)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a command: its exit code, what it printed, and what it said was wrong."""
+
+    def ran(*arguments: str) -> tuple[int, str, str]:
+        code = 0
+        try:
+            main(["robot", *arguments])
+        except SystemExit as exit_:
+            code = int(exit_.code or 0)
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return ran
+
+
+def files(folder: Path) -> set[str]:
+    """Everything in a folder."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def fits(home: Path, text: str = CAR) -> str:
+    """A profile whose robot has its key and certificate."""
+    profile = write_profile(home / "work", text)
+    make_credentials(home / "config" / "shapechanger" / "robots" / profile.name, profile.name)
+    return str(profile.path)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "init",
+        "doctor",
+        "calibrate",
+        "serve",
+        "find",
+        "remember",
+        "forget",
+        "drive",
+        "safe-pins",
+        "selftest",
+    ],
+)
+def test_help(run: Run, command: str) -> None:
+    """Each command says what it does."""
+    code, said, _ = run(command, "--help")
+    assert code == 0
+    assert f"shapechanger robot {command}" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("init nocar", "No kind of robot matches 'nocar'"),
+        ("init car --name ../up", "name"),
+        ("serve nocar", "No profile matches 'nocar'. Did you mean 'car'?"),
+        ("serve nowhere.toml", "There is no file nowhere.toml"),
+        ("serve twice.toml", "22"),
+        ("serve tank", "Run `shapechanger robot init`"),
+        ("serve test-car.toml --clock twin", "--clock twin means something with --twin only"),
+        ("serve test-car.toml --wired-as car", "--wired-as means something with --twin only"),
+        ("serve test-car.toml --twin-folder .", "--twin-folder means something with --twin only"),
+        ("serve test-car.toml --twin --port 99999", "A port is"),
+        ("serve test-car.toml --twin --port 0 --host 203.0.113.1", "cannot be listened at"),
+        ("serve test-car.toml --twin --wired-as nowhere.toml", "There is no file nowhere.toml"),
+        ("serve test-car.toml --twin --twin-folder nowhere", "There is no folder"),
+        ("serve test-car.toml --twin --twin-folder stale", "A twin has left"),
+        ("doctor nocar", "No profile matches 'nocar'"),
+        ("safe-pins nocar", "No profile matches 'nocar'"),
+        ("selftest nocar", "No profile matches 'nocar'"),
+        ("selftest test-car.toml", "lift its wheels"),
+        ("selftest test-car.toml --cap 0", "The cap is above 0"),
+        ("selftest test-car.toml --twin --trials 0", "At least one trial"),
+        ("calibrate car", "`shapechanger robot init car` writes one of your own"),
+        ("calibrate test-car.toml --cap 2", "The cap is above 0"),
+        ("calibrate test-car.toml --twin", "needs a terminal"),
+        ("drive nobody", "needs a terminal"),
+        ("drive nobody --cap 0", "The cap is above 0"),
+        ("forget nobody", "No known robot matches 'nobody'"),
+        ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
+        ("remember one 127.0.0.1:99999 --fingerprint insecure", "is no port"),
+        ("remember ../one 127.0.0.1 --fingerprint insecure", "no name for a robot"),
+        ("find --seconds 0", "more than 0 s"),
+    ],
+)
+def test_one_sentence(
+    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, words: str
+) -> None:
+    """Exit code 2; no file more than before, and no process."""
+    monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
+    fits(home)
+    (home / "work" / "twice.toml").write_text(changed("pins = [13, 12]", "pins = [22, 12]"))
+    (home / "work" / "stale").mkdir()
+    (home / "work" / "stale" / "ledger.jsonl").touch()
+    before = files(home)
+    code, _, said = run(*arguments.split())
+    assert code == 2
+    assert said.startswith("error: ")
+    assert words in said
+    assert said.count("\n") == 1
+    assert files(home) == before
+
+
+def test_the_key_is_asked_for(run: Run) -> None:
+    """It does not belong on a command line."""
+    code, _, said = run("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
+    assert code == 2
+    assert "SHAPECHANGER_KEY" in said
+
+
+def test_a_port_in_use(run: Run, home: Path) -> None:
+    """Nothing starts for it."""
+    path = fits(home)
+    before = files(home / "work")
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        code, _, said = run("serve", path, "--twin", "--port", str(port), "--no-announce")
+    assert code == 2
+    assert "Does the robot run already?" in said
+    assert files(home / "work") == before
+
+
+def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
+    """A twin that runs keeps its clock."""
+    path = fits(home)
+    folder = home / "work" / "twin"
+    folder.mkdir()
+    ready = home / "ready.json"
+    command = [sys.executable, "-c", "from shapechanger.cli import main; main()", "robot", "serve"]
+    command += [path, "--twin", "--port", "0", "--no-announce", "--twin-folder", str(folder)]
+    with (home / "log.txt").open("wb") as log:
+        served = subprocess.Popen(
+            [*command, "--ready-file", str(ready)], stdin=subprocess.DEVNULL, stdout=log, stderr=log
+        )
+    try:
+        until(lambda: ready.exists() or served.poll() is not None, 30.0)
+        assert json.loads(ready.read_text())["port"] > 0
+        code, _, said = run(*command[4:], "--clock", "twin")
+        assert code == 2
+        assert "runs on --clock real" in said
+    finally:
+        served.send_signal(signal.SIGTERM)
+        assert served.wait(20.0) == 0
+
+
+def test_init_never_overwrites(run: Run, home: Path) -> None:
+    """Neither the profile nor the key."""
+    code, said, _ = run("init", "car", "--name", "rover")
+    assert code == 0
+    key = next(line.split()[1] for line in said.splitlines() if line.startswith("key  "))
+    profile = home / "work" / "rover.toml"
+    text = profile.read_text() + "# Mine.\n"
+    profile.write_text(text)
+    before = {path: path.read_bytes() for path in home.rglob("*") if path.is_file()}
+    code, _, said = run("init", "car", "--name", "rover")
+    assert code == 2
+    assert "it exists" in said
+    profile.rename(profile.with_name("other.toml"))
+    code, said, _ = run("init", "car", "--name", "rover")
+    assert code == 0
+    assert key in said
+    profile.unlink()
+    profile.with_name("other.toml").rename(profile)
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_doctor(run: Run, home: Path) -> None:
+    """Here nothing is a Raspberry Pi, and it says what is good all the same."""
+    code, said, _ = run("doctor", fits(home), "--port", "0")
+    assert code == 1
+    assert "good     profile" in said
+    assert "good     credentials" in said
+    shutil.rmtree(home / "config" / "shapechanger")
+    _, said, _ = run("doctor", "test-car.toml")
+    assert "MISSING  credentials" in said
+
+
+def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot that is forgotten leaves nothing."""
+    monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
+    before = files(home / "work")
+    assert run("remember", "one", "127.0.0.1:5000", "--fingerprint", "insecure")[0] == 0
+    assert run("forget", "one")[0] == 0
+    assert files(home / "work") == before
+    assert not list((home / "config").rglob("one*"))

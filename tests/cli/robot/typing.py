@@ -1,0 +1,101 @@
+"""A person at a terminal: presses keys, and reads what the command writes."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+__all__ = ["Person"]
+
+_ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
+
+
+class Person:
+    """Runs a command at a terminal.
+
+    Args:
+        arguments: Of `shapechanger`.
+        folder: Where.
+        variables: Of the environment, besides what there is.
+    """
+
+    def __init__(
+        self, arguments: tuple[str, ...], folder: Path, variables: Mapping[str, str]
+    ) -> None:
+        self._main, terminal = pty.openpty()
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", "from shapechanger.cli import main; main()", *arguments],
+            stdin=terminal,
+            stdout=terminal,
+            stderr=terminal,
+            cwd=folder,
+            env={**os.environ, "TERM": "xterm", "COLUMNS": "300", **variables},
+            start_new_session=True,
+        )
+        os.close(terminal)
+        self._text = ""
+        self._ended = threading.Event()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Self:
+        """The person."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End what is left."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.wait(20.0)
+        self._ended.set()
+        self._reader.join()
+        os.close(self._main)
+
+    @property
+    def text(self) -> str:
+        """What was written so far, without colours."""
+        return _ESCAPES.sub("", self._text)
+
+    def press(self, keys: str) -> None:
+        """Press keys."""
+        os.write(self._main, keys.encode())
+
+    def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
+        """Wait for words, and say where they end."""
+        self.wait_for(lambda: words in self.text[after:], seconds, words)
+        return self.text.index(words, after) + len(words)
+
+    def wait_for(self, done: Callable[[], bool], seconds: float = 40.0, what: str = "it") -> None:
+        """Wait until something is so."""
+        until_s = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < until_s, f"{what!r} did not come, but: {self.text[-2000:]}"
+            time.sleep(0.02)
+
+    def end(self, seconds: float = 40.0) -> int:
+        """Wait for the command to end; its exit code."""
+        return self.process.wait(seconds)
+
+    def _read(self) -> None:
+        while not self._ended.is_set():
+            if not select.select([self._main], [], [], 0.1)[0]:
+                continue
+            try:
+                self._text += os.read(self._main, 65536).decode(errors="replace")
+            except OSError:  # The other end is closed.
+                return

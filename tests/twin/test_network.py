@@ -1,0 +1,154 @@
+"""The bad network is bad in the ways that it is told to, and in no other."""
+
+from __future__ import annotations
+
+import random
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shapechanger.twin.network import BadNetwork
+from tests.twin.robots import until
+
+PATIENCE_S = 10.0
+
+
+class Line:
+    """A connection through the network.
+
+    Attributes:
+        network: The network.
+        near: The end of whoever connected.
+        far: The end of whoever was connected to.
+    """
+
+    def __init__(self, network: BadNetwork, listener: socket.socket) -> None:
+        self.network = network
+        self.near = socket.create_connection(("127.0.0.1", network.port), PATIENCE_S)
+        self.far, _ = listener.accept()
+        self.far.settimeout(PATIENCE_S)
+
+    def carries(self, data: bytes, *, back: bool = False) -> bytes:
+        """What arrives of some bytes."""
+        source, sink = (self.far, self.near) if back else (self.near, self.far)
+        source.sendall(data)
+        return self.takes(sink, len(data))
+
+    def takes(self, sink: socket.socket, size: int) -> bytes:
+        """So many bytes from an end."""
+        got = b""
+        while len(got) < size and (more := sink.recv(size - len(got))):
+            got += more
+        return got
+
+    def close(self) -> None:
+        """Both ends."""
+        self.near.close()
+        self.far.close()
+
+
+@pytest.fixture(scope="module")
+def far() -> Iterator[socket.socket]:
+    """Somebody who listens."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.settimeout(PATIENCE_S)
+        yield listener
+
+
+@pytest.fixture
+def line(far: socket.socket) -> Iterator[Line]:
+    """A connection through a network in good order."""
+    with BadNetwork(far.getsockname()[1]) as network:
+        made = Line(network, far)
+        yield made
+        made.close()
+
+
+@pytest.fixture(scope="module")
+def sliced(far: socket.socket) -> Iterator[Line]:
+    """A connection through a network that passes single bytes."""
+    with BadNetwork(far.getsockname()[1]) as network:
+        network.slice_bytes = 1
+        made = Line(network, far)
+        yield made
+        made.close()
+
+
+@given(data=st.binary(min_size=1, max_size=3000), back=st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_slices_change_nothing(sliced: Line, data: bytes, back: bool) -> None:
+    """Byte by byte, both ways, in order."""
+    assert sliced.carries(data, back=back) == data
+
+
+def test_much_at_once(line: Line) -> None:
+    """More than the network holds back, while nobody reads yet."""
+    data = random.Random(0).randbytes(300_000)
+    line.near.sendall(data[:100_000])
+    assert line.carries(data[100_000:])[:100_000] == data[:100_000]
+    assert line.takes(line.far, 100_000) == data[200_000:]
+
+
+def test_latency(line: Line) -> None:
+    """Each byte takes its time, and not much more."""
+    line.network.latency_s = 0.2
+    before_s = time.monotonic()
+    assert line.carries(b"late") == b"late"
+    assert 0.19 <= time.monotonic() - before_s < 2.0
+
+
+def test_silence_holds_back_and_keeps_the_connection(line: Line) -> None:
+    """Nothing passes and nobody is told; afterwards all of it comes."""
+    assert line.carries(b"before") == b"before"
+    line.network.silent = True
+    line.near.sendall(b"held")
+    line.far.settimeout(0.2)
+    with pytest.raises(TimeoutError):
+        line.far.recv(1)
+    line.far.settimeout(PATIENCE_S)
+    line.network.silent = False
+    assert line.takes(line.far, 4) == b"held"
+
+
+def test_reset_tears(line: Line) -> None:
+    """Both ends learn of it as of an error, or of an end."""
+    assert line.carries(b"before") == b"before"
+    line.network.reset()
+
+    def ended(end: socket.socket) -> bool:
+        try:
+            return end.recv(1) == b""
+        except ConnectionResetError:
+            return True
+
+    assert ended(line.near)
+    assert ended(line.far)
+
+
+def test_half_an_end(line: Line) -> None:
+    """The far end hears the end, and is still heard."""
+    assert line.carries(b"before") == b"before"
+    line.network.half_close()
+    assert line.far.recv(1) == b""
+    assert line.carries(b"after", back=True) == b"after"
+
+
+def test_nobody_behind_it() -> None:
+    """A connection ends as soon as it is made."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with (
+        BadNetwork(port) as network,
+        socket.create_connection(("127.0.0.1", network.port), PATIENCE_S) as near,
+    ):
+        ends: list[bytes] = []
+
+        def ended() -> bool:
+            ends.append(near.recv(1))
+            return ends[-1] == b""
+
+        until(ended)
