@@ -104,9 +104,9 @@ def write_profile(folder: Path, text: str = CAR) -> Profile:
 
 
 _WAYS = "forward = 22\nbackward = 27\n"
-_DRIVE = f"[output.drive]\ndriver = \"hbridge\"\npart = \"wheels\"\n{_WAYS}"
+_DRIVE = f'[output.drive]\ndriver = "hbridge"\npart = "wheels"\n{_WAYS}'
 _SIDES = "forward = 4\nbackward = 17\n"
-_STEER = f"[output.steer]\ndriver = \"hbridge\"\npart = \"steering\"\n{_SIDES}"
+_STEER = f'[output.steer]\ndriver = "hbridge"\npart = "steering"\n{_SIDES}'
 
 SWAPPED_WAYS = changed(_WAYS, "forward = 27\nbackward = 22\n")
 """The car with the two pins of its drive swapped."""

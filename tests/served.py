@@ -98,4 +98,3 @@ def driving(robot: RunningRobot, clock: Clock, **options: Any) -> Generator[Serv
         client.take()
         client.arm()
         yield Served(robot, client, operator, clock)
-

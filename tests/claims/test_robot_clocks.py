@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -86,7 +87,7 @@ def test_forty_commands(car: Served, clock: Clock) -> None:
         if number == 35:
             assert seen.action_applied == (-1.0, -0.5)
             assert car.operator.where().travelled_m - start.travelled_m > 0.3
-    periods = [after - before for before, after in zip(times, times[1:], strict=False)]
+    periods = [after - before for before, after in pairwise(times)]
     if clock == "twin":
         assert set(periods) == {50_000_000}
     assert min(periods) > 0

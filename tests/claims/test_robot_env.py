@@ -1,4 +1,4 @@
-"""`RemoteVehicle-v1` over the real thing: link, daemon, guard and drivers, and a twin below them."""
+"""`RemoteVehicle-v1` over the real thing: link, daemon, guard, drivers, and a twin below them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.wiring import WiredOutput, Wiring
 from tests.robot.profile.texts import HOVERCRAFT
 from tests.robots import BLIND_CAR, write_profile
+from tests.twin.robots import until
 
 Env = gym.Env[Any, Any]
 FORWARD = np.array([0.0, 1.0], np.float32)
@@ -67,7 +68,8 @@ def test_the_reward_says_where_it_comes_from(car: RunningRobot, env: Env) -> Non
         metres = 0.0
         for _ in range(20):
             seen, reward, terminated, truncated, info = env.step(FORWARD)
-            assert not (terminated or truncated), info
+            assert not terminated
+            assert not truncated, info["truncated_because"]
             assert reward == pytest.approx(sum(info["reward_terms"].values()))
             assert info["reward_terms"]["reward_collision"] == 0.0
             metres += info["reward_velocity"]
@@ -90,10 +92,11 @@ def test_a_wall_ends_the_episode(env: Env) -> None:
     else:
         pytest.fail("It never reached a wall.")
     assert info["reward_collision"] == -10.0
-    assert reward < -9.0
+    assert float(reward) < -9.0
     env.reset(seed=1)
     *_, terminated, truncated, _ = env.step(-FORWARD)
-    assert not (terminated or truncated)
+    assert not terminated
+    assert not truncated
 
 
 def test_the_size_of_2017(car: RunningRobot) -> None:
@@ -112,6 +115,7 @@ def test_four_keys(car: RunningRobot) -> None:
     env = FourWay(env_of(car))
     env.reset(seed=0)
     wanted = {"forward": (0, 1), "backward": (0, -1), "right": (1, 0), "left": (-1, 0)}
+    info: dict[str, Any] = {}
     for number, way in enumerate(FOUR_WAYS):
         for _ in range(20):  # What the bumper touched before may still count.
             *_, info = env.step(np.int64(number))
@@ -129,12 +133,16 @@ def test_a_lost_link_truncates(tmp_path: Path, serve: Callable[[Profile], Runnin
     env.step(FORWARD)
     robot.supervisor.kill()
     robot.supervisor.wait()
+    info: dict[str, Any] = {}
     for _ in range(100):
         *_, terminated, truncated, info = env.step(FORWARD)
         assert not terminated
-        if truncated:
+        # The guard may have time to say that it disarms, as it must.
+        if truncated and not info["truncated_because"].startswith("The robot was disarmed"):
             break
-    assert info["truncated_because"].startswith("The link to the robot is lost")
+    # On a twin the daemon may live long enough to say what it lost itself.
+    lost = ("The link to the robot is lost", "The twin's board is gone")
+    assert info["truncated_because"].startswith(lost)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(FORWARD)
     with pytest.raises(LinkError, match="No robot answers"):
@@ -167,10 +175,10 @@ def test_bodies_that_do_not_drive(
     env = env_of(robot)
     env.reset(seed=0)
     assert env.action_space.shape == (actions,)
-    low, high = env.action_space.low, env.action_space.high  # pyright: ignore
     # Within every cap, and another one for each.
     told = np.linspace(0.2, 0.6, actions, dtype=np.float32)
-    told = np.clip(told, low, high)
+    assert env.action_space.contains(told)
+    info: dict[str, Any] = {}
     for _ in range(100):
         *_, truncated, info = env.step(told)
         assert not truncated, info["truncated_because"]
@@ -209,5 +217,9 @@ def test_a_vehicle_that_no_code_has_ever_seen(
         assert after.travelled_m > start.travelled_m
         assert after.heading < start.heading
         env.close()
-        operator.advance(0.1)
-        assert all(outputs()[name].at_rest for name in wiring.propelling)
+
+        def rests() -> bool:
+            operator.advance(0.05)
+            return all(outputs()[name].at_rest for name in wiring.propelling)
+
+        until(rests)

@@ -20,11 +20,31 @@ from shapechanger.link.address import parse_address
 from shapechanger.link.proof import parse_key
 from shapechanger.remote.trust import INSECURE, parse_trust
 
-__all__ = ["KnownRobot", "forget", "known_folder", "known_names", "recall", "remember"]
+__all__ = [
+    "KnownRobot",
+    "check_name",
+    "forget",
+    "known_folder",
+    "known_names",
+    "recall",
+    "remember",
+]
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")
 _OTHERS: Final = 0o077
+
+
+def check_name(name: str) -> None:
+    """Refuse a name that no robot can be remembered under.
+
+    Raises:
+        LinkError: If it is none.
+    """
+    if not _NAME.fullmatch(name):
+        raise LinkError(
+            f"{name!r} is no name for a robot: up to 64 letters, digits, '-', '_' and '.'."
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +68,7 @@ class KnownRobot:
     fingerprint: str
 
     def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name):
-            raise LinkError(
-                f"{self.name!r} is no name for a robot: up to 64 letters, digits, '-', '_' and '.'."
-            )
+        check_name(self.name)
         parse_address(self.address)
         parse_trust(self.fingerprint)
         if self.key or self.fingerprint != INSECURE:

@@ -142,13 +142,13 @@ def start_board(
     Wiring(wiring, one_shot_ms)  # Says in words what it does not know.
     folder = Path(folder).absolute()
     socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
+    if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
+        raise RobotError(f"The path {socket_path} is too long for a socket.")
     if not folder.is_dir():
         raise RobotError(f"There is no folder {folder} for the twin: make it first.")
     for left in (socket_path, ledger_path, folder / _FIFO):
         if os.path.lexists(left):
             raise RobotError(f"A twin has left {left}: give a folder without it.")
-    if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
-        raise RobotError(f"The path {socket_path} is too long for a socket.")
     ours, theirs = socket.socketpair()
     with theirs, tempfile.TemporaryFile() as file:
         file.write(wiring.to_json().encode())

@@ -84,7 +84,8 @@ class Person:
         """Wait until something is so."""
         until_s = time.monotonic() + seconds
         while not done():
-            assert time.monotonic() < until_s, f"{what!r} did not come, but: {self.text[-2000:]}"
+            late = time.monotonic() > until_s or not self._reader.is_alive()
+            assert not late or done(), f"{what!r} did not come, but: {self.text[-2000:]}"
             time.sleep(0.02)
 
     def end(self, seconds: float = 40.0) -> int:

@@ -20,7 +20,7 @@ _SERVO = OutputPlan(
     "steering",
     settings={"over": "pca9685", "bus": 1, "output_enable": -1},
 )
-_CAR = GuardPlan("car", (ActionPlan("throttle", propels=True),), (_MOTOR,))
+CAR = GuardPlan("car", (ActionPlan("throttle", propels=True),), (_MOTOR,))
 
 
 class _Camera:
@@ -44,7 +44,7 @@ class _Camera:
 
 def _found(
     root: Path,
-    guard: GuardPlan = _CAR,
+    guard: GuardPlan = CAR,
     camera: CameraPlan | None = None,
     gives: Frame | RobotError | None = None,
 ) -> dict[str, Finding]:
@@ -107,14 +107,14 @@ def test_the_systemd_unit_must_restart_and_make_safe(
 
 def test_what_hardware_would_make_safe_is_asked_for(tmp_path: Path) -> None:
     """A servo board without OE and motors without a one-shot outlive their processes."""
-    found = _found(tmp_path, replace(_CAR, outputs=(_SERVO,)))
+    found = _found(tmp_path, replace(CAR, outputs=(_SERVO,)))
     assert {found["enable line"].level, found["output enable"].level} == {"missing"}
-    assert _found(tmp_path, replace(_CAR, enable_pin=18))["enable line"].level == "good"
+    assert _found(tmp_path, replace(CAR, enable_pin=18))["enable line"].level == "good"
 
 
 def test_devices_are_looked_for_where_outputs_need_them(tmp_path: Path) -> None:
     """A car on an H-bridge needs the pins, and no bus."""
-    guard = replace(_CAR, outputs=(_MOTOR, _SERVO))
+    guard = replace(CAR, outputs=(_MOTOR, _SERVO))
     _write(tmp_path, "dev/gpiochip0", "")
     sentences = {
         f.sentence: f.level for f in examine_robot(guard, None, 0, tmp_path) if f.check == "devices"
@@ -145,5 +145,5 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
         taken.bind(("", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        ports = [f for f in examine_robot(_CAR, None, port, tmp_path) if f.check == "port"]
+        ports = [f for f in examine_robot(CAR, None, port, tmp_path) if f.check == "port"]
     assert [f.level for f in ports] == ["missing"]

@@ -32,14 +32,15 @@ class Init:
         """Write it all, and say how to go on."""
         from shapechanger.cli.robot.serving import credentials_of
         from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
-        from shapechanger.remote.known import KnownRobot, remember
+        from shapechanger.remote.known import KnownRobot, check_name, remember
         from shapechanger.robot.profile.starter import write_profile
         from shapechanger.robot.setup.unit import write_unit
 
         name = self.name or self.kind
+        check_name(name)
         profile = write_profile(self.kind, self.out or Path(f"{name}.toml"), name)
         credentials = credentials_of(name, self.credentials, make=True)
-        unit = write_unit(profile)
+        unit, is_new = write_unit(profile)
         key = credentials.key_file.read_text().strip()
         digits = fingerprint_hex(credentials.fingerprint)
         # So that the same machine can drive it, on a twin above all.
@@ -47,7 +48,7 @@ class Init:
         console = plain_console()
         console.print(
             f"wrote {profile}: look at its pins before anything moves\n"
-            f"wrote {unit}: for systemd, see docs/hardware.md\n"
+            f"{'wrote' if is_new else 'kept'} {unit}: for systemd, see docs/hardware.md\n"
             f"key and certificate in {credentials.key_file.parent}\n\n"
             f"key          {key}\n"
             f"fingerprint  {fingerprint_short(credentials.fingerprint)}\n\n"

@@ -124,7 +124,7 @@ class Calibration:
         self._console.print(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
         with self._served({}) as robot:
             state = Layout.from_json(robot.welcome.state_layout)
-            place = state.slices["speed"].start
+            place: int = state.slices["speed"].start
             travelled_m = 0.0
             robot.acknowledge()
             seen = robot.observation().message
@@ -178,37 +178,55 @@ class _Jogger:
         self._robot = robot
         self._keys = keys
         self._step = step
+        self._output = output
         # The action that moves this output most.
-        self._action = max(output.mix, key=lambda name: abs(output.mix[name]))
+        name = max(output.mix, key=lambda action: abs(output.mix[action]))
         self._names = [action.name for action in profile.actions]
         self._rests = [action.rest for action in profile.actions]
-        self._weight = output.mix[self._action]
+        self._place = self._names.index(name)
+        self._action = profile.actions[self._place]
+        self._way = math.copysign(1.0, output.mix[name])
 
     def find(self, cap: float) -> float | None:
         """Jog until Enter.
 
         Returns:
-            The value of the output then; None where the person skips.
+            Where the output really is then; None where the person skips.
         """
-        value = 0.0
+        value = self._action.rest
         self._robot.acknowledge()
         newest = self._robot.newest
         seq = newest.message.seq if newest else 0
+        accepted: int | None = None
+        before: tuple[float, ...] = ()
         while True:
             seen = self._robot.observation(seq).message
             seq = seen.seq
             if not seen.armed:
                 raise RobotError(f"The robot stopped: {seen.stop_reason}")
             values = list(self._rests)
-            values[self._names.index(self._action)] = math.copysign(value, self._weight * value)
-            self._robot.command(values, answers=seq)
-            for key in self._keys.keys(0.0):
-                if key == "enter":
-                    return value * abs(self._weight)
-                if key in {"n", "q"}:
-                    return None
-                value += {"d": self._step, "a": -self._step}.get(key, 0.0)
-                value = min(max(value, -cap), cap)
+            values[self._place] = value
+            told = self._robot.command(values, answers=seq)
+            if accepted is None:
+                for key in self._keys.keys(0.0):
+                    if key == "enter":
+                        accepted = told + 1
+                        break
+                    if key in {"n", "q"}:
+                        return None
+                    step = self._way * {"d": self._step, "a": -self._step}.get(key, 0.0)
+                    value = min(max(value + step, -cap), cap)
+                    value = min(max(value, self._action.low), self._action.high)
+            # It may still be on its way there.
+            elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
+                return self._is_at(before)
+            before = seen.action_applied
+
+    def _is_at(self, applied: tuple[float, ...]) -> float:
+        """The value of the output that follows from what the actions are."""
+        mix = self._output.mix
+        mixed = sum(mix.get(name, 0.0) * v for name, v in zip(self._names, applied, strict=True))
+        return min(max(self._output.offset + mixed, -1.0), 1.0)
 
 
 def _number(value: object) -> float:

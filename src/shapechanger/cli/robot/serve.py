@@ -103,7 +103,9 @@ class Serve:
             if given and not self.twin:
                 raise RobotError(f"{option} means something with --twin only.")
         if not 0 <= self.port <= _LAST_PORT:
-            raise RobotError(f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}.")
+            raise RobotError(
+                f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}."
+            )
 
     def _board(self, profile: Profile, undo: contextlib.ExitStack) -> BoardAt:
         """The twin's board: the one that runs in the folder, or a new one.

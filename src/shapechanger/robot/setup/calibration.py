@@ -27,8 +27,8 @@ PULSES: Final = {
 
 # A servo must not be driven against its stop while it is jogged: makers state 500 to 2500 us as the
 # whole range that standard servos understand, and 900 to 2100 us as what most of them reach.
-_NARROWEST_US: Final = 600.0
-_WIDEST_US: Final = 2400.0
+_NARROWEST_US: Final = 600
+_WIDEST_US: Final = 2400
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def widened(output: OutputPlan) -> OutputPlan:
     return dataclasses.replace(output, settings=settings)
 
 
-def pulse_changes(output: OutputPlan, found: Jogging) -> dict[str, float]:
+def pulse_changes(output: OutputPlan, found: Jogging) -> dict[str, int]:
     """What to write for an output that was jogged, by dotted name; whole microseconds.
 
     Args:
@@ -71,8 +71,8 @@ def pulse_changes(output: OutputPlan, found: Jogging) -> dict[str, float]:
     """
     keys = _keys(output)
     jogged = PulseRange(*(_number(output, key) for key in keys))
-    widths = [float(round(jogged.width_us(v))) for v in (found.low, found.middle, found.high)]
-    PulseRange(*widths)  # Says in words what cannot be.
+    widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
+    PulseRange(*map(float, widths))  # Says in words what cannot be.
     return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}
 
 

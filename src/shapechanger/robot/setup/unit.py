@@ -30,11 +30,11 @@ def unit_text(profile: Path, program: str, user: str) -> str:
     return text
 
 
-def write_unit(profile: Path) -> Path:
+def write_unit(profile: Path) -> tuple[Path, bool]:
     """Write the unit beside a profile; one that is there already stays.
 
     Returns:
-        The file.
+        The file, and whether it was written.
 
     Raises:
         OutputError: If it cannot be written.
@@ -46,7 +46,7 @@ def write_unit(profile: Path) -> Path:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        return path
+        return path, False
     except OSError as error:
         raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
-    return path
+    return path, True

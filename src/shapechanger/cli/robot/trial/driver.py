@@ -1,8 +1,8 @@
 """A program that drives at full throttle until it is stopped, in a process of its own.
 
 It is started by path, reads from its standard input where the robot is, and writes each command
-that it has sent to its standard output: the time, in nanoseconds of the machine's monotonic clock, on
-a line of its own.
+that it has sent to its standard output: the time, in nanoseconds of the machine's monotonic clock,
+on a line of its own.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from types import TracebackType
 from typing import Final, Self
@@ -32,12 +33,13 @@ class Driver:
 
     Args:
         robot: The robot.
+        within: The command that starts it elsewhere, such as in another network namespace.
     """
 
-    def __init__(self, robot: KnownRobot) -> None:
+    def __init__(self, robot: KnownRobot, within: Sequence[str] = ()) -> None:
         self.process = subprocess.Popen(
             # By path, so that it loads nothing of the command line.
-            [sys.executable, "-P", __file__],
+            [*within, sys.executable, "-P", __file__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

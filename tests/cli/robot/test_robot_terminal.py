@@ -1,0 +1,158 @@
+"""A person at a terminal drives and calibrates a robot on its twin."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.remote.known import KnownRobot, remember
+from tests.cli.robot.typing import Person
+from tests.robots import CAR, changed, write_profile
+
+SERVO = """\
+# A car with a servo that somebody must calibrate.
+
+[robot]
+name = "servo-car"
+body = "car"
+
+[action.steering]
+gain = 1.0  # Not touched.
+
+[output.steer]
+driver = "servo"
+part = "steering"
+over = "lgpio"
+pin = 18
+left_us = 1150   # Full left.
+centre_us = 1500
+right_us = 1850
+mix = { steering = 1.0 }
+"""
+
+MOTOR = """\
+# A car whose motor somebody must calibrate.
+
+[robot]
+name = "motor-car"
+body = "car"
+
+[action.throttle]
+propels = true
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = 22  # Header place 15.
+backward = 27
+mix = { throttle = 0.8 }
+"""
+
+
+def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """E arms, W drives, X disarms, Space stops, Q leaves; the wheels of the twin turn."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path)) as robot, robot.operator() as operator:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        operator.place(0)
+        start = operator.where().travelled_m
+        with Person(
+            ("robot", "drive", "car", "--cap", "1.0"), tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}
+        ) as person:
+            person.read_until("not armed")
+            person.press("e")
+            read = person.read_until(" armed · cap 1.0")
+            person.press("w")
+            person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
+            # A key that is not pressed again lets go.
+            person.wait_for(lambda: operator.where().speed < 0.05)
+            person.press("x")
+            read = person.read_until("not armed", read)
+            person.press(" ")
+            person.read_until("EMERGENCY STOP", read)
+            person.press("q")
+            assert person.end() == 0
+
+
+def test_calibrating_a_servo(tmp_path: Path) -> None:
+    """Its ends and its middle are found; everything else in the file stays."""
+    profile = write_profile(tmp_path, SERVO)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("full left")
+        person.press("a" * 25)  # From 1500 us to the left, 2 % of 900 us each.
+        person.press("\r")
+        read = person.read_until("straight", read)
+        person.press("d")
+        person.press("\r")
+        read = person.read_until("full right", read)
+        person.press("d" * 20 + "\r")
+        assert person.end() == 0, person.text
+    text = profile.path.read_text()
+    steer = tomllib.loads(text)["output"]["steer"]
+    assert steer["left_us"] == pytest.approx(1500 - 0.5 * 900)
+    assert steer["centre_us"] == pytest.approx(1500 + 0.02 * 900)
+    assert steer["right_us"] == pytest.approx(1500 + 0.4 * 900)
+    assert "# Full left." in text
+    assert "# Not touched." in text
+    assert "calibrated = " in text
+
+
+def test_calibrating_a_motor(tmp_path: Path) -> None:
+    """The smallest duty that moves it; one that goes backward is turned around."""
+    profile = write_profile(tmp_path, MOTOR)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("begins to move")
+        person.press("d" * 4 + "\r")
+        person.read_until("Y or N", read)
+        person.press("n")
+        assert person.end() == 0, person.text
+    text = profile.path.read_text()
+    drive = tomllib.loads(text)["output"]["drive"]
+    assert drive["start"] == pytest.approx(4 * 0.05 * 0.8)
+    assert drive["mix"] == {"throttle": -0.8}
+    assert "# Header place 15." in text
+
+
+def test_skipping_everything_writes_nothing(tmp_path: Path) -> None:
+    """The file stays as it is."""
+    profile = write_profile(tmp_path, SERVO)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        person.read_until("full left")
+        person.press("n")
+        assert person.end() == 0
+        assert "nothing was written" in person.text
+    assert profile.path.read_text() == SERVO
+
+
+def test_an_action_that_is_capped(tmp_path: Path) -> None:
+    """What is written is where the servo really was, not where it was asked to go."""
+    capped = changed("gain = 1.0  # Not touched.", "low = -0.3", SERVO)
+    profile = write_profile(tmp_path, capped)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("full left")
+        person.press("a" * 40 + "\r")
+        read = person.read_until("straight", read)
+        person.press("\r")
+        read = person.read_until("full right", read)
+        person.press("d" * 10 + "\r")
+        assert person.end() == 0, person.text
+    steer = tomllib.loads(profile.path.read_text())["output"]["steer"]
+    assert steer["left_us"] == pytest.approx(1500 - 0.3 * 900)
+
+
+@pytest.mark.slow
+def test_selftest_on_a_twin(tmp_path: Path) -> None:
+    """Every fault once, in a table; each promise is kept, or the exit code says so."""
+    text = changed('[camera]\ndriver = "picamera2"\nsize = [160, 120]\nfps = 20\n\n', "", CAR)
+    profile = write_profile(tmp_path, changed("camera_stale_ms = 500\n", "", text))
+    with Person(("robot", "selftest", str(profile.path), "--twin"), tmp_path, {}) as person:
+        code = person.end(200.0)
+        said = person.text
+    assert "this robot has no camera" in said
+    assert "NEVER" not in said
+    assert "it never drove" not in said
+    assert code == (1 if "BAD" in said else 0)

@@ -1,0 +1,97 @@
+"""A radio that really dies: the robot here, its driver in a network namespace, the cable cut."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from shapechanger.cli.robot.running import RunningRobot, run_robot
+from shapechanger.cli.robot.trial.driver import Driver
+from shapechanger.remote.known import KnownRobot
+from shapechanger.twin.ledger import read_ledger
+from shapechanger.twin.oracle import propelled
+from shapechanger.twin.wiring import Wiring
+from tests.envs.drawing import missing
+from tests.robots import write_profile
+from tests.twin.robots import until
+
+DEADLINE_MS: Final = 250.0
+LATE_MS: Final = 200.0  # Ten times what is promised on a quiet machine.
+NAME: Final = f"sc{os.getpid() % 100_000}"
+ROBOT, DRIVER = "10.213.77.1", "10.213.77.2"
+
+
+def ip(*arguments: str) -> None:
+    """Run `ip`, and fail in its words."""
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def namespace() -> Iterator[str]:
+    """A network namespace with a cable to here; both are gone afterwards."""
+    if sys.platform != "linux" or os.geteuid() != 0:
+        missing("Network namespaces need Linux and root")
+    try:
+        ip("netns", "add", NAME)
+    except (OSError, subprocess.CalledProcessError) as error:
+        missing(f"No network namespace can be made here: {error}")
+    near, far = f"{NAME}a", f"{NAME}b"
+    try:
+        try:
+            ip("link", "add", near, "type", "veth", "peer", "name", far, "netns", NAME)
+        except subprocess.CalledProcessError as error:
+            missing(f"No pair of interfaces can be made here: {error.stderr}")
+        ip("address", "add", f"{ROBOT}/24", "dev", near)
+        ip("link", "set", near, "up")
+        ip("-n", NAME, "address", "add", f"{DRIVER}/24", "dev", far)
+        ip("-n", NAME, "link", "set", far, "up")
+        yield NAME
+    finally:
+        subprocess.run(["ip", "link", "del", near], check=False, capture_output=True)
+        ip("netns", "del", NAME)
+
+
+def there(robot: RunningRobot) -> KnownRobot:
+    """The robot at its end of the cable."""
+    return robot.known_at(f"{ROBOT}:{robot.port}")
+
+
+def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
+    """At full throttle: at rest at the deadline; joined again, somebody can drive again."""
+    profile = write_profile(tmp_path)
+    wiring = Wiring(profile.guard_plan(), None)
+    within = ("ip", "netns", "exec", namespace)
+    with (
+        run_robot(profile, arguments=("--host", ROBOT)) as robot,
+        robot.operator() as operator,
+    ):
+
+        def drives() -> bool:
+            outputs = wiring.read(operator.levels(), 0)
+            return not all(outputs[name].at_rest for name in wiring.propelling)
+
+        operator.place(0)
+        with Driver(there(robot), within) as driver:
+            driver.await_commands(8)
+            until(drives)
+            cut_ns = time.monotonic_ns()
+            ip("link", "set", f"{namespace}a", "down")
+            until(lambda: not drives())
+            ends = [i.end_ns for i in propelled(read_ledger(robot.ledger_path), wiring)]
+            assert max(ends) - cut_ns <= (DEADLINE_MS + LATE_MS) * 1e6
+            # What it still sends reaches nobody.
+            sent = len(driver.sent)
+            until(lambda: len(driver.sent) >= sent)
+            assert not drives()
+        ip("link", "set", f"{namespace}a", "up")
+        operator.place(0)
+        with Driver(there(robot), within) as driver:
+            driver.await_commands(8)
+            until(drives)

@@ -1,0 +1,34 @@
+"""The systemd unit that a new robot gets."""
+
+from pathlib import Path
+
+from shapechanger.robot.setup.doctor import examine_robot
+from shapechanger.robot.setup.unit import unit_text, write_unit
+from tests.robot.setup.test_doctor import CAR
+
+
+def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
+    """No place is left open, and nothing has to be edited."""
+    text = unit_text(tmp_path / "car.toml", "/opt/venv/bin/shapechanger", "pi")
+    assert f"ExecStart=/opt/venv/bin/shapechanger robot serve {tmp_path}/car.toml" in text
+    assert "User=pi" in text
+    assert "@" not in text
+
+
+def test_the_doctor_is_content_with_the_unit(tmp_path: Path) -> None:
+    """What `init` writes is what `doctor` looks for."""
+    folder = tmp_path / "etc/systemd/system"
+    folder.mkdir(parents=True)
+    path, is_new = write_unit(folder / "car.toml")
+    found = {finding.check: finding for finding in examine_robot(CAR, None, 0, tmp_path)}
+    assert is_new
+    assert path.parent == folder
+    assert found["systemd"].level == "good"
+
+
+def test_a_unit_that_somebody_changed_stays(tmp_path: Path) -> None:
+    """It may hold the settings of another robot."""
+    path, _ = write_unit(tmp_path / "car.toml")
+    path.write_text("mine")
+    assert write_unit(tmp_path / "car.toml") == (path, False)
+    assert path.read_text() == "mine"
