@@ -54,7 +54,7 @@ SEEDS = [
         Acknowledge(seq=1),
         Take(),
         Release(),
-        Arm(emergency=1),
+        Arm(answers=1, emergency=1),
         Disarm(),
         EmergencyStop(reason="fuzz"),
         Ping(token=3),
@@ -162,7 +162,7 @@ def fuzz(
         _drained(owner)
         for order in orders:
             counts[f"order {order.kind}"] += 1
-            if order.kind in ("command", "arm"):
+            if order.kind in ("command", "halt", "arm"):
                 raise AssertionError(f"{order} came through, by {data!r}.")
         orders.clear()
         if number % 50_000 < 4:

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -41,17 +42,25 @@ _PROCESSES: Final[dict[Literal["guard", "daemon"], int]] = {"guard": 25, "daemon
 
 
 def faults(trials: int = TRIALS) -> list[Row]:
-    """The time to stop after each fault."""
-    with tempfile.TemporaryDirectory() as folder:
+    """The time to stop after each fault, on as many robots at a time as there are cores."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ThreadPoolExecutor(max(1, (os.cpu_count() or 1))) as robots,
+    ):
         profile = _written(CAR, Path(folder) / "car.toml")
-        rows: list[Row] = []
-        with Trial(profile) as trial:
-            for fault in FAULTS.values():
-                rows.append(_fault_row(fault, [trial.run(fault) for _ in range(trials)]))
+
+        def tried(fault: Fault, one_shot: bool) -> list[TrialResult]:
+            with Trial(profile, one_shot=one_shot) as trial:
+                return [trial.run(fault) for _ in range(trials)]
+
+        work = [robots.submit(tried, fault, True) for fault in FAULTS.values()]
         bare = FAULTS["guard and supervisor killed"]
-        with Trial(profile, one_shot=False) as trial:
-            rows.append(_without_one_shot(bare, [trial.run(bare) for _ in range(trials)]))
-        return rows
+        without = robots.submit(tried, bare, False)
+        rows = [
+            _fault_row(fault, done.result())
+            for fault, done in zip(FAULTS.values(), work, strict=True)
+        ]
+        return [*rows, _without_one_shot(bare, without.result())]
 
 
 def _fault_row(fault: Fault, results: list[TrialResult]) -> Row:

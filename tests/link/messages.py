@@ -52,7 +52,7 @@ client_messages: st.SearchStrategy[ClientMessage] = st.one_of(
     st.builds(Acknowledge, seq=_counts),
     st.builds(Take),
     st.builds(Release),
-    st.builds(Arm, emergency=_counts),
+    st.builds(Arm, answers=_counts, emergency=_counts),
     st.builds(Disarm),
     st.builds(EmergencyStop, reason=_texts),
     st.builds(Ping, token=_counts),

@@ -153,3 +153,21 @@ def test_a_picture_travels_as_it_is() -> None:
     full = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": jpeg})
     assert len(full) - len(empty) <= len(jpeg) + 4
     assert jpeg in full
+
+
+def test_bytes_are_counted_and_not_shown() -> None:
+    """A log line with a message in it is no picture, and tells no proof."""
+    fields = {name: 0 for name in Observation.__struct_fields__}
+    seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
+    assert "frame=<5000 bytes>" in repr(seen)
+    assert "holder='Grace'" in repr(seen)
+    assert len(repr(seen)) < 400
+    assert "frame=None" in repr(msgspec.structs.replace(seen, frame=None))
+    hello = messages.Hello(version=1, proof=b"secret" * 5)
+    assert repr(hello).startswith("Hello(version=1, proof=<30 bytes>, name='', role='program'")
+
+
+def test_an_arming_answers_something() -> None:
+    """One that does not say what was seen is no message."""
+    with pytest.raises(LinkError, match="answers"):
+        decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))

@@ -248,7 +248,9 @@ class Robot:
                 case m.EmergencyStop():
                     self.emergency, self.stop_reason = True, message.reason
                 case m.Arm():
-                    if self.arming == "person" and hello.role != "person":
+                    if message.answers != self._seq:
+                        await self._send(socket, m.Refused(reason="You answer something old."))
+                    elif self.arming == "person" and hello.role != "person":
                         await self._send(socket, m.Refused(reason="Only a person arms this robot."))
                     else:
                         self.armed, self.emergency = True, False

@@ -37,6 +37,19 @@ def test_a_program_takes_arms_commands_and_sees(run: Run, connect: Connect) -> N
     assert (command.answers, command.ttl_ms, command.scale) == (before.message.seq, 250, 1.0)
 
 
+def test_arming_answers_what_is_true_now_and_ends_what_was_seen(run: Run, connect: Connect) -> None:
+    """An emergency stop of a moment ago is not ended by who has not seen it."""
+    robot = run()
+    client = connect(robot, role="person")
+    client.take()
+    seen = client.ask().message
+    robot.emergency = True
+    client.arm()
+    (arm,) = robot.told(m.Arm)
+    assert arm.answers == seen.seq + 1
+    assert arm.emergency == seen.emergencies == 0
+
+
 def test_commands_are_numbered_whoever_sends_them(run: Run, connect: Connect) -> None:
     """Two threads never send the same number."""
     client = connect(run(), pace="lockstep")

@@ -179,3 +179,14 @@ def test_an_answer_to_what_was_never_seen_is_refused(serve: Callable[..., Served
         seq = client.command((0.0, 0.5), answers=seen.message.seq + 1000)
         client.observation(seen.message.seq)
         assert "was not sent to this client" in client.refusal(seq)
+
+
+def test_who_arms_after_a_long_silence_arms(serve: Callable[..., Served]) -> None:
+    """The client looks first: what it saw last is too old to arm by."""
+    robot = serve(max_observation_age_ms=100)
+    with RobotClient.connect(robot.known, role="person") as person:
+        person.take()
+        seen = person.ask().message
+        eventually(lambda: robot.running.clock.now_ns() - seen.sent_ns > 200_000_000)
+        person.arm()
+        assert robot.running.guard.state.armed

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from gpiozero import DigitalOutputDevice
 
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import open_output
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.chips.pca9685 import Pca9685
 from shapechanger.twin.hardware import connect
@@ -16,7 +18,7 @@ from shapechanger.twin.levels import Channel
 from shapechanger.twin.operator import Operator
 from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import Wiring
-from tests.twin.robots import ACTIONS, process, servo
+from tests.twin.robots import ACTIONS, esc, process, servo
 
 _ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 3, "output_enable": 24}
 _SERVO_CAR = GuardPlan("car", ACTIONS, (servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),))
@@ -92,6 +94,36 @@ def test_without_auto_increment_a_block_lands_in_one_register() -> None:
     chip.write(0x06, [0, 0, 51, 1])
     assert chip.read(0x06, 4) == [1, 1, 1, 1]
     assert chip.channels[0].us == 0.0
+
+
+def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_known(
+    tmp_path: Path,
+) -> None:
+    """The servo is written to, and the propeller must not start for it."""
+    at = _ON_CHIP | {"channel": 0}
+    plan = GuardPlan(
+        "car",
+        ACTIONS,
+        (
+            esc("drive", "wheels", {"throttle": 1.0}, **at),
+            servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),
+        ),
+    )
+    with start_board(plan, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        drive, steer = (open_output(output, hardware) for output in plan.outputs)
+        wiring = Wiring(plan)
+        steer.write(0.2, 0)
+        operator.break_chip(1, 0x40)
+        with pytest.raises(RobotError, match="Remote I/O"):
+            steer.write(0.4, 1)
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        operator.break_chip(1, 0x40, dead=False)
+        steer.write(0.2, 2)
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        drive.write(0.0, 2)
+        assert wiring.read(operator.levels(), 0)["steer"].value == pytest.approx(0.2, abs=0.01)
+        hardware.close()
 
 
 def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:

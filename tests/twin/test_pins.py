@@ -73,13 +73,26 @@ def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
         assert 50 < high < 110
 
 
-def test_a_polite_end_leaves_outputs_low(tmp_path: Path) -> None:
-    """Who closes its pins leaves low outputs, and nobody is reported dead."""
+def test_a_polite_end_leaves_motors_low_and_plain_outputs_alone(tmp_path: Path) -> None:
+    """As the pins of a Pi; and nobody is reported dead."""
     with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")
-        assert set(operator.levels().duties.values()) == {0.0}
+        assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.0}
         assert "gone" not in {line.kind for line in read_ledger(board.ledger_path)}
+
+
+def test_an_active_low_output_is_never_low_on_opening_and_after_closing(tmp_path: Path) -> None:
+    """As on a Pi: low at the OE input of a PCA9685 would let its old pulses through."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        for _ in range(2):
+            device = DigitalOutputDevice(24, active_high=False, pin_factory=hardware.pin_factory())
+            assert not device.value
+            device.close()
+        hardware.close()
+        assert operator.levels().duties == {24: 1.0}
+        assert {line.duty for line in read_ledger(board.ledger_path) if line.pin == 24} == {1.0}
 
 
 @pytest.mark.parametrize(("asked", "done"), [(0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)])

@@ -85,6 +85,11 @@ _Values = Annotated[tuple[float, ...], Meta(max_length=64)]
 class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_only=True):
     """Something that is said in one go."""
 
+    def __repr__(self) -> str:
+        """Its fields, of bytes only how many: neither pictures nor proofs belong in a log."""
+        fields = (f"{name}={_shown(getattr(self, name))}" for name in self.__struct_fields__)
+        return f"{type(self).__name__}({', '.join(fields)})"
+
 
 # What a client says.
 
@@ -148,13 +153,16 @@ class Release(_Message, frozen=True):
 
 
 class Arm(_Message, frozen=True):
-    """Lets the outputs move, and ends an emergency stop.
+    """Lets the outputs move; from a person it also ends an emergency stop.
 
     Attributes:
+        answers: `seq` of an observation that was received just now, as in a command: one that was
+            long on its way must not arm a robot that nobody looks at any more.
         emergency: How many emergency stops the sender has seen (`Observation.emergencies`). One
             that came since is not ended, because the sender did not know of it.
     """
 
+    answers: _Sequence
     emergency: _Sequence = 0
 
 
@@ -364,6 +372,10 @@ def decode_robot_message(data: bytes) -> RobotMessage:
         LinkError: If these bytes are too many or no message of a robot.
     """
     return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
+
+
+def _shown(value: object) -> str:
+    return f"<{len(value)} bytes>" if isinstance(value, bytes) else repr(value)
 
 
 def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _M:

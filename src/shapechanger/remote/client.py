@@ -182,16 +182,18 @@ class RobotClient:
             raise RobotRefused(lease.reason or f"{lease.holder or 'Somebody'} commands the robot.")
 
     def arm(self) -> None:
-        """Let the outputs move.
+        """Let the outputs move; a person also ends an emergency stop that was seen before.
 
         Raises:
             RobotRefused: If the robot says no, or does not say yes in time.
         """
-        newest = self.newest or self.ask()
+        seen = self.newest or self.ask()
+        # It answers what is true now, and ends only what was known before.
+        newest = self.ask()
         refusal = _Question(messages.Refused)
         with self._lock:
             self._questions.append(refusal)
-        self._post(messages.Arm(emergency=newest.message.emergencies))
+        self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
         until = self._clock() + self._access.timeout_s
         try:
             while self._clock() < until:

@@ -87,12 +87,26 @@ class PinBoard:
         return None if line is None else line.owner
 
     def claim(
-        self, owner: Owner, pin: int, mode: Literal["input", "output"], pull: str, t: int
+        self,
+        owner: Owner,
+        pin: int,
+        mode: Literal["input", "output"],
+        pull: str,
+        level: int,
+        t: int,
     ) -> int:
-        """Take a pin; an output is low then.
+        """Take a pin.
+
+        Args:
+            owner: Who takes it.
+            pin: Its BCM number.
+            mode: What it is from now on.
+            pull: Which way an input is pulled.
+            level: Where an output begins.
+            t: The time.
 
         Returns:
-            Its level, as far as its pull and the resistors around it make it.
+            Its level; that of an input as far as its pull and the resistors around it make it.
 
         Raises:
             RobotError: If another process holds it.
@@ -102,8 +116,8 @@ class PinBoard:
             raise RobotError(f"GPIO{pin} is busy: process {line.owner.pid} holds it.")
         line.owner, line.mode, line.pull, line.hz = owner, mode, pull, 0
         if mode == "output":
-            self._drive(owner.pid, pin, 0.0, 0, t)
-            return 0
+            self._drive(owner.pid, pin, float(level), 0, t)
+            return level
         if pin in self.levels.duties:
             self.levels.release(pin)
             idle = self._wiring.idle_level(pin)

@@ -4,9 +4,10 @@ A pin does what `LowAtOncePin` does on a Raspberry Pi, which is gpiozero's lgpio
 at once (see `shapechanger.robot.drivers.lgpio_pins`):
 
 * Opening a pin makes it an input without a pull, so it floats to the level that its resistors give
-  it; as an output it is low first.
+  it; it becomes an output straight at the level that it is opened with.
 * Software PWM has whole percent (`int(value * 100)`) and a whole frequency.
-* An output that is closed is low, and stays an output. An input that is closed loses its pull.
+* An output that is closed stays an output, at its level; one with PWM goes low first. An input that
+  is closed loses its pull.
 * When the process dies, its outputs keep their level, and software PWM stops where it is.
 
 Two things are simpler than on the Pi: a new duty cycle above 0 acts at once and not from the next
@@ -51,27 +52,35 @@ class TwinPin(PiPin):
         return self._number
 
     def close(self) -> None:
-        """Leave an output low and an output; take the pull from an input."""
+        """Leave an output as it is, low if it had PWM; take the pull from an input."""
         if self._link.closed:
             return
         if self._function == "output":
-            self._put(0.0, 0)
+            self.frequency = None
         else:
             self._pull = "floating"
             self._watched = False
             self._claim()
+
+    def output_with_state(self, state: bool) -> None:
+        """Become an output at this level, or take it, if it is an output already."""
+        if self._function != "output":
+            self._function, self._pull, self._watched = "output", "floating", False
+            self._claim(int(state))
+        self.state = state
 
     def notice(self, level: int, at_ns: int) -> None:
         """Tell whoever watches this pin that its level has changed."""
         if self._watched and self._edges in ("both", "rising" if level else "falling"):
             self._call_when_changed(at_ns / 1e9, level)
 
-    def _claim(self) -> None:
+    def _claim(self, level: int = 0) -> None:
         answer = self._link.ask(
             op="claim",
             pin=self._number,
             mode=self._function,
             pull=self._pull,
+            level=level,
             t=self.factory.clock.now_ns(),
         )
         self._pwm_hz, self._duty = 0, float(answer["level"])
@@ -80,9 +89,9 @@ class TwinPin(PiPin):
     def _put(self, duty: float, hz: int) -> None:
         if (duty, hz) == (self._duty, self._pwm_hz):
             return
-        self._duty, self._pwm_hz = duty, hz
         now_ns = self.factory.clock.now_ns()
         self._link.post(op="pin", pin=self._number, duty=duty, hz=hz, t=now_ns)
+        self._duty, self._pwm_hz = duty, hz
 
     def _get_function(self) -> str:
         return self._function

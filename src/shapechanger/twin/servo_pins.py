@@ -28,11 +28,12 @@ class TwinServoPins:
         """Send pulses of this width on a BCM pin from now on; 0 for none."""
         if pin not in self._pulses:
             now_ns = self._clock.now_ns()
-            self._link.ask(op="claim", pin=pin, mode="output", pull="floating", t=now_ns)
+            claim = {"op": "claim", "pin": pin, "mode": "output", "pull": "floating", "level": 0}
+            self._link.ask(**claim, t=now_ns)
         pulse = (int(width_us), int(frequency_hz))
         if self._pulses.get(pin) != pulse:
-            self._pulses[pin] = pulse
             self._link.post(op="pulse", pin=pin, us=pulse[0], hz=pulse[1], t=self._clock.now_ns())
+            self._pulses[pin] = pulse
 
     def close(self) -> None:
         """End all pulses; the pins stay low."""

@@ -193,7 +193,8 @@ class Switchboard:
         if isinstance(other, Connection) and other is not connection:
             self._serve(other)  # It may be gone by now.
         t = self._stamp(message)
-        level = self._pins.claim(connection.owner, pin, mode, message["pull"], t)
+        pull, level = message["pull"], message["level"]
+        level = self._pins.claim(connection.owner, pin, mode, pull, level, t)
         if mode == "input":
             connection.inputs.add(pin)
             level = self._input_levels.get(pin, level)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import mmap
 import os
 import struct
@@ -22,6 +23,7 @@ from shapechanger.robot.cameras import v4l2_api as api
 from shapechanger.robot.cameras.barcode import read_barcode
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.v4l2 import V4l2
+from tests.robot.guard.waiting import until
 
 
 def _jpeg(value: int = 0, size: tuple[int, int] = (32, 24)) -> bytes:
@@ -144,6 +146,38 @@ def test_pipe_gives_the_newest_picture_and_its_time(fifo: Path) -> None:
     assert camera.read().jpeg == _jpeg(50)  # The next writer.
     writing.join()
     camera.close()
+
+
+def test_pictures_that_waited_in_the_pipe_are_left_out(fifo: Path) -> None:
+    """Without a time of their own they would all look as if they had just been taken."""
+    camera = open_camera(_plan("pipe", path=str(fifo)))
+    noise = np.random.default_rng(1).integers(0, 256, (24, 32, 3), np.uint8)
+    old = simplejpeg.encode_jpeg(noise, 95)
+    with fifo.open("wb", buffering=0) as writer:
+        fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 1 << 18)
+        count = 150_000 // len(old)  # More than one read takes.
+        writer.write(old * count + _jpeg(90) + _jpeg(20)[:100])
+        assert camera.read().jpeg == _jpeg(90)
+        writer.write(_jpeg(20)[100:])
+        assert camera.read().jpeg == _jpeg(20)
+        writer.write(_jpeg(30))
+    assert camera.read().jpeg == _jpeg(30)  # Its writer is gone, but it is the newest.
+    with pytest.raises(RobotError, match="has ended"):
+        camera.read()
+
+
+def test_program_that_is_ahead_is_caught_up_with(tmp_path: Path) -> None:
+    """The pictures that a program has sent while nobody read."""
+    (tmp_path / "stream").write_bytes(_jpeg(10) * 90 + _jpeg(90))
+    (tmp_path / "send.py").write_text(
+        "import pathlib, sys, time\n"
+        f"sys.stdout.buffer.write(pathlib.Path('{tmp_path}/stream').read_bytes())\n"
+        f"sys.stdout.flush(); pathlib.Path('{tmp_path}/sent').touch(); time.sleep(60)\n"
+    )
+    camera = open_camera(_plan("pipe", path=f"| {sys.executable} {tmp_path}/send.py"))
+    until((tmp_path / "sent").exists)
+    assert camera.read().jpeg == _jpeg(90)
+    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 
 def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:

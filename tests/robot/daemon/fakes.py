@@ -44,6 +44,8 @@ class FakeGuard:
                 data = self._socket.recv(MAX_DATAGRAM)
             except BlockingIOError:
                 break
+            except ConnectionResetError:  # The daemon closed, and had not read everything.
+                data = b""
             if not data:
                 asyncio.get_running_loop().remove_reader(self._socket)
                 return
@@ -65,8 +67,13 @@ class FakeGuard:
     def _obey(self, order: Order) -> None:
         changes: dict[str, Any] = {}
         rest = {"applied": (0.0, 0.0), "applied_seq": None}
-        if order.kind == "arm":
+        may_arm = order.person or not self.state.emergency
+        if order.kind == "arm" and may_arm:
             changes = {"armed": True, "emergency": False, "stop_reason": ""}
+        elif order.kind == "arm":
+            changes = {"refused": "Only a person ends an emergency stop."}
+        elif order.kind == "halt":
+            changes = rest
         elif order.kind == "disarm":
             changes = {"armed": False, "stop_reason": order.reason, **rest}
         elif order.kind == "emergency":

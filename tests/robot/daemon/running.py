@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import socket
 import ssl
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
@@ -160,17 +161,31 @@ class Running:
             yield Client(socket, certificate)
 
     @contextlib.asynccontextmanager
+    async def idle(self, stranger: socket.socket) -> AsyncIterator[None]:
+        """A connection through the handshake that says nothing then."""
+        context = ssl.create_default_context()
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+        _, writer = await asyncio.open_connection(sock=stranger, ssl=context, server_hostname="x")
+        yield
+        writer.transport.abort()
+
+    @contextlib.asynccontextmanager
     async def client(self, key: bytes = b"", **hello: Any) -> AsyncIterator[Client]:
         """A connection that is known."""
         async with self.connect() as client:
             await client.greet(key, **hello)
             yield client
 
+    async def arm(self, client: Client, emergency: int = 0) -> None:
+        """Let a client ask for arming, in answer to what it sees now."""
+        seen = await client.observe()
+        await client.say(Arm(answers=seen.seq, emergency=emergency))
+
     async def armed(self, client: Client) -> None:
         """Let a person take the command and arm."""
         while not (await client.take()).mine:
             pass
-        await client.say(Arm())
+        await self.arm(client)
         await until(lambda: self.guard.state.armed, "the guard is armed")
 
 

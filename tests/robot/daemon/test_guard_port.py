@@ -84,16 +84,17 @@ def test_to_a_guard_that_does_not_read_stops_are_kept_and_commands_are_not(ends:
         for _ in range(3):
             ends.port.send(Order(kind="disarm", reason="gone"))
             ends.port.send(Order(kind="emergency", reason="stop"))
+            ends.port.send(Order(kind="halt"))
             ends.port.send(Order(kind="arm"))
         heard: list[Order] = []
 
         def stopped() -> bool:
             heard.extend(ends.heard())
-            return [order.kind for order in heard[-2:]] == ["disarm", "emergency"]
+            return [order.kind for order in heard[-3:]] == ["disarm", "emergency", "halt"]
 
-        await until(stopped, "both stops have arrived")
+        await until(stopped, "all stops have arrived")
         return heard
 
     heard = asyncio.run(play())
-    assert {order.kind for order in heard[:-2]} == {"command"}
-    assert heard[-3].seq < 9_999
+    assert {order.kind for order in heard[:-3]} == {"command"}
+    assert heard[-4].seq < 9_999

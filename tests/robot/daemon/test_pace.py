@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from shapechanger.link.messages import Acknowledge, Arm, Command, Observation
+from shapechanger.link.messages import Acknowledge, Command, Observation
 from shapechanger.robot.daemon.plan import DaemonPlan
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, picture
@@ -41,9 +41,9 @@ def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch)
     async def script(robot: Running) -> None:
         async with robot.client(pace="lockstep") as client:
             await client.take()
-            await client.say(Arm())
+            await robot.arm(client)
             seen = await client.observe()
-            assert clock.steps == [0.01, 0.05]
+            assert clock.steps == [0.05, 0.01, 0.05]
             assert seen.armed
             for seq in range(1, 50):
                 before_ns = clock.ns

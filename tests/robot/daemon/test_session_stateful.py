@@ -55,6 +55,7 @@ class Robot(RuleBasedStateMachine):
         self.holder: int | None = None
         self.numbers = 0
         self.stops = 0
+        self.halts = 0
 
     def connected(self) -> bool:
         """Whether there is anybody."""
@@ -87,6 +88,7 @@ class Robot(RuleBasedStateMachine):
             return
         held = None if self.holder is None else self.told[self.holder].role
         if held is None or (held == "program" and self.told[place].role == "person"):
+            self.halts += held is not None
             self.holder = place
 
     @rule(place=_places)
@@ -96,14 +98,16 @@ class Robot(RuleBasedStateMachine):
             self.holder = None
             self.stops += 1
 
-    @rule(place=_places, emergency=st.integers(0, 2))
-    def arm(self, place: int, emergency: int) -> None:
-        """Somebody arms: only a person, and only if anybody commands."""
-        before = len(self.orders)
-        if not self.say(place, Arm(emergency=emergency)):
+    @rule(place=_places, emergency=st.integers(0, 2), back=st.integers(-1, 3))
+    def arm(self, place: int, emergency: int, back: int) -> None:
+        """Somebody arms: only a person who sees the robot, and only if anybody commands."""
+        if place not in self.sessions:
             return
+        before, answers = len(self.orders), self.answers(place, back)
+        self.say(place, Arm(answers=answers, emergency=emergency))
         may = self.told[place].role == "person" and self.holder is not None
-        assert [order.kind for order in self.orders[before:]] == (["arm"] if may else [])
+        orders = [(order.kind, order.person) for order in self.orders[before:]]
+        assert orders == ([("arm", True)] if may and self.is_fresh(place, answers) else [])
 
     @rule(place=_places)
     def stop(self, place: int) -> None:
@@ -144,18 +148,13 @@ class Robot(RuleBasedStateMachine):
         if place not in self.sessions:
             return
         told = self.told[place]
-        answers = max(0, max(told.sent, default=0) - back)
+        answers = self.answers(place, back)
         message = Command(seq=seq, answers=answers, values=values, scale=scale)
-        sent_ns = told.sent.get(answers)
-        if (
-            self.holder == place
-            and seq > told.newest_command
-            and len(values) == 2
-            and all(map(math.isfinite, values))
-            and sent_ns is not None
-            and self.now_ns - sent_ns <= MAX_AGE_NS
-        ):
-            self.allowed.append((seq, tuple(scale * value for value in values)))
+        if self.holder == place and seq > told.newest_command:
+            if len(values) != 2 or not all(map(math.isfinite, values)):
+                self.halts += 1
+            elif self.is_fresh(place, answers):
+                self.allowed.append((seq, tuple(scale * value for value in values)))
         told.newest_command = max(told.newest_command, seq)
         assert self.say(place, message)
 
@@ -198,11 +197,25 @@ class Robot(RuleBasedStateMachine):
         assert all(order.reason for order in lost)
 
     @invariant()
+    def only_nonsense_and_another_driver_halt_the_robot(self) -> None:
+        """Not what is late, comes twice or is said by somebody else."""
+        assert sum(order.kind == "halt" for order in self.orders) == self.halts
+
+    @invariant()
     def there_is_one_who_commands(self) -> None:
         """The same as in the reference."""
         held = self.cockpit.lease.holder
         place = next((p for p, s in self.sessions.items() if s.who == held), None)
         assert place == self.holder
+
+    def answers(self, place: int, back: int) -> int:
+        """Number of an observation: the last one that was sent there, or so many before it."""
+        return max(0, max(self.told[place].sent, default=0) - back)
+
+    def is_fresh(self, place: int, answers: int) -> bool:
+        """Whether an observation was sent there a short time ago."""
+        sent_ns = self.told[place].sent.get(answers)
+        return sent_ns is not None and self.now_ns - sent_ns <= MAX_AGE_NS
 
     def say(self, place: int, message: Any) -> bool:
         """Say something, if there is somebody at that place."""

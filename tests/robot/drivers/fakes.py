@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
@@ -16,8 +17,47 @@ MS = 1_000_000
 """Nanoseconds of a millisecond."""
 
 
+class Fault:
+    """Makes one operation on the hardware fail; nothing fails until it is armed.
+
+    Attributes:
+        happened: Whether the operation has come, and failed.
+    """
+
+    def __init__(self) -> None:
+        self._left = 0
+        self._takes_effect = False
+        self.happened = False
+
+    def arm(self, operation: int, takes_effect: bool) -> None:
+        """Let an operation fail, counted from 1 on.
+
+        Args:
+            operation: Which one.
+            takes_effect: Whether it is done all the same, as by a chip that acknowledges too late.
+        """
+        self._left, self._takes_effect, self.happened = operation, takes_effect, False
+
+    def disarm(self) -> None:
+        """Let nothing fail."""
+        self._left = 0
+
+    def during(self, operation: Callable[[], None]) -> None:
+        """Do an operation, unless it is the one that fails."""
+        self._left -= 1
+        fails = self._left == 0
+        if not fails or self._takes_effect:
+            operation()
+        if fails:
+            self.happened = True
+            raise OSError(110, "Connection timed out")
+
+
 class ScriptedPin(MockPWMPin):
     """A pin whose changes are logged, at a time that the test sets."""
+
+    def _set_state(self, value: float) -> None:
+        self.factory.fault.during(lambda: super(ScriptedPin, self)._set_state(value))
 
     def _change_state(self, value: float) -> bool:
         changed = super()._change_state(value)
@@ -34,6 +74,7 @@ class ScriptedFactory(MockFactory):
         super().__init__(pin_class=ScriptedPin)
         self.now_s = 0.0
         self.log: list[tuple[str, float]] = []
+        self.fault = Fault()
 
     def drive(self, pin: int, level: int, at_s: float) -> None:
         """Change an input."""
@@ -44,8 +85,9 @@ class ScriptedFactory(MockFactory):
 class FakeBus:
     """Chips as tables of registers; a chip that is not there does not acknowledge."""
 
-    def __init__(self, chips: dict[int, dict[int, int]]) -> None:
+    def __init__(self, chips: dict[int, dict[int, int]], fault: Fault) -> None:
         self.chips = chips
+        self._fault = fault
         self.writes: list[tuple[int, int, list[int]]] = []
         self.closed = 0
 
@@ -71,7 +113,8 @@ class FakeBus:
         """Set several registers."""
         chip = self._chip(i2c_addr)
         self.writes.append((i2c_addr, register, list(data)))
-        chip.update({register + i: byte for i, byte in enumerate(data)})
+        for i, byte in enumerate(data):  # A transfer may break off in its middle.
+            self._fault.during(functools.partial(chip.__setitem__, register + i, byte))
 
     def close(self) -> None:
         """Let go."""
@@ -81,25 +124,31 @@ class FakeBus:
 class FakeServoPins:
     """Remembers the width of each pin's pulses."""
 
-    def __init__(self) -> None:
+    def __init__(self, fault: Fault) -> None:
         self.widths_us: dict[int, int] = {}
+        self._fault = fault
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
         """Send pulses."""
-        self.widths_us[pin] = width_us
+        self._fault.during(functools.partial(self.widths_us.__setitem__, pin, width_us))
 
     def close(self) -> None:
         """Let go."""
 
 
 class FakeHardware:
-    """All of it."""
+    """All of it.
+
+    Attributes:
+        fault: Makes an operation on a pin, a chip or a pulse fail.
+    """
 
     def __init__(self, chips: dict[int, dict[int, int]] | None = None) -> None:
         self.clock = RealClock()
         self.factory = ScriptedFactory()
-        self.bus = FakeBus(chips or {})
-        self.pulses = FakeServoPins()
+        self.fault = self.factory.fault
+        self.bus = FakeBus(chips or {}, self.fault)
+        self.pulses = FakeServoPins(self.fault)
 
     def pin_factory(self) -> Any:
         """The pins."""

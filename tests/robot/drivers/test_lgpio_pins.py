@@ -165,6 +165,26 @@ def test_gpiozero_makes_1400_us_out_of_1500_us(lgpio: _Lgpio) -> None:
     servo.close()
 
 
+def test_servo_pins_let_go_also_when_a_pin_fails(
+    lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever tries again would find them busy; and the other pins end as well."""
+    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_servo").LgpioServoPins()
+    for pin in (17, 18, 19):
+        pins.pulse(pin, 1500, 50)
+    send = lgpio.tx_servo
+
+    def fail_on_18(handle: int, pin: int, width_us: int, hz: int) -> None:
+        if pin == 18:
+            raise lgpio.error("bad")
+        send(handle, pin, width_us, hz)
+
+    monkeypatch.setattr(lgpio, "tx_servo", fail_on_18)
+    with pytest.raises(lgpio.error):
+        pins.close()
+    assert (lgpio.levels[17], lgpio.levels[19], lgpio.closed) == (0, 0, True)
+
+
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
     """Lgpio forgets a pin at the level of that moment; ours is low."""
     pins = importlib.import_module("shapechanger.robot.drivers.lgpio_servo").LgpioServoPins()

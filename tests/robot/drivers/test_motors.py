@@ -86,6 +86,28 @@ def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) ->
     assert set(dict(hardware.factory.log).values()) == {0.0}
 
 
+@pytest.mark.parametrize(("value", "broken"), [(0.5, 27), (-0.5, 22)])
+def test_one_input_goes_low_also_when_the_other_one_fails(value: float, broken: int) -> None:
+    """The motor turns by the other one."""
+    hardware = FakeHardware()
+    motor = hardware.output("hbridge", **_HBRIDGE)
+    motor.write(value, 0)
+    hardware.fault.arm(1 if broken == 22 else 2, takes_effect=False)
+    with pytest.raises(RobotError, match="timed out"):
+        motor.write(0.0, 1)
+    assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.0, 0.0]
+
+
+def test_backward_leaves_both_inputs_low_when_it_is_closed() -> None:
+    """The direction input would otherwise stay high for ever."""
+    hardware = FakeHardware()
+    motor = hardware.output("phase_enable", **_PHASE)
+    motor.write(-1.0, 0)
+    hardware.factory.log.clear()
+    motor.close()
+    assert ("GPIO5", 0.0) in hardware.factory.log
+
+
 def test_pin_in_use_is_refused_in_words() -> None:
     """Two motors on one pin is a mistake in the profile."""
     hardware = FakeHardware()

@@ -36,6 +36,12 @@ def _asleep() -> dict[int, int]:
     return {0x00: 0x11, 0x01: 0x04, 0xFE: 0x1E}
 
 
+def _width_us(hardware: FakeHardware, channel: int) -> float:
+    """The pulse that the chip's registers say."""
+    low, high = (hardware.bus.chips[0x40][0x06 + 4 * channel + i] for i in (2, 3))
+    return (high << 8 | low) * 4.88
+
+
 @given(value=st.floats(-1.0, 1.0), ends=st.tuples(st.floats(500, 1400), st.floats(1600, 2500)))
 def test_width_and_value_are_inverse(value: float, ends: tuple[float, float]) -> None:
     """What is said to be done is what was asked for, whichever way a servo is mounted."""
@@ -218,6 +224,54 @@ def test_outputs_are_off_when_the_bus_fails() -> None:
     hardware.bus.chips[0x40] = chip
     servo.write(0.0, 2)
     assert hardware.factory.pin(26).state == 0.0
+
+
+def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
+    """The controller may go on at full throttle; writing to the servo must not let it."""
+    hardware = FakeHardware({0x40: _asleep()})
+    on_chip = _ON_CHIP | {"output_enable": 26}
+    esc = hardware.output("esc", **_ESC | on_chip | {"arm_s": 0.0}, channel=0)
+    servo = hardware.output("servo", **_SERVO | on_chip, channel=1)
+    esc.write(0.0, 0)
+    hardware.fault.arm(4, takes_effect=True)
+    with pytest.raises(RobotError, match="timed out"):
+        esc.write(1.0, 1)
+    servo.write(0.5, 2)
+    assert hardware.factory.pin(26).state == 1.0
+    esc.write(0.0, 3)
+    assert hardware.factory.pin(26).state == 0.0
+    assert _width_us(hardware, 0) == pytest.approx(1500, abs=5)
+
+
+def test_outputs_of_a_dead_process_do_not_come_back() -> None:
+    """The first controller that is opened turns the outputs of all channels on."""
+    stale = {0x06 + 4 + 2: 410 & 0xFF, 0x06 + 4 + 3: 410 >> 8}  # Channel 1: 2000 us.
+    hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121} | stale})
+    hardware.output("esc", **_ESC | _ON_CHIP | {"output_enable": 26}, channel=0)
+    assert hardware.factory.pin(26).state == 0.0
+    assert (0x40, 0xFD, [0x10]) in hardware.bus.writes
+
+
+def test_chip_that_lost_its_power_is_started_again() -> None:
+    """It would otherwise take the pulses, and send none."""
+    hardware = FakeHardware({0x40: _asleep()})
+    esc, servo = (
+        hardware.output("servo", **_SERVO | _ON_CHIP, channel=channel) for channel in (0, 1)
+    )
+    esc.write(0.0, 0)
+    servo.write(0.5, 0)
+    hardware.bus.chips[0x40] = _asleep()
+    for i in range(100):
+        try:
+            esc.write(0.0, i)
+        except RobotError:
+            break
+    esc.write(0.0, 100)
+    servo.write(0.5, 100)
+    chip = hardware.bus.chips[0x40]
+    assert (chip[0x00], chip[0xFE]) == (0x20, 121)
+    assert _width_us(hardware, 0) == pytest.approx(1500, abs=5)
+    assert _width_us(hardware, 1) == pytest.approx(1750, abs=5)
 
 
 def test_channel_that_does_not_exist_leaves_nothing_open() -> None:

@@ -59,9 +59,9 @@ def quick_car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> 
     return replace(plan, actions=actions)
 
 
-def arm(now_ns: int, emergency: int = 0) -> Order:
+def arm(now_ns: int, emergency: int = 0, *, person: bool = True) -> Order:
     """Somebody arms the robot now."""
-    return Order("arm", issued_ns=now_ns, emergency=emergency)
+    return Order("arm", issued_ns=now_ns, emergency=emergency, person=person)
 
 
 def command(

@@ -14,7 +14,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard import sensors
 from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
-from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.guard.plan import GuardPlan, LimitPlan, SensorPlan
 from shapechanger.robot.guard.process import Guard, main
 from shapechanger.robot.guard.wire import GuardState, Order, decode_state, encode
 from tests.robot.guard.plans import MS, arm, command, quick_car
@@ -49,7 +49,7 @@ class _Clock:
 class _Bench:
     """A guard with everything around it."""
 
-    def __init__(self, plan: GuardPlan) -> None:
+    def __init__(self, plan: GuardPlan, **options: bool) -> None:
         self.clock = _Clock()
         self.factory = MockFactory(pin_class=MockPWMPin)
         self.daemon, guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -57,7 +57,9 @@ class _Bench:
         self.supervisor, heart = socket.socketpair()
         self._channel = DaemonChannel(guards_end.detach())
         self._heartbeat = Heartbeat(heart.detach(), 0.0)
-        self.guard = Guard(plan, self, self._channel, self._heartbeat, logging.getLogger("test"))
+        self.guard = Guard(
+            plan, self, self._channel, self._heartbeat, logging.getLogger("test"), **options
+        )
         self.states: list[GuardState] = []
 
     def pin_factory(self) -> MockFactory:
@@ -98,8 +100,8 @@ def make() -> Iterator[Callable[[GuardPlan], _Bench]]:
     """Make benches that are closed in the end."""
     benches: list[_Bench] = []
 
-    def bench(plan: GuardPlan) -> _Bench:
-        benches.append(_Bench(plan))
+    def bench(plan: GuardPlan, **options: bool) -> _Bench:
+        benches.append(_Bench(plan, **options))
         return benches[-1]
 
     yield bench
@@ -115,7 +117,7 @@ def _drives(bench: _Bench) -> None:
     bench.clock.at(1, lambda: bench.say(arm(_T0), command(1, _T0)))
 
 
-_Make = Callable[[GuardPlan], _Bench]
+_Make = Callable[..., _Bench]
 
 
 def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
@@ -264,6 +266,8 @@ def test_an_output_that_fails_rests_everything_until_it_obeys_and_somebody_arms(
     stopped = [s for s in bench.states if s.emergency]
     assert "Output drive does not answer." in stopped[0].stop_reason
     assert all(s.outputs["steer"] == 0.0 and s.applied == (0.0, 0.0) for s in stopped)
+    assert "NOT at rest: Output drive: Output drive does not answer." in stopped[0].stop_reason
+    assert "NOT at rest" not in stopped[-1].stop_reason  # It obeys by then.
     assert stopped[-1].emergencies == 2  # Armed while it did not obey: that failed again.
     assert state.applied_seq == 2
     assert steer.write(0.0, 0) == 0.0
@@ -283,6 +287,51 @@ def test_a_released_robot_lets_go_once(make: _Make) -> None:
     _drives(bench)
     bench.run(300)
     assert released == ["drive", "steer"] * 2
+
+
+def test_after_a_failure_it_begins_with_an_emergency_stop(make: _Make) -> None:
+    """Whatever was stopped before stays stopped: only a person ends it."""
+    bench = make(_plan(), after_failure=True)
+    bench.clock.at(1, lambda: bench.say(arm(_T0, 1, person=False), command(1, _T0)))
+    state = bench.run(20)
+    assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
+    words = "Emergency stop: the robot's processes failed and started afresh."
+    assert state.stop_reason == words
+    assert not any(state.applied_seq for state in bench.states)
+    bench.guard.ended = ""
+    bench.clock.at(21, lambda: bench.say(arm(_T0, 1)))
+    assert bench.run(40).armed
+
+
+def test_an_order_without_sense_ends_the_command_before(make: _Make) -> None:
+    """At once, and not only at its deadline."""
+    bench = make(_plan())
+    _drives(bench)
+    duties: list[float] = []
+    nan = encode(command(2, _T0)).replace(b"0.5", b"NaN")
+    bench.clock.at(55, lambda: duties.append(bench.duty(22)))
+    bench.clock.at(56, lambda: bench.daemon.send(nan))
+    bench.clock.at(57, lambda: duties.append(bench.duty(22)))
+    assert bench.run(60).armed
+    assert duties == [0.5, 0.0]
+    assert any("no finite number" in state.refused for state in bench.states)
+
+
+def test_a_controller_that_does_not_obey_yet_is_told_of(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is said to be applied is what the outputs do, and why."""
+    plan = _plan()
+    bench = make(plan)
+    drive = bench.guard._outputs._drivers[0][1]
+    monkeypatch.setattr(drive, "write", lambda value, now_ns: 0.0)
+    _drives(bench)
+    bench.clock.at(50, monkeypatch.undo)
+    state = bench.run(70)
+    waiting = [s for s in bench.states if s.applied_seq == 1 and s.at_ns < _T0 + 50 * MS]
+    assert {s.applied for s in waiting} == {(0.5, 0.0)}
+    assert {s.stop_reason for s in waiting} == {"Output drive: it does something else."}
+    assert (state.applied, state.stop_reason) == ((0.5, 0.5), "")
 
 
 class _Sensor:
@@ -332,6 +381,108 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     assert bench.states[-1].sources["collision"] == "bumper"
 
 
+class _SlowSensor(_Sensor):
+    """A sensor that lets time go by, and remembers what the drive did when it was asked."""
+
+    def __init__(self, takes_ms: int) -> None:
+        super().__init__()
+        self.says = {"speed": 1.0}
+        self.takes_ns = takes_ms * MS
+        self.bench: _Bench | None = None
+        self.driven: list[tuple[int, float]] = []
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        if self.bench is not None:
+            self.driven.append((self.bench.clock.time_ns, self.bench.duty(22)))
+            self.bench.clock.time_ns += self.takes_ns
+        return super().read(now_ns, direction)
+
+
+def _with(
+    make: _Make, monkeypatch: pytest.MonkeyPatch, drivers: dict[str, _Sensor], measures: str
+) -> _Bench:
+    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: drivers[plan.name])
+    return make(_plan(sensors=tuple(SensorPlan(name, "any", measures) for name in drivers)))
+
+
+def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At its deadline the drive rests first; and a deadline that passes meanwhile counts."""
+    sensor = _SlowSensor(takes_ms=15)
+    bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
+    _drives(bench)
+    sensor.bench = bench
+    bench.run(320)
+    assert all(duty == 0.0 for t, duty in sensor.driven if t >= _T0 + 250 * MS)
+    # Decided with the time after the sensor, not with that before it.
+    acting = [state.at_ns for state in bench.states if state.applied_seq == 1]
+    assert max(acting) < _T0 + 250 * MS
+    assert all(not state.stop_reason for state in bench.states if state.at_ns in acting)
+
+
+def test_a_sensor_that_is_slow_stops_the_robot(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It holds up every stop; so the robot rests until it answers in time."""
+    sensor = _SlowSensor(takes_ms=0)
+    bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
+    _drives(bench)
+    sensor.bench = bench
+    bench.clock.at(45, lambda: setattr(sensor, "takes_ns", 21 * MS))
+    bench.clock.at(150, lambda: setattr(sensor, "takes_ns", 20 * MS))
+    bench.run(200)
+    words = "Sensor wheel holds up the robot: It took more than 20 ms to answer."
+    slow = [state for state in bench.states if state.stop_reason == words]
+    assert slow
+    assert all(state.outputs["drive"] == 0.0 for state in slow)
+    assert slow[0].at_ns == _T0 + 71 * MS
+    assert any(state.applied_seq == 1 and state.at_ns > slow[-1].at_ns for state in bench.states)
+
+
+def test_a_pressed_bumper_is_not_hidden_by_a_free_one(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two sensors of one kind protect twice."""
+    front, other = _Sensor(), _Sensor()
+    front.says = {"bump": 1.0}
+    bench = _with(make, monkeypatch, {"front": front, "other": other}, "bump")
+    _drives(bench)
+    state = bench.run(100)
+    assert state.outputs["drive"] == 0.0
+    assert state.stop_reason == "Not forward: the bumper touched something."
+    assert state.sources["bump"] == "front"
+
+
+def test_of_two_eyes_both_must_see(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that has heard no echo yet may be the one with something before it."""
+    left, right = _Sensor(), _Sensor()
+    left.says, right.says = {"distance": 2.0}, {}
+    eyes = {"left": left, "right": right}
+    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: eyes[plan.name])
+    plans = tuple(SensorPlan(name, "hcsr04", "distance") for name in eyes)
+    bench = make(_plan(sensors=plans, limits=LimitPlan(stop_distance_m=0.5)))
+    _drives(bench)
+    bench.clock.at(55, lambda: setattr(right, "says", {"distance": 1.0}))
+    state = bench.run(100)
+    reasons = list(dict.fromkeys(state.stop_reason for state in bench.states))
+    assert reasons == ["Not armed.", "Not forward: the distance ahead is not known.", ""]
+    assert state.quantities["distance"] == 1.0
+
+
+def test_the_outputs_rest_before_anything_is_closed(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sensor or a pin may take its time to be closed."""
+    sensor = _Sensor()
+    bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
+    _drives(bench)
+    duties: list[float] = []
+    monkeypatch.setattr(sensor, "close", lambda: duties.append(bench.duty(22)))
+    bench.run(50)
+    assert bench.duty(22) == 0.5
+    bench.guard.close()
+    assert duties == [0.0]
+
+
 def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -361,9 +512,9 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     OutputDevice(22, pin_factory=factory).close()  # Nobody has the pin any more.
 
 
-def test_wrong_arguments_end_it_in_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_arguments_end_it_in_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     """With exit code 1."""
     with pytest.raises(SystemExit) as ended:
         main(["--plan-fd", "3"])
     assert ended.value.code == 1
-    assert capsys.readouterr().err.count("\n") == 1
+    assert capfd.readouterr().err.count("\n") == 1

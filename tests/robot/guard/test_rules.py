@@ -81,15 +81,24 @@ def test_a_command_from_a_little_ahead_acts_from_now() -> None:
         (command(6, _T0 - 250 * MS, session=2), "250 ms old"),
         (command(6, _T0 - 20 * MS, session=2, ttl_ms=20), "20 ms old"),
         (command(6, _T0, session=2, ttl_ms=0), "0 ms old"),
-        (command(6, _T0, (0.1,), session=2), "1 values"),
     ],
 )
 def test_what_is_not_the_newest_fresh_command_is_refused(order: Order, words: str) -> None:
-    """Repeated, older, of an older lease, late, from the future, or of another robot."""
+    """Repeated, older, of an older lease, late, or from the future: the newest one goes on."""
     rules = _armed(quick_car())
     assert not rules.offer(command(5, _T0, session=2), _T0)
     assert words in rules.offer(order, _T0)
     assert rules.tick(_T0).seq == 5
+
+
+def test_a_newest_command_that_makes_no_sense_ends_the_one_before() -> None:
+    """Whoever sent it had done with that one; what is older than it changes nothing."""
+    rules = _driving(quick_car())
+    assert "1 values" in rules.offer(command(5, _T0, (0.1,)), _T0)
+    assert rules.tick(_T0).stop_reason == "No fresh command."
+    assert not rules.offer(command(6, _T0), _T0)
+    assert "not newer" in rules.offer(command(4, _T0, (0.1,)), _T0)
+    assert rules.tick(_T0).seq == 6
 
 
 def test_a_refused_command_still_makes_older_ones_old() -> None:
@@ -157,6 +166,26 @@ def test_an_emergency_stop_latches_until_somebody_who_knows_of_it_arms() -> None
     assert rules.tick(_T0).stop_reason == "Emergency stop."
 
 
+def test_only_a_person_ends_an_emergency_stop() -> None:
+    """A program may arm a robot that allows it, and never one that somebody stopped."""
+    rules = Rules(quick_car(), _T0)
+    assert not rules.offer(arm(_T0, person=False), _T0)
+    rules.stop("a child.")
+    refusal = rules.offer(arm(_T0, 1, person=False), _T0)
+    assert refusal == "Not armed: only a person ends an emergency stop."
+    assert not rules.arming.armed
+    assert not rules.offer(arm(_T0, 1), _T0)
+
+
+def test_what_others_say_is_cut() -> None:
+    """A state has to fit into a datagram, whatever reasons it repeats."""
+    rules = _driving(quick_car())
+    rules.disarm("\N{GRINNING FACE}" * 1024)
+    assert len(rules.tick(_T0).stop_reason.encode()) < 250
+    rules.stop("\ud800" * 1024)
+    assert len(rules.tick(_T0).stop_reason.encode()) < 250
+
+
 def test_the_button_stops_and_keeps_from_arming_while_it_is_pressed() -> None:
     """Each press is one emergency stop, however long it is held."""
     rules = _driving(quick_car())
@@ -173,7 +202,11 @@ def test_values_stay_within_the_caps() -> None:
     """Of the robot's own profile, whatever is asked."""
     rules = _driving(quick_car(), (0.0, 0.0))
     rules.offer(command(2, _T0, (-9.0, 9)), _T0)
-    assert rules.tick(_T0).actions == (-0.8, 0.6)
+    decision = rules.tick(_T0)
+    assert decision.actions == (-0.8, 0.6)
+    assert decision.stop_reason == "Clipped by the robot's caps."
+    rules.offer(command(3, _T0, (-0.800000011920929, 0.6000000238418579)), _T0)
+    assert rules.tick(_T0).stop_reason == ""  # A cap as a 32-bit float is no clip.
 
 
 def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
@@ -270,6 +303,14 @@ def test_blind_is_still() -> None:
     assert rules.tick(end).seq == 5
 
 
+def test_without_a_command_nothing_is_said_of_pictures() -> None:
+    """Commands tell of them; without one there may be a new picture all the same."""
+    rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
+    assert rules.tick(_T0).stop_reason == "No fresh command."
+    rules.offer(command(1, _T0, frame_ns=_T0), _T0)
+    assert rules.tick(_T0 + 300 * MS).stop_reason == "No fresh command."
+
+
 def test_a_picture_from_a_little_ahead_counts_from_now() -> None:
     """It never lengthens the time until the robot is blind."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
@@ -321,6 +362,46 @@ def test_something_near_keeps_it_from_going_forward() -> None:
     other = _driving(quick_car())
     _sense(other, _T0, distance=0.01)
     assert _ask(other, 2, _T0, 0.5) == (0.5, "")
+
+
+@pytest.mark.parametrize(
+    "sensing",
+    [Sensing(), Sensing({"distance": 2.0}, {"distance": "eye"}, silent=frozenset({"other"}))],
+)
+def test_an_unknown_distance_keeps_it_from_going_forward(sensing: Sensing) -> None:
+    """Also that of one of two sensors; and only where a distance was to stop it."""
+    rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
+    rules.sense(sensing, _T0)
+    assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: the distance ahead is not known.")
+    assert _ask(rules, 3, _T0, -0.4) == (-0.4, "")
+    _sense(rules, _T0, distance=2.0)
+    assert _ask(rules, 4, _T0, 0.0) == (0.0, "")
+    assert _ask(rules, 5, _T0, 0.5) == (0.5, "")
+    other = _driving(quick_car())
+    other.sense(sensing, _T0)
+    assert _ask(other, 2, _T0, 0.5) == (0.5, "")
+
+
+def test_what_the_outputs_do_not_yet_do_is_no_push() -> None:
+    """A controller that waits at neutral does not stall, and has no direction."""
+    rules = _driving(quick_car())
+    for ms in range(0, 1_000, 10):
+        now_ns = _T0 + ms * MS
+        assert _ask(rules, 2 + ms, now_ns, 0.5) == (0.5, "")
+        rules.learn((0.5, 0.0))
+        assert rules.direction == 0.0
+        _sense(rules, now_ns, speed=0.0)
+    assert rules.senses.quantities["stall"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["wheel", "bumper"])
+def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
+    """It holds up every stop."""
+    rules = _driving(quick_car())
+    rules.sense(Sensing(failures={name: "Slow."}, slow=frozenset({name})), _T0)
+    decision = rules.tick(_T0)
+    assert decision.seq is None
+    assert decision.stop_reason == f"Sensor {name} holds up the robot: Slow."
 
 
 @pytest.mark.parametrize(("throttle", "way"), [(0.5, "forward"), (-0.4, "backward")])

@@ -111,13 +111,16 @@ class _World(RuleBasedStateMachine):
             and len(values) == 2
         )
         assert accepted == (not refusal)
+        is_due = issued_ns <= self.now_ns + 50 * MS and self.now_ns < until_ns
+        if is_newer and is_due and len(values) != 2:
+            self.acting = None  # Whoever sent it had done with the one before.
         if accepted:
             self.acting, self.until_ns = (session, seq), until_ns
 
     @rule(values=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=2))
     def drive(self, values: list[float]) -> None:
         """Everybody does what they should, so that there is something to stop."""
-        self.arm(0, 0)
+        self.arm(0, 0, person=True)
         self.command(0, 0, 0, 1_000, values, 0, follows=True, is_good=True)
 
     @rule(steps=st.integers(2, 30))
@@ -127,13 +130,17 @@ class _World(RuleBasedStateMachine):
             self.wait_for_the_rules()
             self.holds()
 
-    @rule(age_ns=st.sampled_from([0, 0, 999 * MS, 1_000 * MS]), behind=st.integers(-1, 1))
-    def arm(self, age_ns: int, behind: int) -> None:
-        """Somebody arms, who may not have seen the last emergency."""
+    @rule(
+        age_ns=st.sampled_from([0, 0, 999 * MS, 1_000 * MS]),
+        behind=st.integers(-1, 1),
+        person=st.booleans(),
+    )
+    def arm(self, age_ns: int, behind: int, person: bool) -> None:
+        """Somebody arms, who may not have seen the last emergency, or may be no person."""
         seen = max(0, self.emergencies - behind)
-        order = Order("arm", issued_ns=self.now_ns - age_ns, emergency=seen)
+        order = Order("arm", issued_ns=self.now_ns - age_ns, emergency=seen, person=person)
         refusal = self.rules.offer(order, self.now_ns)
-        knows = not self.emergency or seen == self.emergencies
+        knows = not self.emergency or (person and seen == self.emergencies)
         assert (age_ns < 1_000 * MS and knows) == (not refusal)
         if not refusal:
             self.armed, self.emergency, self.acting = True, False, None
@@ -157,9 +164,18 @@ class _World(RuleBasedStateMachine):
         distance=st.sampled_from([0.1, 1.0]),
         speed=st.sampled_from([0.0, 0.5]),
         volts=st.sampled_from([5.0, 7.0, 7.0]),
-        fails=st.sampled_from(["", "", "", "bumper", "wheel", "meter"]),
+        fails=st.sampled_from(["", "", "", "bumper", "wheel", "meter", "eye"]),
+        is_slow=st.booleans(),
     )
-    def sense(self, bump: bool, distance: float, speed: float, volts: float, fails: str) -> None:
+    def sense(
+        self,
+        bump: bool,
+        distance: float,
+        speed: float,
+        volts: float,
+        fails: str,
+        is_slow: bool,
+    ) -> None:
         """The sensors say anything."""
         quantities = {
             "bump": float(bump),
@@ -167,12 +183,13 @@ class _World(RuleBasedStateMachine):
             "speed": speed,
             "battery": volts,
         }
-        names = {"bumper": "bump", "wheel": "speed", "meter": "battery"}
+        names = {"bumper": "bump", "wheel": "speed", "meter": "battery", "eye": "distance"}
         quantities.pop(names.get(fails, ""), None)
         self.sensing = Sensing(
             quantities,
             dict.fromkeys(quantities, "one"),
             {fails: "No answer."} if fails else {},
+            frozenset({fails} if fails and is_slow else {}),
         )
         self.rules.sense(self.sensing, self.now_ns)
         if quantities.get("bump"):
@@ -209,7 +226,8 @@ class _World(RuleBasedStateMachine):
             self.frame_ns is None or now_ns - self.frame_ns >= self.stale_ns
         )
         may_act = self.armed and not self.emergency and is_fresh and not is_blind
-        if not may_act or self.sensing.failures.keys() & {"bumper", "meter"}:
+        protects_no_longer = self.sensing.failures.keys() & {"bumper", "meter", "eye"}
+        if not may_act or protects_no_longer or self.sensing.slow:
             assert decision.seq is None
         if decision.seq is None:
             assert throttle == 0.0

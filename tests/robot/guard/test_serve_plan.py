@@ -51,6 +51,18 @@ def test_several_processes_may_read_the_same_file() -> None:
         os.close(fd)
 
 
+def test_nobody_changes_a_plan() -> None:
+    """A process that inherits it must not move the limits of the next guard."""
+    fd = plan_fd(_PLAN)
+    try:
+        for change in (lambda: os.pwrite(fd, b"x", 0), lambda: os.ftruncate(fd, 0)):
+            with pytest.raises(PermissionError):
+                change()
+        assert read_plan_fd(fd) == _PLAN
+    finally:
+        os.close(fd)
+
+
 def test_outputs_are_mixed_from_actions_and_clipped() -> None:
     """A tank's tracks: throttle plus and minus steering."""
     plan = GuardPlan(
@@ -80,6 +92,13 @@ def test_restarts_are_limited_in_a_time() -> None:
         False,
         True,
     ]
+
+
+def test_restarts_come_ever_more_slowly() -> None:
+    """The first one at once; later ones leave time for what keeps failing."""
+    restarts = Restarts()
+    pauses = [restarts.pause_s for t in range(5) if restarts.may_restart(t)]
+    assert pauses == pytest.approx([0.0, 0.2, 0.6, 1.4, 3.0])
 
 
 @pytest.mark.parametrize("arguments", [["--a", "1"], ["--a", "1", "--c", "2"], ["--a"]])

@@ -4,15 +4,22 @@ The times allowed are ten times those that are promised, because the machine tha
 does other things too; `make bench` measures them.
 """
 
+import contextlib
+import logging
 import os
+import re
 import signal
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from shapechanger.robot.guard import supervisor
 from shapechanger.robot.guard.plan import LimitPlan
+from shapechanger.robot.guard.serve_plan import ServePlan
+from shapechanger.robot.guard.supervisor import Commands, Supervisor
 from tests.robot.guard.plans import MS, quick_car
 from tests.robot.guard.running import running
 from tests.robot.guard.waiting import until
@@ -64,6 +71,9 @@ def test_killed_daemon(tmp_path: Path) -> None:
         until(lambda: len(robot.pids("daemon")) == len(robot.pids("hardware")) == 2)
         assert _is_gone(guard)
         assert robot.record.is_at_rest()
+        # Whatever was stopped before stays stopped.
+        words = "guard: Emergency stop: the robot's processes failed and started afresh."
+        until(lambda: words in _log(tmp_path))
 
 
 def test_silent_daemon(tmp_path: Path) -> None:
@@ -152,6 +162,117 @@ def test_a_stuck_output_is_said_to_be_unsafe(tmp_path: Path) -> None:
         assert robot.process.wait(20) == 3
     assert "GPIO22 is stuck" in _log(tmp_path)
     assert "NOT SAFE" in _log(tmp_path)
+
+
+def test_what_does_not_obey_is_told_to_rest_again_and_again(tmp_path: Path) -> None:
+    """Nothing starts and nothing ends before all outputs are at rest."""
+    with running(tmp_path) as robot:
+        robot.drive()
+        (tmp_path / "stuck-GPIO22").touch()
+        robot.kill("hardware", signal.SIGKILL)
+
+        def attempts() -> int:
+            lines = robot.record.lines()
+            return sum(
+                x.get("opened") == "hardware" and x["pid"] == robot.process.pid for x in lines
+            )
+
+        until(lambda: attempts() > 8)  # More than there may be restarts.
+        assert len(robot.pids("hardware")) == 1
+        mended_ns = robot.record.lines()[-1]["t"]
+        (tmp_path / "stuck-GPIO22").unlink()
+        assert robot.rested_ns(mended_ns, robot.process.pid) - mended_ns < 2_000 * MS
+        until(lambda: len(robot.pids("hardware")) == 2)
+    assert _log(tmp_path).count("NOT SAFE") == 1
+
+
+def test_outputs_that_no_guard_ever_had_are_not_waited_for(tmp_path: Path) -> None:
+    """A robot that is not wired as its profile says is told of, and ends."""
+    (tmp_path / "stuck-GPIO22").touch()
+    with running(tmp_path) as robot:
+        assert robot.process.wait(30) == 3
+    assert re.search("gives up: .* is gone, and not all outputs are at rest.", _log(tmp_path))
+
+
+class _Stuck:
+    """A guard that is stuck in the kernel: SIGKILL ends it only after a while."""
+
+    name = "guard"
+    has_beaten = True
+
+    def __init__(self, looks: int) -> None:
+        self.killed = True
+        self.looks = looks
+        self.code: int | None = None
+
+    def is_gone(self, now_ns: int) -> bool:
+        return self.has_ended()
+
+    def has_ended(self) -> bool:
+        self.looks -= 1
+        if self.looks <= 0:
+            self.code = -9
+        return self.looks <= 0
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def __getattr__(self, name: str) -> object:
+        raise AssertionError(f"{name}: it was killed already; every moment counts.")
+
+
+class _Daemon(_Stuck):
+    """A daemon that ends when it is told to."""
+
+    name = "daemon"
+
+    def tell(self) -> None:
+        self.code = 0
+
+    def end(self, at_most_s: float, reap_s: float) -> None:
+        self.code = 0
+
+
+@contextlib.contextmanager
+def _supervisor(told: str) -> Iterator[Supervisor]:
+    """One without processes."""
+    log = logging.getLogger("test")
+    one = Supervisor(ServePlan(quick_car(), {}), -1, Commands((), ()), log)
+    one._told = told
+    with one._woken, one._waker:
+        yield one
+
+
+@pytest.mark.parametrize("told", ["", "told to by SIGTERM"])
+def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
+    monkeypatch: pytest.MonkeyPatch, told: str
+) -> None:
+    """The pins rest at once, and once more when it is gone: it may still have written."""
+    attempts: list[int | None] = []
+    guard = _Stuck(looks=4)
+
+    def safe(plan: ServePlan) -> list[str]:
+        attempts.append(guard.code)
+        return ["Output drive: GPIO22 is busy"] if len(attempts) == 1 else []
+
+    monkeypatch.setattr(supervisor, "_safe", safe)
+    monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
+    with _supervisor(told) as one:
+        one._stop(guard, _Daemon(looks=9))
+    assert attempts == [None, None, None, -9]
+    assert one._is_safe
+
+
+def test_a_guard_that_never_ends_is_given_up_when_told_to_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And the outputs are not said to be safe."""
+    monkeypatch.setattr(supervisor, "_safe", lambda plan: [])
+    monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
+    monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
+    with _supervisor("told to by SIGTERM") as one:
+        one._stop(_Stuck(looks=10**9), _Daemon(looks=9))
+    assert not one._is_safe
 
 
 def test_garbage_is_counted_and_refused_in_words(tmp_path: Path) -> None:

@@ -1,13 +1,14 @@
 """What daemon and guard say to each other survives, and nothing else is understood."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.robot.guard.wire import (
+    MAX_DATAGRAM,
     GuardState,
     Order,
     decode_order,
@@ -15,7 +16,7 @@ from shapechanger.robot.guard.wire import (
     encode,
 )
 
-_ORDER = Order("command", 1, 2, 3, 4, 5, (0.5, -1.0), 6, "why")
+_ORDER = Order("command", 1, 2, 3, 4, 5, (0.5, -1.0), 6, "why", True)
 _STATE = GuardState(
     1, True, False, 2, "", (0.5,), 3, 4, 5, "", None, {"drive": 0.5}, {"speed": 1.0}, {}, 0
 )
@@ -45,6 +46,7 @@ def test_orders_and_states_come_back_as_they_were() -> None:
         ("values", [float("inf")]),
         ("values", [10**400]),
         ("reason", 5),
+        ("person", 1),
         ("other", 1),
     ],
 )
@@ -53,6 +55,14 @@ def test_what_is_no_order_is_refused(field: str, value: object) -> None:
     data = json.dumps(asdict(_ORDER) | {field: value}).encode()
     with pytest.raises(ValueError, match=r"no order|no whole number|no finite number|no words"):
         decode_order(data)
+
+
+def test_a_state_with_the_longest_words_fits_into_a_datagram() -> None:
+    """What cannot be written is replaced, never an error in the guard."""
+    words = "\N{GRINNING FACE}" * 250
+    state = replace(_STATE, stop_reason=words, refused=words + "\ud800")
+    assert len(encode(state)) < MAX_DATAGRAM // 4
+    assert decode_state(encode(state)).refused == words + "?"
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"1", b"[" * 16_000, b"{}", b"\x00"])

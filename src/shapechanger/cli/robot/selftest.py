@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import platform
 import sys
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -46,6 +48,13 @@ class Selftest:
         from shapechanger.robot.profile.load import find_profile, load_profile
 
         profile = load_profile(find_profile(self.profile))
+        # So that what is printed says by itself what it is about.
+        plain_console().print(
+            f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
+            f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
+            f"{platform.platform()}",
+            soft_wrap=True,
+        )
         good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
         if not good:
             sys.exit(1)

@@ -1,7 +1,9 @@
 """A stream of JPEG pictures from a named pipe, a file or a program, such as rpicam-vid or ffmpeg.
 
 Where a picture says in a comment segment when it was taken (`captured_ns=`, monotonic), that is its
-time; otherwise it is when its last byte arrived, which hides the delay of the source.
+time; otherwise it is when its last byte was read, which hides the delay of the source. So that
+pictures that have waited in the pipe do not look new, the pipe is emptied before one of these is
+given.
 """
 
 from __future__ import annotations
@@ -23,13 +25,14 @@ from shapechanger.robot.cameras.turned import turned
 __all__ = ["Pipe", "open_driver"]
 
 _CHUNK: Final = 64 * 1024  # Bytes; as many as a pipe of Linux holds.
+_MOST_WAITING: Final = 1 << 20  # Bytes; the largest pipe that Linux gives without privileges.
 _PROGRAM_ENDS_S: Final = 2.0
 
 
 class Pipe:
     """A camera at the other end of a pipe; see `Camera`.
 
-    Of several pictures that have arrived, the newest is given, except from a file.
+    Of several pictures that have been read, the newest is given, except from a file.
     """
 
     def __init__(self, plan: CameraPlan) -> None:
@@ -51,11 +54,15 @@ class Pipe:
         while jpeg is None:
             self._feed()
             jpeg = self._splitter.next()
-        arrived_ns = time.monotonic_ns()
-        while self._live and (newer := self._splitter.next()) is not None:
-            jpeg = newer
-        check_jpeg(jpeg, self._plan.size)
+        jpeg = self._newest(jpeg)
         captured_ns = captured_ns_of(jpeg)
+        left = _MOST_WAITING
+        while captured_ns is None and left > 0 and (count := self._take_waiting()):
+            left -= count
+            jpeg = self._newest(jpeg)
+            captured_ns = captured_ns_of(jpeg)
+        arrived_ns = time.monotonic_ns()
+        check_jpeg(jpeg, self._plan.size)
         if self._plan.flip:
             jpeg = turned(jpeg, self._plan.jpeg_quality)
         return Frame(jpeg, arrived_ns if captured_ns is None else captured_ns)
@@ -88,9 +95,26 @@ class Pipe:
                 raise
             finally:
                 os.close(its_end)
+            os.set_blocking(fd, False)
             return fd
         # A named pipe would otherwise wait for its writer here.
         return os.open(os.path.expanduser(self._path), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+
+    def _newest(self, jpeg: bytes) -> bytes:
+        while self._live and (newer := self._splitter.next()) is not None:
+            jpeg = newer
+        return jpeg
+
+    def _take_waiting(self) -> int:
+        """Take in what waits in the pipe; how many bytes that were, 0 also at its end."""
+        if not self._live or self._fd is None:
+            return 0
+        try:
+            data = os.read(self._fd, _CHUNK)
+        except BlockingIOError:
+            return 0
+        self._splitter.feed(data)
+        return len(data)
 
     def _feed(self) -> None:
         if self._fd is None:

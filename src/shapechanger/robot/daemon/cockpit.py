@@ -147,6 +147,11 @@ class Cockpit:
             )
         )
 
+    def halt(self) -> None:
+        """Take back the newest command, because whoever commands said nonsense after it."""
+        # Nobody has to wait until it takes effect: whoever said that waits for an observation.
+        self._order(Order(kind="halt", issued_ns=self._now_ns()))
+
     def give_order(self, order: Order) -> None:
         """Hand the guard an order that is no command, with the time of now."""
         self.unsettled = True

@@ -161,11 +161,13 @@ class Connection:
                 return message.data
             if message.type is WSMsgType.PING:
                 await self._pong(message.data)
+            elif message.type is WSMsgType.PONG:
+                self._session.count()
             elif message.type is WSMsgType.TEXT:
                 raise LinkError("You sent text; the link is made of binary messages.")
             elif message.type is WSMsgType.ERROR:
                 raise LinkError(f"You sent something that is no message: {message.data}.")
-            elif message.type is not WSMsgType.PONG:
+            else:
                 return None
 
     async def _pong(self, data: bytes) -> None:

@@ -28,7 +28,7 @@ class Sent:
         self._sent.append((seq, now_ns))
 
     def refusal(self, answers: int, now_ns: int) -> str:
-        """Why a command that arrives now must not act; empty when it may.
+        """Why what arrives now must not act; empty when it may.
 
         Args:
             answers: `seq` of the observation that it answers.

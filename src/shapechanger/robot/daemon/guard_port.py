@@ -15,7 +15,7 @@ __all__ = ["GuardPort"]
 _log = logging.getLogger(__name__)
 
 # Orders that must arrive whatever happens. One of each is enough: they say the same twice.
-_URGENT: Final = ("end", "emergency", "disarm")
+_URGENT: Final = ("end", "emergency", "disarm", "halt")
 
 
 class GuardPort:
@@ -83,6 +83,7 @@ class GuardPort:
 
     def close(self) -> None:
         """Close the socket, which tells the guard to stop."""
+        self._lost = True  # Whatever is said from now on goes nowhere.
         if self._loop is not None and self._socket.fileno() >= 0:
             self._loop.remove_reader(self._socket)
             self._loop.remove_writer(self._socket)

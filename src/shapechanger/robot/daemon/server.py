@@ -8,14 +8,15 @@ import logging
 import socket
 import ssl
 from collections.abc import Awaitable, Callable
-from typing import Final, cast
+from typing import Final
 
 from aiohttp import web
 
-from shapechanger.errors import LinkError, RobotError, RobotRefused, ShapechangerError
+from shapechanger.errors import LinkError, RobotError, ShapechangerError
 from shapechanger.robot.daemon.cockpit import Cockpit
 from shapechanger.robot.daemon.connection import Connection, new_socket
-from shapechanger.robot.daemon.limits import WrongKeys
+from shapechanger.robot.daemon.doorstep import Doorstep
+from shapechanger.robot.daemon.listener import Listener
 from shapechanger.robot.daemon.origin import origin_refusal
 from shapechanger.robot.daemon.pace import Pacer
 from shapechanger.robot.daemon.page import status_page
@@ -26,12 +27,10 @@ __all__ = ["Server"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_STRANGERS: Final = 8  # Connections that have not said hello yet.
-_MAX_SOCKETS: Final = 64  # Connections of any kind, pages too.
+# Nobody guesses a key of 128 bits. This keeps a try from costing us more than whoever tries it, and
+# shuts out nobody who has the right one and the same address.
 _WRONG_KEY_S: Final = 0.5
-_HANDSHAKE_S: Final = 5.0
 _GOODBYE_S: Final = 0.2  # A daemon that ends has nothing left to say.
-_SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few pictures.
 _UNANSWERED_MS: Final = 4_000  # After which what was sent counts as lost.
 _ALIVE_NS: Final = 1_000_000_000
 
@@ -63,14 +62,12 @@ class Server:
         self._cockpit = cockpit
         self._time = time
         self._door = door
-        self._tls = tls
         self._numbers = itertools.count(1)
-        self._strangers = 0
-        self._wrong_keys = WrongKeys()
+        self._doorstep = Doorstep()
         self._runner = web.AppRunner(
             self._app(), access_log=None, handle_signals=False, shutdown_timeout=_GOODBYE_S
         )
-        self._listener: asyncio.Server | None = None
+        self._listener = Listener(self._doorstep, self._protocol, tls)
 
     async def start(self) -> int:
         """Begin to listen.
@@ -83,29 +80,11 @@ class Server:
         """
         plan = self._cockpit.plan
         await self._runner.setup()
-        handshake_s = None if self._tls is None else _HANDSHAKE_S
-        try:
-            self._listener = await asyncio.get_running_loop().create_server(
-                self._protocol,
-                plan.host,
-                plan.port,
-                ssl=self._tls,
-                ssl_handshake_timeout=handshake_s,
-                backlog=32,
-            )
-        except OSError as error:
-            raise RobotError(
-                f"{plan.host} port {plan.port} cannot be listened at: {error.strerror or error}. "
-                "Does the robot run already?"
-            ) from error
-        for listening in self._listener.sockets:
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-        return self._listener.sockets[0].getsockname()[1]
+        return await self._listener.start(plan.host, plan.port)
 
     async def close(self) -> None:
         """Close all connections."""
-        if self._listener is not None:
-            self._listener.close()
+        await self._listener.close()
         await self._runner.cleanup()
 
     def _app(self) -> web.Application:
@@ -115,11 +94,11 @@ class Server:
         app.router.add_get("/link", self._link)
         return app
 
-    def _protocol(self) -> asyncio.BaseProtocol:
+    def _protocol(self) -> asyncio.Protocol:
         server = self._runner.server
-        if server is None or len(server.connections) >= _MAX_SOCKETS:
-            return _TurnedAway()
-        return cast("asyncio.BaseProtocol", server())
+        if server is None:
+            raise RobotError("The server has not begun.")
+        return server()
 
     async def _page(self, request: web.Request) -> web.Response:
         return web.Response(text=status_page(self._cockpit, request.host), content_type="text/html")
@@ -139,15 +118,16 @@ class Server:
         )
         if refusal:
             raise web.HTTPForbidden(text=refusal)
+        self._doorstep.keep(request.protocol)
         websocket = new_socket()
         await websocket.prepare(request)
-        _tune(request.transport)
         session = Session(next(self._numbers), self._cockpit, self._door)
         pacer = Pacer(session, self._cockpit, self._time)
         connection = Connection(websocket, session, pacer, self._time, _log)
         reason: ShapechangerError | None = None
         try:
-            await self._talk(connection, session, request.remote or "")
+            _tune(request.transport)
+            await self._talk(connection, session, request)
         except ShapechangerError as error:
             reason = error
         finally:
@@ -158,33 +138,20 @@ class Server:
             await connection.dismiss(reason)
         await self._time.settle()
         await connection.close()
+        self._doorstep.leave(request.protocol)
         return websocket
 
-    async def _talk(self, connection: Connection, session: Session, address: str) -> None:
-        wait_s = self._wrong_keys.wait_s(address)
-        if wait_s > 0.0:
-            raise RobotRefused(f"Too many wrong keys from {address}; wait {wait_s:.0f} s.")
-        if self._strangers >= _MAX_STRANGERS:
-            raise RobotRefused("Too many are at the door; try again in a few seconds.")
-        self._strangers += 1
+    async def _talk(self, connection: Connection, session: Session, request: web.Request) -> None:
         try:
             await connection.greet()
         except WrongKey:
-            self._wrong_keys.add(address)
             await asyncio.sleep(_WRONG_KEY_S)
             raise
-        finally:
-            self._strangers -= 1
-        _log.info("%s, a %s, is here from %s.", session.who.name, session.who.role, address)
+        self._doorstep.leave(request.protocol)
+        who = session.who
+        _log.info("%s, a %s, is here from %s.", who.name, who.role, request.remote)
         await connection.serve()
         _log.info("%s has left.", session.who.name)
-
-
-class _TurnedAway(asyncio.Protocol):
-    """For a connection too many."""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        cast("asyncio.Transport", transport).abort()
 
 
 @web.middleware

@@ -241,7 +241,15 @@ class Session:
 
     def _command(self, command: Command) -> None:
         now_ns = self._cockpit.now_ns()
-        refusal = self._refusal(command, now_ns)
+        refusal = self._refusal_to_listen(command)
+        if not refusal:
+            refusal = self._nonsense(command)
+            if refusal:
+                # The one before is no longer what the client wants. What is refused for being late
+                # says nothing about that, and what is old must not stop what is newer.
+                self._cockpit.halt()
+            else:
+                refusal = self._sent.refusal(command.answers, now_ns)
         self._command_seq = max(self._command_seq, command.seq)
         if refusal:
             self.tell(Refused(reason=refusal, seq=command.seq))
@@ -249,12 +257,16 @@ class Session:
             self._cockpit.command(command, now_ns)
         self._give_credit()
 
-    def _refusal(self, command: Command, now_ns: int) -> str:
-        """Why a command must not act, in words; empty when it may."""
+    def _refusal_to_listen(self, command: Command) -> str:
+        """Why a command does not count, whatever it says; empty when it does."""
         if not self._cockpit.lease.holds(self._number):
             return "You do not command; take the command first."
         if command.seq <= self._command_seq:
             return f"Command {command.seq} is not newer than {self._command_seq}."
+        return ""
+
+    def _nonsense(self, command: Command) -> str:
+        """What is wrong with the values of a command, in words; empty for nothing."""
         if len(command.values) != self._cockpit.action_size:
             return (
                 f"A command of this robot has {self._cockpit.action_size} values, "
@@ -262,7 +274,7 @@ class Session:
             )
         if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in command.values):
             return "A value is no finite number."
-        return self._sent.refusal(command.answers, now_ns)
+        return ""
 
     def _give_credit(self) -> None:
         self.credit = True
@@ -270,10 +282,14 @@ class Session:
 
     def _arm(self, arm: Arm) -> None:
         refusal = self._refusal_to_arm()
+        if not refusal and (late := self._sent.refusal(arm.answers, self._cockpit.now_ns())):
+            refusal = f"Not armed. {late}"
         if refusal:
             self.tell(Refused(reason=refusal))
-        else:
-            self._cockpit.give_order(Order(kind="arm", emergency=arm.emergency))
+            return
+        # The guard knows of each emergency stop, and this process only of those it was told.
+        person = self._who.role == "person"
+        self._cockpit.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _refusal_to_arm(self) -> str:
         """Why this client must not arm, in words; empty when it may."""

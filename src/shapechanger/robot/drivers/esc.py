@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from typing import Final, Literal
 
 from shapechanger.errors import UnknownName
@@ -59,10 +60,10 @@ class Esc:
 
     def release(self) -> None:
         """No pulse; the controller must see neutral again before it obeys."""
-        with in_words(self._name):
-            self._channel.release()
         self._neutral_since_ns = self._backward_since_ns = None
         self._reverses = False
+        with in_words(self._name):
+            self._channel.release()
 
     def close(self) -> None:
         """No pulse, and let go of the channel."""
@@ -109,7 +110,10 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> Esc:
         raise UnknownName("kind of reverse", reverse, _REVERSES)
     keys = ("backward_us", "neutral_us", "forward_us")
     pulses = PulseRange(*(number(settings, key) for key in keys))
-    with in_words(name):
-        channel = open_pulse_channel(settings, hardware)
     arm_s, brake_s = number(settings, "arm_s"), number(settings, "brake_ms") / 1e3
-    return Esc(channel, pulses, reverse, arm_s, brake_s, name)
+    with in_words(name), ExitStack() as undo:
+        channel = open_pulse_channel(settings, hardware)
+        undo.callback(channel.close)
+        controller = Esc(channel, pulses, reverse, arm_s, brake_s, name)
+        undo.pop_all()
+    return controller

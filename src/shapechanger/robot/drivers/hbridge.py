@@ -7,6 +7,7 @@ have a third input that enables both.
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 
 from gpiozero import DigitalOutputDevice, Motor
 
@@ -40,8 +41,12 @@ class HBridge:
         """Turn the motor, and say how fast; see `OutputDriver.write`."""
         drive = math.copysign(self._duty.of(value), value)
         if drive != self._written:
+            self._written = None  # What fails may have taken effect all the same.
             with in_words(self._name):
-                self._motor.value = drive
+                if drive:
+                    self._motor.value = drive
+                else:
+                    self._stop()
                 if self._enable is not None:
                     self._enable.on()
             self._written = drive
@@ -49,19 +54,30 @@ class HBridge:
 
     def release(self) -> None:
         """Both inputs low and the bridge disabled: the motor runs out."""
-        with in_words(self._name):
-            self._motor.stop()
-            if self._enable is not None:
-                self._enable.off()
         self._written = None
+        with in_words(self._name):
+            try:
+                if self._enable is not None:
+                    self._enable.off()
+            finally:
+                self._stop()
 
     def close(self) -> None:
         """Both inputs low; see `LowAtOncePin.close` for what the pins do then."""
-        if not self._motor.closed:
-            self.release()
-            self._motor.close()
+        if self._motor.closed:
+            return
+        with in_words(self._name), ExitStack() as stack:
             if self._enable is not None:
-                self._enable.close()
+                stack.callback(self._enable.close)
+            stack.callback(self._motor.close)
+            self.release()
+
+    def _stop(self) -> None:
+        # Unlike `Motor.stop`, one input goes low also when the other one fails.
+        try:
+            self._motor.forward_device.off()
+        finally:
+            self._motor.backward_device.off()
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> HBridge:
@@ -74,12 +90,16 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> HBridge:
     forward, backward = whole(settings, "forward"), whole(settings, "backward")
     enable = whole(settings, "enable")
     name = f"Output {plan.name!r} on GPIO{forward} and GPIO{backward}"
-    with in_words(name):
+    duty = Duty(number(settings, "start"), number(settings, "full"))
+    with in_words(name), ExitStack() as undo:
         factory = hardware.pin_factory()
-        # Ours and not that of `Motor`, which would be on before anything is written.
-        enabling = None if enable < 0 else DigitalOutputDevice(enable, pin_factory=factory)
-        motor = Motor(forward, backward, pin_factory=factory)
+        enabling = None
+        if enable >= 0:
+            # Ours and not that of `Motor`, which would be on before anything is written.
+            enabling = undo.enter_context(DigitalOutputDevice(enable, pin_factory=factory))
+        motor = undo.enter_context(Motor(forward, backward, pin_factory=factory))
         for device in (motor.forward_device, motor.backward_device):
             device.frequency = whole(settings, "pwm_hz")
-    duty = Duty(number(settings, "start"), number(settings, "full"))
-    return HBridge(motor, enabling, duty, name)
+        bridge = HBridge(motor, enabling, duty, name)
+        undo.pop_all()
+    return bridge

@@ -23,7 +23,7 @@ __all__ = ["Hcsr04", "open_driver"]
 
 _TRIGGER_S: Final = 10e-6  # A pulse of 10 us starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
-_SILENT_NS: Final = 1_000_000_000
+_MOST_MISSED: Final = 3  # Pings without an echo: about 200 ms, or 0.2 m at 1 m/s.
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 
@@ -37,9 +37,10 @@ class Hcsr04:
         self._lock = threading.Lock()  # lgpio calls back from a thread of its own.
         self._rise: float | None = None
         self._echo_s: float | None = None
+        self._answered = False  # Whether the line has moved since the last read.
         self._distance_m: float | None = None
         self._pinged_ns: int | None = None
-        self._heard_ns: int | None = None
+        self._unanswered = 0  # Pings since the line has moved.
         self._trigger = DigitalOutputDevice(trigger, pin_factory=factory)
         self._echo = EdgeInput(echo, "down", factory, self._changed)
 
@@ -47,18 +48,20 @@ class Hcsr04:
         """The "distance" in m, at most `max_m`; nothing before the first echo.
 
         Raises:
-            RobotError: If no echo has come for a second.
+            RobotError: If three pings in a row had no answer: what was seen before them is old.
         """
         with self._lock:
             echo_s, self._echo_s = self._echo_s, None
+            answered, self._answered = self._answered, False
         if echo_s is not None:
             self._distance_m = min(echo_s * _SOUND_M_PER_S / 2.0, self._max_m)
-        if echo_s is not None or self._heard_ns is None:
-            self._heard_ns = now_ns
+        if answered:
+            self._unanswered = 0
         if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
             self._pinged_ns = now_ns
+            self._unanswered += 1
             self._ping()
-        if now_ns - self._heard_ns > _SILENT_NS:
+        if self._unanswered > _MOST_MISSED:
             self._distance_m = None
             raise RobotError(f"{self._name} gives no echo: is it wired, and does it have 5 V?")
         return {} if self._distance_m is None else {"distance": self._distance_m}
@@ -76,6 +79,7 @@ class Hcsr04:
 
     def _changed(self, at_s: float, level: int) -> None:
         with self._lock:
+            self._answered = True
             if level:
                 self._rise = at_s
             elif self._rise is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import lgpio
 
 from shapechanger.robot.drivers.lgpio_pins import open_gpio_chip
@@ -36,7 +38,11 @@ class LgpioServoPins:
         """End all pulses; the pins stay low outputs until the chip is closed."""
         if self._handle is None:
             return
-        for pin in sorted(self._pins):
-            self.pulse(pin, 0, 50)
-        lgpio.gpiochip_close(self._handle)
+        with ExitStack() as stack:
+            stack.callback(self._let_go, self._handle)
+            for pin in self._pins:
+                stack.callback(self.pulse, pin, 0, 50)
+
+    def _let_go(self, handle: int) -> None:
         self._handle = None
+        lgpio.gpiochip_close(handle)

@@ -8,7 +8,8 @@ input.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import ExitStack, contextmanager
 from typing import Final
 
 from gpiozero import DigitalOutputDevice
@@ -29,16 +30,16 @@ _PRESCALE: Final = 0xFE
 _AUTO_INCREMENT: Final = 0x20  # MODE1, AI.
 _SLEEP: Final = 0x10  # MODE1; the prescaler can be written only then.
 _TOTEM_POLE: Final = 0x04  # MODE2, OUTDRV; outputs change at the stop of a transfer (OCH = 0).
-_FULL_OFF: Final = 0x10  # Bit 4 of OFF_H: no pulse at all.
 
 _OSCILLATOR_MHZ: Final = 25.0  # The internal oscillator; boards deviate, so calibrate the widths.
 _STEPS: Final = 4096
+_NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulse at all.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
 _PRESCALE_RANGE: Final = (3, 255)
 
 # Unchanged pulses are not written again; now and then the chip is asked whether it still runs,
 # because one that lost its power for a moment sleeps.
-_WRITES_PER_CHECK: Final = 50
+_UNCHANGED_PER_CHECK: Final = 50
 
 
 def prescale_for(hz: float) -> int:
@@ -51,7 +52,12 @@ def prescale_for(hz: float) -> int:
 
 
 class Pca9685:
-    """One chip, shared by its channels in this process."""
+    """One chip, shared by its channels in this process.
+
+    It remembers what each channel does for sure, and sends nothing twice. A transfer that failed
+    may have taken effect all the same, or in part; after one, all channels are in doubt: the
+    outputs are off, where there is a pin for that, until all channels have been written again.
+    """
 
     def __init__(
         self, hardware: Hardware, bus: int, address: int, hz: int, output_enable: int
@@ -60,23 +66,27 @@ class Pca9685:
         self.hz = hz
         self.output_enable = output_enable
         self.channels: set[int] = set()
-        self._sending: set[int] = set()
         self._hardware = hardware
         self._address = address
         self._prescale = prescale_for(hz)
+        self._steps: dict[int, int] = {}  # By channel; none for a channel in doubt.
+        self._must_start = False
+        self._unchanged = 0
         self._enable: DigitalOutputDevice | None = None
-        with in_words(self.name):
+        with in_words(self.name), ExitStack() as undo:
             if output_enable >= 0:
                 # OE is active low, and a resistor pulls it up until we drive it.
                 self._enable = DigitalOutputDevice(
                     output_enable, active_high=False, pin_factory=hardware.pin_factory()
                 )
+                undo.callback(self._enable.close)
             self._bus = hardware.i2c(bus)
-            try:
-                self._start()
-            except OSError:
-                self._let_go()
-                raise
+            undo.callback(self._bus.close)
+            self._start()
+            if self._enable is not None:
+                # What a dead process left on a channel must not come back with our first pulse.
+                self._bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
+            undo.pop_all()
 
     def step_us(self) -> float:
         """Width of one step: 4.88 us at 50 Hz."""
@@ -84,60 +94,83 @@ class Pca9685:
 
     def send(self, channel: int, steps: int) -> None:
         """Send pulses of so many steps."""
-        self._write(channel, [0, 0, steps & 0xFF, steps >> 8])
-        self._sending.add(channel)
-        if self._enable is not None:
-            self._enable.on()
+        if self._steps.get(channel) != steps:
+            self._write(channel, steps)
+            return
+        self._unchanged += 1
+        if self._unchanged >= _UNCHANGED_PER_CHECK:
+            self._unchanged = 0
+            self._check()
 
     def stop(self, channel: int) -> None:
         """Send none; without any, the outputs of the chip are off too."""
-        self._sending.discard(channel)
-        if self._enable is not None and not self._sending:
-            self._enable.off()
-        self._write(channel, [0, 0, 0, _FULL_OFF])
+        self._steps.pop(channel, None)
+        try:
+            if not self._sends():
+                self._switch(False)  # First, since a bus that hangs takes a second to say so.
+        finally:
+            self._write(channel, _NO_PULSE)
 
-    def check(self) -> None:
+    def leave(self, channel: int) -> None:
+        """One channel less; the last one lets go of the chip."""
+        self.channels.discard(channel)
+        self._steps.pop(channel, None)
+        if not self.channels:
+            self._bus.close()
+            if self._enable is not None:
+                self._enable.close()
+
+    def _start(self) -> None:
+        bus, address = self._bus, self._address
+        mode = bus.read_byte_data(address, _MODE1)
+        asleep = mode & _SLEEP or bus.read_byte_data(address, _PRESCALE) != self._prescale
+        if asleep:
+            # First no pulses, so that nothing starts again with the oscillator.
+            bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
+            bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT | _SLEEP)
+            bus.write_byte_data(address, _PRESCALE, self._prescale)
+        bus.write_byte_data(address, _MODE2, _TOTEM_POLE)
+        bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT)
+        if asleep:
+            time.sleep(_WAKE_UP_S)
+        self._must_start = False
+
+    def _check(self) -> None:
         """Make sure that the chip still runs.
 
         Raises:
             RobotError: If it does not answer, or sleeps, as after a loss of power.
         """
-        with in_words(self.name):
-            asleep = self._bus.read_byte_data(self._address, _MODE1) & _SLEEP
-        if asleep:
-            raise RobotError(f"{self.name} sleeps: it has lost its power for a moment.")
+        with self._doubt_on_failure():
+            if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
+                raise RobotError(f"{self.name} sleeps: it has lost its power for a moment.")
 
-    def leave(self, channel: int) -> None:
-        """One channel less; the last one lets go of the chip."""
-        self.channels.discard(channel)
-        if not self.channels:
-            self._let_go()
+    def _write(self, channel: int, steps: int) -> None:
+        with self._doubt_on_failure():
+            if self._must_start:
+                self._start()
+            registers = [0, 0, steps & 0xFF, steps >> 8]
+            self._bus.write_i2c_block_data(self._address, _CHANNEL_0 + 4 * channel, registers)
+            self._steps[channel] = steps
+            self._switch(self._sends() and self.channels <= self._steps.keys())
 
-    def _let_go(self) -> None:
-        self._bus.close()
+    def _sends(self) -> bool:
+        return any(steps != _NO_PULSE for steps in self._steps.values())
+
+    def _switch(self, on: bool) -> None:
         if self._enable is not None:
-            self._enable.close()
+            with in_words(self.name):
+                self._enable.value = on
 
-    def _start(self) -> None:
-        bus, address = self._bus, self._address
-        mode = bus.read_byte_data(address, _MODE1)
-        if mode & _SLEEP or bus.read_byte_data(address, _PRESCALE) != self._prescale:
-            # First no pulses, so that nothing starts again with the oscillator.
-            bus.write_byte_data(address, _ALL_OFF_H, _FULL_OFF)
-            bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT | _SLEEP)
-            bus.write_byte_data(address, _PRESCALE, self._prescale)
-        bus.write_byte_data(address, _MODE2, _TOTEM_POLE)
-        bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT)
-        time.sleep(_WAKE_UP_S)
-
-    def _write(self, channel: int, registers: list[int]) -> None:
+    @contextmanager
+    def _doubt_on_failure(self) -> Generator[None]:
         try:
             with in_words(self.name):
-                self._bus.write_i2c_block_data(self._address, _CHANNEL_0 + 4 * channel, registers)
-        except RobotError:
-            # Whatever it was told before, it would go on doing it.
-            if self._enable is not None:
-                self._enable.off()
+                yield
+        except Exception:
+            self._steps.clear()
+            self._must_start = True
+            self._switch(False)
             raise
 
 
@@ -152,32 +185,26 @@ class Pca9685Channel:
         chip.channels.add(channel)
         self._chip: Pca9685 | None = chip
         self._channel = channel
-        self._steps: int | None = None
-        self._writes = 0
 
     def write_us(self, width_us: float) -> float:
         """Send pulses of this width, in whole steps; see `PulseChannel.write_us`."""
         chip = self._open_chip()
         steps = min(max(round(width_us / chip.step_us()), 0), _STEPS - 1)
-        self._writes += 1
-        if steps != self._steps:
-            chip.send(self._channel, steps)
-            self._steps = steps
-        elif self._writes % _WRITES_PER_CHECK == 0:
-            chip.check()
+        chip.send(self._channel, steps)
         return steps * chip.step_us()
 
     def release(self) -> None:
         """Send none."""
         self._open_chip().stop(self._channel)
-        self._steps = None
 
     def close(self) -> None:
-        """Send none, and let go."""
-        if self._chip is not None:
-            self.release()
-            self._chip.leave(self._channel)
-            self._chip = None
+        """Send none, and let go, also when the chip does not answer."""
+        if (chip := self._chip) is not None:
+            try:
+                chip.stop(self._channel)
+            finally:
+                self._chip = None
+                chip.leave(self._channel)
 
     def _open_chip(self) -> Pca9685:
         if self._chip is None:
@@ -210,9 +237,13 @@ def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685C
         )
     try:
         channel = Pca9685Channel(chip, whole(settings, "channel"))
-        channel.release()
     except RobotError:
         if not chip.channels:
             chip.leave(-1)
+        raise
+    try:
+        channel.release()
+    except Exception:
+        chip.leave(whole(settings, "channel"))  # Whoever tries again finds it free.
         raise
     return channel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 
 from gpiozero import PhaseEnableMotor
 
@@ -33,10 +34,12 @@ class PhaseEnable:
         """Turn the motor, and say how fast; see `OutputDriver.write`."""
         drive = math.copysign(self._duty.of(value), value)
         if drive != self._written:
+            written = self._written
+            self._written = None  # What fails may have taken effect all the same.
             with in_words(self._name):
                 # gpiozero turns the motor off before each new speed, also in the same direction,
                 # which would make it stutter.
-                if self._written is not None and drive * self._written > 0.0:
+                if written is not None and drive * written > 0.0:
                     self._motor.enable_device.value = abs(drive)
                 else:
                     self._motor.value = drive
@@ -45,15 +48,18 @@ class PhaseEnable:
 
     def release(self) -> None:
         """No speed; such drivers brake then, and cannot let go."""
+        self._written = None
         with in_words(self._name):
             self._motor.stop()
-        self._written = None
 
     def close(self) -> None:
         """Both inputs low; see `LowAtOncePin.close` for what the pins do then."""
-        if not self._motor.closed:
+        if self._motor.closed:
+            return
+        with in_words(self._name), ExitStack() as stack:
+            stack.callback(self._motor.close)
             self.release()
-            self._motor.close()
+            self._motor.phase_device.off()  # A plain output would keep its level.
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> PhaseEnable:
@@ -65,7 +71,11 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> PhaseEnable:
     settings = plan.settings
     phase, enable = whole(settings, "phase"), whole(settings, "enable")
     name = f"Output {plan.name!r} on GPIO{phase} and GPIO{enable}"
-    with in_words(name):
+    duty = Duty(number(settings, "start"), number(settings, "full"))
+    with in_words(name), ExitStack() as undo:
         motor = PhaseEnableMotor(phase, enable, pin_factory=hardware.pin_factory())
+        undo.callback(motor.close)
         motor.enable_device.frequency = whole(settings, "pwm_hz")
-    return PhaseEnable(motor, Duty(number(settings, "start"), number(settings, "full")), name)
+        driver = PhaseEnable(motor, duty, name)
+        undo.pop_all()
+    return driver

@@ -81,11 +81,14 @@ class _PinChannel:
         self._send(0)
 
     def close(self) -> None:
-        self._send(0)
-        self._pins.close()
+        try:
+            self._send(0)
+        finally:
+            self._pins.close()
 
     def _send(self, width_us: int) -> None:
         if width_us != self._width_us:
+            self._width_us = None  # What fails may have taken effect all the same.
             self._pins.pulse(self._pin, width_us, self._hz)
             self._width_us = width_us
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from shapechanger.robot.drivers.in_words import in_words
 from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
@@ -11,6 +12,8 @@ from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 __all__ = ["Servo", "open_driver"]
+
+_DEG_PER_VALUE: Final = 90.0  # From end to end, a value of 2, it is taken to turn by 180 degrees.
 
 
 class Servo:
@@ -39,9 +42,9 @@ class Servo:
 
     def release(self) -> None:
         """No pulse: most servos let go then."""
+        self._value = None
         with in_words(self._name):
             self._channel.release()
-        self._value = None
 
     def close(self) -> None:
         """No pulse, and let go of the channel."""
@@ -53,12 +56,13 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> Servo:
     """Open the servo; it gets no pulse yet.
 
     The settings are those of `open_pulse_channel`, `left_us`, `centre_us` and `right_us` (at -1, 0
-    and 1), and `travel_deg_per_s`: how fast it is moved from one end to the other, where the whole
-    travel of a servo counts as 180 degrees; infinite for as fast as it can.
+    and 1), and `travel_deg_per_s`: how fast it is moved, at most; infinite for as fast as it can.
+    From end to end it is taken to turn by 180 degrees; for one that turns by 90, double the speed.
     """
     settings = plan.settings
     name = f"Output {plan.name!r}"
     pulses = PulseRange(*(number(settings, key) for key in ("left_us", "centre_us", "right_us")))
+    speed_per_s = number(settings, "travel_deg_per_s") / _DEG_PER_VALUE
     with in_words(name):
         channel = open_pulse_channel(settings, hardware)
-    return Servo(channel, pulses, number(settings, "travel_deg_per_s") / 90.0, name)
+    return Servo(channel, pulses, speed_per_s, name)

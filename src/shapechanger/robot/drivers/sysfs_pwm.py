@@ -46,11 +46,14 @@ class SysfsPwm:
     def close(self) -> None:
         """Send none, and switch the channel off."""
         with in_words(self._name):
-            self._send(0)
-            self._write("enable", 0)
+            try:
+                self._send(0)
+            finally:
+                self._write("enable", 0)
 
     def _send(self, width_us: int) -> None:
         if width_us != self._width_us:
+            self._width_us = None  # What fails may have taken effect all the same.
             self._write("duty_cycle", width_us * 1000)
             self._width_us = width_us
 

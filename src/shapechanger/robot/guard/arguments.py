@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
-__all__ = ["descriptors"]
+__all__ = ["AFTER_FAILURE", "descriptors"]
+
+AFTER_FAILURE: Final = "--after-failure"
+"""The guard's argument that says that it follows processes which failed."""
 
 
 def descriptors(arguments: Sequence[str], names: Sequence[str]) -> dict[str, int]:

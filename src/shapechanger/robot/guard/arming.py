@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from shapechanger.robot.guard.words import shortened
+
 __all__ = ["Arming"]
 
 
 class Arming:
-    """Starts disarmed. An emergency stop latches until somebody who knows of it arms again.
+    """Starts disarmed. An emergency stop latches until a person who knows of it arms again.
 
     Attributes:
         armed: Whether commands move anything.
@@ -21,15 +23,18 @@ class Arming:
         self.emergencies = 0
         self.reason = "Not armed."
 
-    def arm(self, seen: int) -> str:
+    def arm(self, seen: int, *, person: bool) -> str:
         """Let commands move, and end an emergency stop.
 
         Args:
             seen: How many emergency stops whoever arms has seen.
+            person: Whether a person arms.
 
         Returns:
             Why not, in words; empty when it is armed now.
         """
+        if self.emergency and not person:
+            return "Not armed: only a person ends an emergency stop."
         if self.emergency and seen != self.emergencies:
             return (
                 f"Not armed: there were {self.emergencies} emergency stops, and whoever armed "
@@ -40,12 +45,13 @@ class Arming:
 
     def disarm(self, reason: str) -> None:
         """Let nothing move; the reason of an emergency stop stays."""
-        self.armed = False
+        self.armed, reason = False, shortened(reason)
         if not self.emergency:
             self.reason = f"Disarmed: {reason}" if reason else "Disarmed."
 
     def stop(self, reason: str) -> None:
         """Stop at once, until armed again; each call counts, and the first reason stays."""
+        reason = shortened(reason)
         if not self.emergency:
             self.reason = f"Emergency stop: {reason}" if reason else "Emergency stop."
         self.armed, self.emergency = False, True

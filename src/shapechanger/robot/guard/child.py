@@ -22,6 +22,7 @@ class Child:
         name: What it is.
         beaten_ns: When its heart was heard last; when it was started, before the first beat.
         has_beaten: Whether it was heard at all.
+        killed: Whether it was ended by `kill`; one that is stuck in the kernel outlives that.
 
     Args:
         name: What it is.
@@ -36,6 +37,7 @@ class Child:
         self.name = name
         self.beaten_ns = now_ns
         self.has_beaten = False
+        self.killed = False
         self._heart, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         self._heart.setblocking(False)
         with theirs:
@@ -79,17 +81,31 @@ class Child:
             is_closed = True
         return self._process.poll() is not None or is_closed
 
+    def has_ended(self) -> bool:
+        """Whether there is no such process any more."""
+        return self._process.poll() is not None
+
     def kill(self, at_most_s: float) -> None:
         """End it at once (SIGKILL), and wait for its end so long at most."""
+        self.killed = True
         self._process.kill()
         self._wait(at_most_s)
 
-    def end(self, at_most_s: float) -> None:
-        """Tell it to end (SIGTERM), and end it at once if it has not ended by then."""
-        if self._process.poll() is None:
+    def tell(self) -> None:
+        """Tell it to end (SIGTERM)."""
+        if not self.has_ended():
             self._process.terminate()
-            if not self._wait(at_most_s):
-                self.kill(at_most_s)
+
+    def end(self, at_most_s: float, reap_s: float) -> None:
+        """Tell it to end, and end it at once if it has not ended by then.
+
+        Args:
+            at_most_s: How long it may take.
+            reap_s: How long it may take to be gone after it was killed.
+        """
+        self.tell()
+        if not self._wait(at_most_s):
+            self.kill(reap_s)
 
     def close(self) -> None:
         """Let go of it; it must have ended."""

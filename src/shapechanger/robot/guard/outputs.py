@@ -9,6 +9,7 @@ from dataclasses import replace
 from shapechanger.robot.drivers.output import OutputDriver, open_output
 from shapechanger.robot.guard.mix import output_values
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.guard.truth import Done, Truth
 from shapechanger.robot.hardware import Hardware
 
 __all__ = ["Outputs", "drives_first"]
@@ -26,6 +27,7 @@ class Outputs:
 
     Attributes:
         values: The value that each output really has, by name.
+        released: Whether they let go.
 
     Args:
         plan: The robot.
@@ -38,8 +40,9 @@ class Outputs:
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
         self._plan = plan = drives_first(plan)
         self._rest = tuple(action.rest for action in plan.actions)
+        self._truth = Truth(plan)
         self._drivers: list[tuple[OutputPlan, OutputDriver]] = []
-        self._released = False
+        self.released = False
         self.values = {output.name: 0.0 for output in plan.outputs}
         with ExitStack() as undo:
             for output in plan.outputs:
@@ -48,21 +51,26 @@ class Outputs:
                 self._drivers.append((output, driver))
             undo.pop_all()
 
-    def write(self, actions: Sequence[float], now_ns: int) -> None:
-        """Move all outputs, also those that have their value: some controllers need time."""
+    def write(self, actions: Sequence[float], now_ns: int) -> Done:
+        """Move all outputs, also those that have their value: some controllers need time.
+
+        Returns:
+            What they really do.
+        """
         values = output_values(self._plan, actions)
         for (output, driver), value in zip(self._drivers, values, strict=True):
             self.values[output.name] = driver.write(value, now_ns)
-        self._released = False
+        self.released = False
+        return self._truth.done(actions, values, tuple(self.values.values()))
 
     def release(self) -> None:
         """Let all outputs go, once."""
-        if self._released:
+        if self.released:
             return
         for output, driver in self._drivers:
             driver.release()
             self.values[output.name] = 0.0
-        self._released = True
+        self.released = True
 
     def rest(self, now_ns: int) -> list[str]:
         """Put every output to rest, also after one of them failed.
@@ -77,7 +85,7 @@ class Outputs:
                 self.values[output.name] = driver.write(value, now_ns)
             except Exception as error:  # Whatever it is, the next output must rest too.
                 failures.append(_words(output, error))
-        self._released = False
+        self.released = False
         return failures
 
     def close(self, now_ns: int) -> list[str]:
@@ -87,7 +95,7 @@ class Outputs:
             What failed, in words.
         """
         # What was let go must not be gripped once more.
-        failures = [] if self._released else self.rest(now_ns)
+        failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
             try:
                 driver.close()

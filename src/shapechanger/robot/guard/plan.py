@@ -98,8 +98,10 @@ class LimitPlan:
         deadline_ms: How long the newest command acts; then the robot stops.
         camera_stale_ms: Age of the newest picture from which on the robot is blind, and stops; 0
             for a robot without a camera.
-        bump_hold_ms: How long a bump keeps the robot from going forward.
-        stop_distance_m: Distance ahead below which it does not go forward; 0 for never.
+        bump_hold_ms: How long a bump keeps the robot from going forward. All bumpers count as front
+            bumpers: touched from behind, it may still go backward.
+        stop_distance_m: Distance ahead below which it does not go forward, nor does it while
+            a sensor knows none; 0 for never.
         stall_s: How long it may push without moving before it stops; 0 for ever.
         stall_throttle: Propulsion above which it should move.
         low_battery_v: Voltage below which it stops; 0 for none.

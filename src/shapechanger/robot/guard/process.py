@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.arguments import descriptors
+from shapechanger.robot.guard.arguments import AFTER_FAILURE, descriptors
 from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
 from shapechanger.robot.guard.log import log_to_stderr
 from shapechanger.robot.guard.outputs import Outputs
@@ -28,7 +28,9 @@ from shapechanger.robot.guard.rules import Decision, Rules
 from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.guard.switches import Switches
+from shapechanger.robot.guard.truth import Done
 from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.guard.words import shortened
 from shapechanger.robot.hardware import Hardware, connect
 
 __all__ = ["BEAT_S", "Guard", "main"]
@@ -38,6 +40,7 @@ BEAT_S: Final = 0.01
 
 _WAIT_S: Final = 0.01  # Real seconds of one wait at most, while a twin's time stands still.
 _STATE_EVERY_NS: Final = 20_000_000  # 50 states a second at least.
+_MOST_REASON_BYTES: Final = 1000  # Several reasons may come together; a datagram holds 16 kB.
 
 
 class Guard:
@@ -49,6 +52,8 @@ class Guard:
         daemon: Where orders come from.
         heartbeat: How the supervisor knows that this lives.
         log: Where to say what happens.
+        after_failure: Whether it follows processes of this robot that failed. Then it begins with
+            an emergency stop, so that only a person lets it move again.
     """
 
     def __init__(
@@ -58,6 +63,8 @@ class Guard:
         daemon: DaemonChannel,
         heartbeat: Heartbeat,
         log: logging.Logger,
+        *,
+        after_failure: bool = False,
     ) -> None:
         self._clock = hardware.clock
         self._daemon = daemon
@@ -73,8 +80,12 @@ class Guard:
             undo.callback(self._switches.close)
             self._sensors = Sensors(plan, hardware)
             undo.callback(self._sensors.close)
+            # The first thing at the end: pins take their time to be closed.
+            undo.callback(self._rest_outputs)
             self._opened = undo.pop_all()
         self._rules = Rules(plan, now_ns)
+        if after_failure:
+            self._rules.stop("the robot's processes failed and started afresh.")
         self._next_tick_ns = now_ns
         self._healthy = True
         self._failures: dict[str, str] = {}
@@ -107,6 +118,10 @@ class Guard:
         """Put all outputs to rest and let go of everything."""
         self._opened.close()
 
+    def _rest_outputs(self) -> None:
+        if not self._outputs.released:
+            self._outputs.rest(self._clock.now_ns())  # Whoever fails is told of when it is closed.
+
     def _close_outputs(self) -> None:
         for failure in self._outputs.close(self._clock.now_ns()):
             self.is_safe = False
@@ -118,7 +133,10 @@ class Guard:
         if is_tick := now_ns >= self._next_tick_ns:
             self._next_tick_ns = max(self._next_tick_ns, now_ns - self._period_ns)
             self._next_tick_ns += self._period_ns
+            if self._applied[1] is not None and self._rules.stands(now_ns):
+                self._apply(now_ns)  # No stop waits for a sensor.
             self._sense(now_ns)
+        now_ns = self._clock.now_ns()  # Orders and sensors took their time.
         decision = self._apply(now_ns)
         if is_tick and self._healthy:
             self._switches.toggle()
@@ -133,9 +151,11 @@ class Guard:
             if order.kind == "end":
                 self.ended = "the daemon ended it"
         if malformed:
+            self._rules.halt()  # Whoever said it had done with the command before.
             self._malformed += len(malformed)
             self._refused = (malformed[-1], None)
-            self._log.warning("%d datagrams were no orders: %s", self._malformed, malformed[-1])
+            words = shortened(malformed[-1])
+            self._log.warning("%d datagrams were no orders: %s", self._malformed, words)
         if self._daemon.lost:
             self._rules.disarm("the daemon is gone.")
 
@@ -157,7 +177,7 @@ class Guard:
             if decision.release:
                 self._outputs.release()
             else:
-                self._outputs.write(decision.actions, now_ns)
+                decision = self._truly(decision, self._outputs.write(decision.actions, now_ns))
         except Exception as error:  # Whatever a driver raises: everything else must rest.
             self._healthy = False
             self._rules.fail(str(error) or type(error).__name__, now_ns)
@@ -167,6 +187,14 @@ class Guard:
             self._applied_ns = None if decision.seq is None else self._clock.now_ns()
         return decision
 
+    def _truly(self, decision: Decision, done: Done) -> Decision:
+        """The decision as the outputs carry it out."""
+        self._rules.learn(done.actions)
+        reason = decision.stop_reason
+        if decision.seq is not None:  # A robot at rest does what it was told, if a little later.
+            reason = f"{reason} {done.reason}".strip()
+        return replace(decision, actions=done.actions, stop_reason=reason)
+
     def _recover(self, decision: Decision, now_ns: int) -> Decision:
         """Put all outputs to rest, again and again until each of them obeys."""
         failures = self._outputs.rest(now_ns)
@@ -174,7 +202,12 @@ class Guard:
         if failures and not self._rules.arming.emergency:
             self._rules.fail(" ".join(failures), now_ns)
         self._applied, self._applied_ns = (0, None), None
-        return self._rules.tick(now_ns) if decision.seq is not None else decision
+        if decision.seq is not None:
+            decision = self._rules.tick(now_ns)
+        if not failures:
+            return decision
+        words = shortened(" ".join(failures))
+        return replace(decision, stop_reason=f"NOT at rest: {words} {decision.stop_reason}")
 
     def _report(self, decision: Decision, now_ns: int) -> None:
         arming, senses = self._rules.arming, self._rules.senses
@@ -185,12 +218,12 @@ class Guard:
             armed=arming.armed,
             emergency=arming.emergency,
             emergencies=arming.emergencies,
-            stop_reason=decision.stop_reason,
+            stop_reason=shortened(decision.stop_reason, _MOST_REASON_BYTES),
             applied=decision.actions,
             applied_session=session,
             applied_seq=seq,
             applied_ns=self._applied_ns,
-            refused=refused,
+            refused=shortened(refused, _MOST_REASON_BYTES),
             refused_seq=refused_seq,
             outputs=dict(self._outputs.values),
             quantities=senses.quantities,
@@ -215,7 +248,11 @@ class Guard:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Run the guard; the arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`."""
+    """Run the guard.
+
+    The arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`, and before them
+    `--after-failure` where processes of this robot failed before it.
+    """
     log = log_to_stderr("guard")
     try:
         _guard(arguments, log)
@@ -225,7 +262,9 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
-    fds = descriptors(arguments, ("--plan-fd", "--daemon-fd", "--heartbeat-fd"))
+    after_failure = list(arguments[:1]) == [AFTER_FAILURE]
+    names = ("--plan-fd", "--daemon-fd", "--heartbeat-fd")
+    fds = descriptors(arguments[1:] if after_failure else arguments, names)
     told: list[str] = []
     guard: Guard | None = None
 
@@ -244,7 +283,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         plan = read_plan_fd(fds["--plan-fd"])
         hardware = connect(*plan.hardware)
         opened.callback(hardware.close)
-        guard = Guard(plan.guard, hardware, daemon, heartbeat, log)
+        guard = Guard(plan.guard, hardware, daemon, heartbeat, log, after_failure=after_failure)
         opened.callback(guard.close)
         if told:  # While it was being set up.
             guard.ended = told[0]

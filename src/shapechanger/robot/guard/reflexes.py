@@ -121,7 +121,12 @@ class Health:
         failing = [
             f"Sensor {name} fails, and can protect no longer: {sensing.failures[name]}"
             for name in self._protecting
-            if name in sensing.failures
+            if name in sensing.failures and name not in sensing.slow
+        ]
+        # Also one that protects from nothing: it holds up every stop.
+        failing += [
+            f"Sensor {name} holds up the robot: {sensing.failures[name]}"
+            for name in sorted(sensing.slow)
         ]
         limits, quantities = self._limits, sensing.quantities
         volts = quantities.get("battery")

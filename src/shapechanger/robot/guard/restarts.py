@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Final
 
 __all__ = ["Restarts"]
+
+_PAUSE_S: Final = 0.2
 
 
 class Restarts:
@@ -19,6 +22,11 @@ class Restarts:
         self._most = most
         self._within_ns = round(within_s * 1e9)
         self._times_ns: deque[int] = deque()
+
+    @property
+    def pause_s(self) -> float:
+        """How long to wait before the restart that counted last, s: twice as long each time."""
+        return _PAUSE_S * (2 ** (len(self._times_ns) - 1) - 1)
 
     def may_restart(self, now_ns: int) -> bool:
         """Whether there may be one more now, which then counts."""

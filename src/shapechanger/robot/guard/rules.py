@@ -16,7 +16,7 @@ from shapechanger.robot.guard.plan import GuardPlan, StopPlan
 from shapechanger.robot.guard.propulsion import Propulsion
 from shapechanger.robot.guard.reflexes import Bump, Health, Stall
 from shapechanger.robot.guard.senses import Senses, Sensing
-from shapechanger.robot.guard.shaping import aimed, slewed
+from shapechanger.robot.guard.shaping import aimed, clipped, slewed
 from shapechanger.robot.guard.stopping import Stopping
 from shapechanger.robot.guard.wire import Order
 
@@ -24,6 +24,8 @@ __all__ = ["ARM_WITHIN_NS", "Decision", "Rules"]
 
 ARM_WITHIN_NS = 1_000_000_000
 """Age from which on an order to arm is refused, ns: nobody looks at the robot any more."""
+
+_CLIPPED = "Clipped by the robot's caps."
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +80,14 @@ class Rules:
         self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
         self._health = Health(plan)
         self._is_near = False
+        self._is_far = True
         self._is_pressed = False
         self._command: Order | None = None
         self._expiry_ns = 0
         self._frame_ns: int | None = None
         self._ticked_ns = now_ns
         self._applied = tuple(action.rest for action in plan.actions)
+        self._done = self._applied
         # A guard starts at the end of a stop.
         self._stopping: Stopping | None = self._rest_at_once(now_ns)
 
@@ -95,7 +99,7 @@ class Rules:
     @property
     def direction(self) -> float:
         """Sign of the propulsion: 1 forward, -1 backward, 0 neither."""
-        push = self._propulsion.push(self._applied)
+        push = self._propulsion.push(self._done)
         return float((push > 0.0) - (push < 0.0))
 
     @property
@@ -114,7 +118,7 @@ class Rules:
             case "command":
                 return self._offer_command(order, now_ns)
             case "halt":
-                self._command = None
+                self.halt()
             case "arm":
                 return self._arm(order, now_ns)
             case "disarm":
@@ -124,6 +128,10 @@ class Rules:
             case "end":
                 self.disarm("the guard ends.")
         return ""
+
+    def halt(self) -> None:
+        """Take the newest command back; the robot stays armed."""
+        self._command = None
 
     def disarm(self, reason: str) -> None:
         """Keep everything at rest until armed again."""
@@ -151,12 +159,15 @@ class Rules:
         quantities = sensing.quantities
         limit_m = self._plan.limits.stop_distance_m
         self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m
+        measures = any(sensor.measures == "distance" for sensor in self._plan.sensors)
+        is_heard = "distance" in quantities and not sensing.silent
+        self._is_far = limit_m <= 0.0 or not measures or is_heard
         self._bump.sense(quantities, now_ns)
-        self._stall.sense(quantities, self._propulsion.push(self._applied), now_ns)
+        self._stall.sense(quantities, self._propulsion.push(self._done), now_ns)
         self._health.sense(sensing, now_ns)
         self.senses.complete(
             sensing,
-            speed=self._propulsion.speed(self._applied),
+            speed=self._propulsion.speed(self._done),
             stalled=self._stall.way != 0,
             watches_stall=self._stall.watches,
         )
@@ -169,10 +180,21 @@ class Rules:
         command = self._command
         if command is not None and now_ns >= self._expiry_ns:
             command = self._command = None
-        reason = self.arming.reason or self._health.reason or self._blindness(now_ns)
+        reason = self._reason(now_ns)
         if reason or command is None:
-            return self._stand(reason or "No fresh command.", now_ns)
-        return self._follow(command, elapsed_ns / 1e9, now_ns)
+            decision = self._stand(reason, now_ns)
+        else:
+            decision = self._follow(command, elapsed_ns / 1e9, now_ns)
+        self._done = self._applied
+        return decision
+
+    def stands(self, now_ns: int) -> bool:
+        """Whether `tick` would let nothing act now."""
+        return self._reason(now_ns) != ""
+
+    def learn(self, done: tuple[float, ...]) -> None:
+        """Take in what the outputs really do after `tick`, one number for each action."""
+        self._done = done
 
     def next_wake_ns(self, now_ns: int) -> int:
         """When `tick` must be asked again even if nothing happens."""
@@ -192,6 +214,7 @@ class Rules:
             return refusal
         wanted, given = len(self._plan.actions), len(order.values)
         if given != wanted:
+            self.halt()  # Whoever sent it had done with the one before.
             return f"Command {order.seq} has {given} values; this robot has {wanted} actions."
         if not self.arming.armed:
             return f"Command {order.seq} is refused. {self.arming.reason}"
@@ -205,7 +228,7 @@ class Rules:
         age_ns = now_ns - order.issued_ns
         if age_ns >= ARM_WITHIN_NS:
             return f"Not armed: the order to arm is {age_ns / 1e9:.1f} s old."
-        if refusal := self.arming.arm(order.emergency):
+        if refusal := self.arming.arm(order.emergency, person=order.person):
             return refusal
         self._command = None  # What was said before does not move anything now.
         self._health.rearm()
@@ -215,6 +238,15 @@ class Rules:
         frame_ns = order.frame_ns
         if frame_ns is not None and frame_ns <= now_ns + FUTURE_NS:
             self._frame_ns = max(min(frame_ns, now_ns), self._frame_ns or 0)
+
+    def _reason(self, now_ns: int) -> str:
+        """Why nothing may act, in words; empty when the newest command may."""
+        if reason := self.arming.reason or self._health.reason:
+            return reason
+        # Pictures are told of by commands, so without one nobody knows how old the newest is.
+        if self._command is None or now_ns >= self._expiry_ns:
+            return "No fresh command."
+        return self._blindness(now_ns)
 
     def _blindness(self, now_ns: int) -> str:
         if not self._stale_ns:
@@ -237,8 +269,11 @@ class Rules:
         self._stopping = None
         actions = self._plan.actions
         aims = [aimed(a, value) for a, value in zip(actions, command.values, strict=True)]
+        clips = any(map(clipped, actions, command.values))
         self._stall.ask(self._propulsion.push(aims))
         reason = self._hold_back(aims, now_ns)
+        if clips:
+            reason = f"{reason} {_CLIPPED}".lstrip()
         self._applied = tuple(
             slewed(a, now, aim, elapsed_s)
             for a, now, aim in zip(actions, self._applied, aims, strict=True)
@@ -252,6 +287,8 @@ class Rules:
             forward.append("Not forward: the bumper touched something.")
         if self._is_near:
             forward.append("Not forward: something is near.")
+        if not self._is_far:
+            forward.append("Not forward: the distance ahead is not known.")
         if self._stall.way > 0:
             forward.append("Not forward: it pushes and does not move.")
         backward = ["Not backward: it pushes and does not move."] if self._stall.way < 0 else []

@@ -19,11 +19,15 @@ class Sensing:
         quantities: What was measured, by name and in SI units; see `GuardState.quantities`.
         sources: Name of the sensor behind each quantity.
         failures: Why a sensor did not answer, in words, by its name.
+        slow: Sensors that took too long, among those that failed.
+        silent: Distance sensors that answered, but know no distance.
     """
 
     quantities: Mapping[str, float] = field(default_factory=dict[str, float])
     sources: Mapping[str, str] = field(default_factory=dict[str, str])
     failures: Mapping[str, str] = field(default_factory=dict[str, str])
+    slow: frozenset[str] = frozenset()
+    silent: frozenset[str] = frozenset()
 
 
 class Senses:

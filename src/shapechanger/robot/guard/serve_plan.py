@@ -1,12 +1,14 @@
 """What the processes of a robot are started with, handed on as an open file.
 
 The command line checks a profile once, turns it into this plan and starts the supervisor with it.
-The file has no name, so that nothing is left behind and nobody can change it on the way, and lies
-in memory, so that a full disk does not keep a robot from starting.
+The file has no name, so that nothing is left behind, and is sealed, so that nobody can change it,
+also not the processes that inherit it. It lies in memory, so that a full disk does not keep a robot
+from starting.
 """
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import sys
@@ -74,10 +76,14 @@ class ServePlan:
 
 def plan_fd(plan: ServePlan) -> int:
     """An open file with the plan, which child processes inherit; close it when they have it."""
-    fd = os.memfd_create("serve-plan", 0)  # Without MFD_CLOEXEC, so that `exec` keeps it open.
+    # Without MFD_CLOEXEC, so that `exec` keeps it open.
+    fd = os.memfd_create("serve-plan", os.MFD_ALLOW_SEALING)
     left = memoryview(plan.to_json().encode())
     while left:
         left = left[os.write(fd, left) :]
+    # The guard takes its limits from it, and a daemon that went astray must not move them.
+    seals = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
+    fcntl.fcntl(fd, fcntl.F_ADD_SEALS, seals)
     return fd
 
 

@@ -6,7 +6,9 @@ import math
 
 from shapechanger.robot.guard.plan import ActionPlan
 
-__all__ = ["aimed", "slewed"]
+__all__ = ["aimed", "clipped", "slewed"]
+
+_SAME = 1e-6  # A cap that went through a 32-bit float is still the cap.
 
 
 def aimed(action: ActionPlan, value: float) -> float:
@@ -16,6 +18,12 @@ def aimed(action: ActionPlan, value: float) -> float:
             return action.high
         return action.low if value <= -action.threshold else action.rest
     return max(action.low, min(action.high, value))
+
+
+def clipped(action: ActionPlan, value: float) -> bool:
+    """Whether a value of a command lies outside the caps."""
+    is_inside = action.low - _SAME <= value <= action.high + _SAME
+    return action.levels == "any" and not is_inside
 
 
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:

@@ -2,12 +2,13 @@
 
 It is the parent of both, and does nothing else, so that there is nothing in it that could fail. A
 guard that is gone or silent cannot put the outputs to rest, and a Raspberry Pi keeps the levels of
-its pins; so then the supervisor does it. After that both are started afresh, and the new guard is
-not armed.
+its pins; so then the supervisor does it, again and again until they obey. After that both are
+started afresh, and the new guard begins with an emergency stop, which only a person ends.
 
 Exit codes: 0 when it was told to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1
-when the processes failed too often; 2 when it cannot start; 3 when it ends and an output did not
-obey. In all cases but the last the outputs are at rest, as far as they say.
+when the processes failed too often; 2 when it cannot start; 3 when it ends and, for some seconds,
+an output did not obey or a killed guard did not end. In all cases but the last the outputs are at
+rest, as far as they say.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.robot.guard import start
-from shapechanger.robot.guard.arguments import descriptors
+from shapechanger.robot.guard.arguments import AFTER_FAILURE, descriptors
 from shapechanger.robot.guard.child import Child
 from shapechanger.robot.guard.log import log_to_stderr
 from shapechanger.robot.guard.priority import run_promptly
@@ -44,6 +45,8 @@ _START_S: Final = 30.0  # Until the first heartbeat: a Pi Zero loads a daemon fo
 _DAEMON_SILENCE_S: Final = 2.0
 _END_S: Final = 1.0  # For a process to end when it is told to.
 _REAP_S: Final = 0.05  # For a killed process to be gone; the pins do not wait any longer.
+_AGAIN_S: Final = 0.1  # Between two attempts to put the outputs to rest.
+_UNSAFE_S: Final = 5.0  # For such attempts where nothing else can be waited for.
 _LOOK_S: Final = 0.02  # Between two looks at the hearts.
 _PAUSE_NS: Final = 100_000_000  # A longer time between two looks means that this did not run.
 
@@ -88,6 +91,8 @@ class Supervisor:
         self._restarts = Restarts()
         self._told = ""
         self._is_safe = True
+        self._has_guarded = False
+        self._failures: list[str] = []
         # A signal makes this readable, so that the loop wakes up.
         self._woken, self._waker = socket.socketpair()
         for end in (self._woken, self._waker):
@@ -105,8 +110,9 @@ class Supervisor:
             if signal.getsignal(number) != signal.SIG_IGN:  # As `nohup` has it.
                 signal.signal(number, self._end)
         run_promptly()
+        after_failure: tuple[str, ...] = ()
         while True:
-            guard, daemon = self._start()
+            guard, daemon = self._start(after_failure)
             why = ""
             try:
                 why = self._supervise(guard, daemon)
@@ -115,24 +121,40 @@ class Supervisor:
             if self._told:
                 self._log.info("ends: %s.", self._told)
                 return _ENDED if self._is_safe else _NOT_SAFE
+            if not self._is_safe:
+                self._log.critical("gives up: %s, and not all outputs are at rest.", why)
+                return _NOT_SAFE
             if not self._restarts.may_restart(time.monotonic_ns()):
                 self._log.critical("gives up: %s, once too often.", why)
-                return _FAILED_TOO_OFTEN if self._is_safe else _NOT_SAFE
+                return _FAILED_TOO_OFTEN
             self._log.warning("%s; both start afresh, and the robot is not armed.", why)
+            self._pause(self._restarts.pause_s)
+            if self._told:
+                self._log.info("ends: %s.", self._told)
+                return _ENDED
+            after_failure = (AFTER_FAILURE,)
 
     def _end(self, number: int, _: object) -> None:
         self._told = self._told or f"told to by {signal.Signals(number).name}"
 
-    def _start(self) -> tuple[Child, Child]:
+    def _pause(self, seconds: float) -> None:
+        """Wait; a signal ends that early, once."""
+        poll = select.poll()
+        if not self._told:
+            poll.register(self._woken.fileno(), select.POLLIN)
+        poll.poll(seconds * 1e3)
+
+    def _start(self, after_failure: tuple[str, ...]) -> tuple[Child, Child]:
         guards_end, daemons_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with guards_end, daemons_end:
-            guard = self._child("guard", self._commands.guard, "--daemon-fd", guards_end)
+            command = (*self._commands.guard, *after_failure)
+            guard = self._child("guard", command, "--daemon-fd", guards_end)
             try:
                 return guard, self._child(
                     "daemon", self._commands.daemon, "--guard-fd", daemons_end
                 )
             except BaseException:
-                guard.end(_END_S)
+                guard.end(_END_S, _REAP_S)
                 guard.close()
                 raise
 
@@ -170,31 +192,64 @@ class Supervisor:
 
     def _stop(self, guard: Child, daemon: Child) -> None:
         """End both and leave the outputs at rest; nothing comes before the guard."""
-        if guard.is_gone(time.monotonic_ns()):
+        if not guard.killed and guard.is_gone(time.monotonic_ns()):
             guard.kill(_REAP_S)
             if guard.code == 0:
                 self._told = self._told or "the guard was told to"
-        else:
+        elif not guard.killed:
             # One that does not end may hold the outputs anywhere, so it has no longer than that.
-            guard.end(self._plan.guard_silence_ms / 1e3)
+            guard.end(self._plan.guard_silence_ms / 1e3, _REAP_S)
+        self._has_guarded = self._has_guarded or guard.has_beaten
+        daemon.tell()
         if guard.code == 0:
             self._is_safe = True
         else:
-            self._make_safe()
-        daemon.end(_END_S)
+            self._secure(guard)
+        daemon.end(_END_S, _END_S)
         for child in (guard, daemon):
             self._log.info("%s %s.", child.name, _words(child.code))
             child.close()
 
-    def _make_safe(self) -> None:
+    def _secure(self, guard: Child) -> None:
+        """Put the outputs to rest until they are, and the guard has ended for good.
+
+        A guard that is stuck in the kernel still holds its pins, and what it is stuck in may be
+        done later. Where there is nothing else to wait for, because it was told to end or because
+        no guard ever had the outputs, this gives up after some seconds.
+        """
+        self._failures = []
         started_ns = time.monotonic_ns()
+        until_ns: int | None = None
+        while True:
+            has_ended = guard.has_ended()  # Before: what it did at last must not come after.
+            self._make_safe()
+            now_ns = time.monotonic_ns()
+            if self._is_safe and has_ended:
+                took_ms = (now_ns - started_ns) / 1e6
+                self._log.warning(
+                    "the guard left; all outputs are at rest, after %.1f ms.", took_ms
+                )
+                return
+            if self._is_safe:
+                self._is_safe = False
+                self._say_unsafe(["The guard does not end, and may still write."])
+            if self._told or not self._has_guarded:
+                until_ns = until_ns or now_ns + round(_UNSAFE_S * 1e9)
+                if now_ns >= until_ns:
+                    return
+            self._pause(_AGAIN_S)
+
+    def _make_safe(self) -> None:
         failures = _collected(lambda: _safe(self._plan))
         self._is_safe = not failures
-        for failure in failures:
-            self._log.error("NOT SAFE: %s", failure)
-        if not failures:
-            took_ms = (time.monotonic_ns() - started_ns) / 1e6
-            self._log.warning("the guard left; all outputs are at rest, after %.1f ms.", took_ms)
+        self._say_unsafe(failures)
+
+    def _say_unsafe(self, failures: list[str]) -> None:
+        """Say what does not obey, once for each time that it changes."""
+        if failures and failures != self._failures:
+            self._failures = failures
+            for failure in failures:
+                self._log.error("NOT SAFE: %s", failure)
 
 
 def _safe(plan: ServePlan) -> list[str]:

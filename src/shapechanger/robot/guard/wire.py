@@ -37,6 +37,7 @@ class Order:
         emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
             is not ended.
         reason: Why, in words, for "disarm" and "emergency".
+        person: For "arm": whether a person arms; nobody else ends an emergency stop.
     """
 
     kind: Literal["command", "halt", "arm", "disarm", "emergency", "end"]
@@ -48,6 +49,7 @@ class Order:
     values: tuple[float, ...] = ()
     emergency: int = 0
     reason: str = ""
+    person: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,8 @@ class GuardState:
 
 def encode(said: Order | GuardState) -> bytes:
     """One datagram."""
-    return json.dumps(asdict(said), allow_nan=False, separators=(",", ":")).encode()
+    text = json.dumps(asdict(said), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    return text.encode(errors="replace")  # Half of a surrogate pair has no bytes.
 
 
 def decode_order(data: bytes) -> Order:
@@ -115,6 +118,8 @@ def decode_order(data: bytes) -> Order:
         raise ValueError("frame_ns is no whole number.")
     if type(order.reason) is not str:
         raise ValueError("The reason is no words.")
+    if type(order.person) is not bool:
+        raise ValueError("This is no order: person is neither true nor false.")
     if not all(_is_finite(value) for value in order.values):
         raise ValueError("A value is no finite number.")
     return order

@@ -1,0 +1,43 @@
+"""What a robot is tried with while its wheels are up, tried on its twin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shapechanger.cli.robot.checks import Check, check_robot
+from shapechanger.cli.robot.running import run_robot
+from tests.robots import BLIND_CAR, CAR, changed, write_profile
+
+
+def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Check]:
+    profile = write_profile(folder, text)
+    files = folder / "robot"
+    files.mkdir()
+    arguments: tuple[str, ...] = ()
+    if wired:
+        true = folder / "true"
+        true.mkdir()
+        arguments = ("--wired-as", str(write_profile(true, wired).path))
+    with run_robot(profile, folder=files, arguments=arguments) as robot:
+        return {check.name: check for check in check_robot(robot, profile, 0.5)}
+
+
+def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:
+    """It boots disarmed, drives forward, and stops in every way that a person has."""
+    checks = _checked(tmp_path, CAR)
+    assert [name for name, check in checks.items() if check.level != "good"] == []
+    assert {"boots disarmed", "drives", "stops by silence", "emergency stop"} <= set(checks)
+    assert "disarmed after a crash" in checks
+
+
+def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
+    """Its two wires are swapped: the reward would pay for reversing."""
+    swapped = changed("a = 5\nb = 6\n", "a = 6\nb = 5\n")
+    assert _checked(tmp_path, swapped, wired=CAR)["drives"].level == "bad"
+
+
+def test_without_an_encoder_it_says_what_it_does_not_know(tmp_path: Path) -> None:
+    """Nothing is called good that nothing measured."""
+    checks = _checked(tmp_path, BLIND_CAR)
+    assert (checks["drives"].level, checks["wheels stand"].level) == ("unknown", "unknown")
+    assert checks["stops by silence"].level == "good"

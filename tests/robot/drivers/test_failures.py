@@ -1,0 +1,201 @@
+"""Output drivers on hardware that fails once: afterwards the next write must reach it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import OUTPUT_DRIVERS, OutputDriver
+from shapechanger.robot.drivers.sysfs_pwm import SysfsPwm
+from tests.robot.drivers.fakes import FakeHardware
+
+_DUTY = {"pwm_hz": 50, "start": 0.0, "full": 1.0}
+_SERVO = {"left_us": 1000, "centre_us": 1500, "right_us": 2000, "travel_deg_per_s": float("inf")}
+_ESC = {
+    "backward_us": 1000,
+    "neutral_us": 1500,
+    "forward_us": 2000,
+    "arm_s": 0.0,
+    "reverse": "direct",
+    "brake_ms": 0,
+}
+_OVER = {
+    "pca9685": {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1},
+    "pca9685 with OE": {
+        "over": "pca9685",
+        "bus": 1,
+        "address": 0x40,
+        "channel": 2,
+        "output_enable": 26,
+    },
+    "lgpio": {"over": "lgpio", "pin": 12},
+    "sysfs": {"over": "sysfs", "chip": 0, "channel": 1},
+}
+_OUTPUTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "hbridge": ("hbridge", _DUTY | {"forward": 22, "backward": 27, "enable": -1}),
+    "hbridge with enable": ("hbridge", _DUTY | {"forward": 22, "backward": 27, "enable": 24}),
+    "phase_enable": ("phase_enable", _DUTY | {"phase": 5, "enable": 6}),
+    **{f"servo over {over}": ("servo", _SERVO | {"hz": 50} | at) for over, at in _OVER.items()},
+    **{f"esc over {over}": ("esc", _ESC | {"hz": 50} | at) for over, at in _OVER.items()},
+}
+_MOST_OPERATIONS = 100
+
+
+class _Bench:
+    """A driver's hardware, and what it does."""
+
+    def __init__(self, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.driver, self.settings = _OUTPUTS[name]
+        self.hardware = FakeHardware({0x40: {0x00: 0x11, 0x01: 0x04, 0xFE: 0x1E}})
+        self._folder = tmp_path / "pwmchip0" / "pwm1"
+        self._folder.mkdir(parents=True, exist_ok=True)
+        fault = self.hardware.fault
+
+        class Pwm(SysfsPwm):
+            """Fails like the rest."""
+
+            def __init__(self, chip: int, channel: int, hz: int) -> None:
+                super().__init__(chip, channel, hz, tmp_path)
+
+            def _write(self, file: str, number: int) -> None:
+                fault.during(lambda: super(Pwm, self)._write(file, number))
+
+        monkeypatch.setattr("shapechanger.robot.drivers.sysfs_pwm.SysfsPwm", Pwm)
+
+    def open(self) -> OutputDriver:
+        """Open the driver."""
+        return self.hardware.output(self.driver, **self.settings)
+
+    def state(self) -> dict[str, Any]:
+        """What reaches the motor."""
+        chip = self.hardware.bus.chips[0x40]
+        pins = {
+            pin.info.name: float(pin.state)
+            for pin in self.hardware.factory.pins.values()
+            if pin.function == "output"
+        }
+        if not pins.get("GPIO6"):
+            pins.pop("GPIO5", None)  # Without a speed the direction says nothing.
+        return {
+            "pins": pins,
+            "pulses": {pin: us for pin, us in self.hardware.pulses.widths_us.items() if us},
+            "channel": [chip.get(register, 0) for register in range(0x06 + 8, 0x06 + 12)],
+            "asleep": chip[0x00] & 0x10,
+            "kernel": {file.name: file.read_text() for file in self._folder.iterdir()},
+        }
+
+
+Bench = Callable[[], _Bench]
+
+
+@pytest.fixture(params=_OUTPUTS)
+def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """Makes a bench for each output driver, over each way of pulses."""
+    made = iter(range(10 * _MOST_OPERATIONS))
+    return lambda: _Bench(request.param, tmp_path / str(next(made)), monkeypatch)
+
+
+def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
+    """What the hardware does when nothing fails."""
+    sound = bench()
+    output = sound.open()
+    for i, value in enumerate(values):
+        output.write(value, i)
+    return sound.state()
+
+
+def test_every_driver_is_tried() -> None:
+    """Whoever adds a driver is told about this law."""
+    assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUT_DRIVERS)
+
+
+@pytest.mark.parametrize("takes_effect", [False, True])
+@pytest.mark.parametrize(("before", "asked"), [(0.0, 0.6), (0.6, -0.6), (-0.6, 0.0), (0.3, 0.6)])
+def test_after_a_failure_the_next_write_reaches_the_hardware(
+    bench: Bench, before: float, asked: float, takes_effect: bool
+) -> None:
+    """Whichever operation fails, and whether or not it took effect: a driver must not trust it."""
+    expected = {after: _state_after(bench, before, after) for after in (0.0, before, asked)}
+    for after in expected:
+        for operation in range(1, _MOST_OPERATIONS):
+            tried = bench()
+            output = tried.open()
+            output.write(before, 0)
+            tried.hardware.fault.arm(operation, takes_effect)
+            try:
+                output.write(asked, 1)
+            except RobotError:
+                pass
+            else:
+                assert not tried.hardware.fault.happened, "a failure was hidden"
+            tried.hardware.fault.disarm()
+            output.write(after, 2)
+            assert tried.state() == expected[after], (operation, after)
+            if not tried.hardware.fault.happened:
+                break  # All operations of a write have failed once.
+
+
+@pytest.mark.parametrize("takes_effect", [False, True])
+def test_after_a_failed_release_the_next_one_reaches_the_hardware(
+    bench: Bench, takes_effect: bool
+) -> None:
+    """So it does, and so does a write: what was let go must be gripped again."""
+    expected: list[dict[str, Any]] = []
+    for operation in range(_MOST_OPERATIONS):  # None of them is number 0.
+        tried = bench()
+        output = tried.open()
+        output.write(0.6, 0)
+        tried.hardware.fault.arm(operation, takes_effect)
+        with contextlib.suppress(RobotError):
+            output.release()
+        tried.hardware.fault.disarm()
+        output.release()
+        states = [tried.state()]
+        output.write(0.0, 1)
+        states.append(tried.state())
+        expected = expected or states
+        assert states == expected, operation
+        if operation and not tried.hardware.fault.happened:
+            break
+
+
+@pytest.mark.parametrize("takes_effect", [False, True])
+def test_after_a_failed_opening_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
+    """The supervisor tries again until the outputs are safe, with the pins that it has."""
+    expected = _state_after(bench)
+    for operation in range(1, _MOST_OPERATIONS):
+        tried = bench()
+        tried.hardware.fault.arm(operation, takes_effect)
+        output = None
+        with contextlib.suppress(RobotError):
+            output = tried.open()
+        tried.hardware.fault.disarm()
+        output = output or tried.open()
+        assert tried.state() == expected, operation
+        output.close()
+        if not tried.hardware.fault.happened:
+            break
+
+
+@pytest.mark.parametrize("takes_effect", [False, True])
+def test_after_a_failed_end_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
+    """A driver whose last words were lost holds nothing, and the next one makes it rest."""
+    expected = _state_after(bench, 0.0)
+    for operation in range(1, _MOST_OPERATIONS):
+        tried = bench()
+        output = tried.open()
+        output.write(0.6, 0)
+        tried.hardware.fault.arm(operation, takes_effect)
+        with contextlib.suppress(RobotError):
+            output.close()
+        tried.hardware.fault.disarm()
+        output = tried.open()
+        output.write(0.0, 1)
+        assert tried.state() == expected, operation
+        if not tried.hardware.fault.happened:
+            break

@@ -1,0 +1,66 @@
+"""What is said of outputs that do something else than they were told."""
+
+import pytest
+
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+from shapechanger.robot.guard.truth import Truth
+
+_CAR = GuardPlan(
+    "car",
+    (ActionPlan("steering", rest=0.1), ActionPlan("throttle", propels=True)),
+    (
+        OutputPlan("drive", "esc", mix={"throttle": 1.0}),
+        OutputPlan("steer", "servo", mix={"steering": -0.5}, offset=0.2),
+    ),
+)
+_TANK = GuardPlan(
+    "tank",
+    (ActionPlan("steering", propels=True), ActionPlan("throttle", propels=True)),
+    (
+        OutputPlan("left", "hbridge", mix={"throttle": 1.0, "steering": 1.0}),
+        OutputPlan("right", "hbridge", mix={"throttle": 1.0, "steering": -1.0}),
+    ),
+)
+_WAITS = "Output drive: its controller waits, brakes or changes direction."
+_SLOW = "Output steer: it turns no faster than its profile allows."
+
+
+@pytest.mark.parametrize(
+    ("has", "actions", "reason"),
+    [
+        ((-0.4, -0.05), (0.5, -0.4), ""),
+        ((-0.41, -0.04), (0.5, -0.4), ""),
+        ((0.0, -0.05), (0.5, 0.0), _WAITS),
+        ((-0.4, 0.15), (0.1, -0.4), _SLOW),
+        ((-0.4, 0.05), (0.3, -0.4), _SLOW),
+        ((0.0, 0.05), (0.3, 0.0), f"{_WAITS} {_SLOW}"),
+    ],
+)
+def test_an_action_is_what_its_output_does(
+    has: tuple[float, float], actions: tuple[float, float], reason: str
+) -> None:
+    """Steps of a pulse are no difference; a controller at neutral is rest."""
+    done = Truth(_CAR).done((0.5, -0.4), (-0.4, -0.05), has)
+    assert done.actions == pytest.approx(actions)
+    assert done.reason == reason
+
+
+def test_outputs_of_several_actions_tell_of_rest_only() -> None:
+    """Two tracks at rest are a tank at rest; one of them alone tells of no action."""
+    truth = Truth(_TANK)
+    assert truth.done((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
+    one = truth.done((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
+    assert one.actions == (0.2, 0.5)
+    assert one.reason == "Output left: it does something else."
+
+
+def test_an_action_with_two_outputs_goes_as_long_as_one_of_them_does() -> None:
+    """A second propeller whose controller still waits does not hide the first."""
+    boat = GuardPlan(
+        "boat",
+        (ActionPlan("throttle", propels=True),),
+        tuple(OutputPlan(name, "esc", mix={"throttle": 1.0}) for name in ("left", "right")),
+    )
+    done = Truth(boat).done((0.5,), (0.5, 0.5), (0.5, 0.0))
+    assert done.actions == (0.5,)
+    assert done.reason.startswith("Output right: its controller waits")

@@ -1,0 +1,76 @@
+"""From what a person saw to changes of a profile."""
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.setup.calibration import (
+    Jogging,
+    motor_changes,
+    pulse_changes,
+    wheel_changes,
+    widened,
+)
+
+_SERVO = OutputPlan(
+    "steer",
+    "servo",
+    mix={"steering": 1.0},
+    settings={"left_us": 1100, "centre_us": 1500, "right_us": 1900},
+)
+_MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full": 1.0})
+
+
+@pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
+def test_what_was_seen_is_the_pulse_that_was_sent_then(left_us: int, right_us: int) -> None:
+    """Also for a servo that is mounted the other way round."""
+    settings = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
+    wide = widened(OutputPlan("steer", "servo", settings=settings))
+    seen = Jogging(-0.5, 0.1, 0.4)
+    changes = pulse_changes(wide, seen)
+    low_us, high_us = (float(str(wide.settings[k])) for k in ("left_us", "right_us"))
+    pulses = PulseRange(low_us, 1500.0, high_us)
+    assert changes == {
+        "output.steer.left_us": round(pulses.width_us(-0.5)),
+        "output.steer.centre_us": round(pulses.width_us(0.1)),
+        "output.steer.right_us": round(pulses.width_us(0.4)),
+    }
+    assert (low_us < high_us) == (left_us < right_us)
+
+
+def test_a_middle_outside_the_ends_is_refused() -> None:
+    """Whoever pressed Enter three times in one place starts again."""
+    with pytest.raises(RobotError, match="must lie between"):
+        pulse_changes(_SERVO, Jogging(0.2, 0.2, 0.2))
+
+
+def test_a_motor_has_no_pulses() -> None:
+    """Only servos and controllers are jogged by width."""
+    with pytest.raises(RobotError, match="sends no pulses"):
+        widened(_MOTOR)
+
+
+def test_a_motor_that_went_backward_is_turned_round_by_its_mix() -> None:
+    """The pins stay as they are wired, so that the doctor's table stays true."""
+    assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
+    assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
+
+
+@pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
+def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
+    """Otherwise there is nothing left to drive with."""
+    with pytest.raises(RobotError, match="cannot start"):
+        motor_changes(_MOTOR, "forward", duty)
+
+
+def test_a_wheel_is_scaled_by_the_way_that_was_pushed() -> None:
+    """An encoder that counted half a metre for one belongs to a wheel twice as large."""
+    assert wheel_changes("wheel", 0.21, 1.0, 0.5) == {"sensor.wheel.wheel_m": 0.42}
+
+
+@pytest.mark.parametrize("measured_m", [0.0, -0.8])
+def test_a_wheel_that_counts_nothing_or_backward_is_a_matter_of_wires(measured_m: float) -> None:
+    """A scale would hide it."""
+    with pytest.raises(RobotError, match="look at its wires"):
+        wheel_changes("wheel", 0.21, 1.0, measured_m)
