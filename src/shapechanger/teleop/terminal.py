@@ -7,7 +7,6 @@ import select
 import sys
 import termios
 import tty
-from types import TracebackType
 from typing import Final, Self
 
 from shapechanger.errors import ShapechangerError
@@ -58,12 +57,7 @@ class Terminal:
         tty.setcbreak(self._fd)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Put the terminal back as it was."""
         termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 

@@ -9,7 +9,6 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Literal
 
 from shapechanger.errors import RobotError
@@ -79,12 +78,7 @@ class RunningBoard(BoardAt):
     def __enter__(self) -> RunningBoard:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def outlive_exec(self) -> None:

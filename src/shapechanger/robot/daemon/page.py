@@ -28,7 +28,8 @@ def status_page(cockpit: Cockpit, host: str) -> str:
 <title>{name}</title>
 <h1>{name}</h1>
 <p>A {body} with {camera}, served by Shapechanger.</p>
-<p>Drive it from another computer with <code>shapechanger robot drive {where}</code>, or as the
-Gymnasium environment <code>shapechanger/RemoteVehicle-v1</code>. Both need its key, which
-<code>shapechanger robot init</code> shows on the robot.</p>
+<p>Make it known on another computer with <code>shapechanger robot remember {name} {where}
+--fingerprint</code> and what <code>shapechanger robot init</code> showed on the robot. Then
+<code>shapechanger robot drive {name}</code> drives it, and so does the Gymnasium environment
+<code>shapechanger/RemoteVehicle-v1</code> with <code>robot="{name}"</code>.</p>
 """
