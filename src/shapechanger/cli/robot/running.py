@@ -23,6 +23,7 @@ from shapechanger.twin.operator import Operator
 
 __all__ = ["RunningRobot", "run_robot"]
 
+_READY: Final = "ready.json"
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
 _LOOK_S: Final = 0.02
@@ -59,7 +60,9 @@ class RunningRobot:
 
     @property
     def port(self) -> int:
-        """Where it listens, on 127.0.0.1."""
+        """Where it listens, on 127.0.0.1; another port after its processes started afresh."""
+        if (self.folder / _READY).exists():
+            self._ready = self._await_ready()
         return self._ready.port
 
     @property
@@ -114,7 +117,7 @@ class RunningRobot:
 
     def forget_ready(self) -> None:
         """Take away what the daemon said, before something that makes it start again."""
-        (self.folder / "ready.json").unlink(missing_ok=True)
+        (self.folder / _READY).unlink(missing_ok=True)
 
     def close(self) -> None:
         """End it; its outputs are at rest then."""
@@ -128,7 +131,7 @@ class RunningRobot:
             self.supervisor.wait()
 
     def _await_ready(self, timeout_s: float = _READY_S) -> _Ready:
-        path = self.folder / "ready.json"
+        path = self.folder / _READY
         until_s = time.monotonic() + timeout_s
         while not path.exists():
             if self.supervisor.poll() is not None or time.monotonic() > until_s:

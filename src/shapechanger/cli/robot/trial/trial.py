@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,6 +14,7 @@ from typing import Final, Self
 from shapechanger.cli.robot.running import RunningRobot, run_robot
 from shapechanger.cli.robot.trial.driver import Driver
 from shapechanger.cli.robot.trial.faults import Fault, Scene
+from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.ledger import read_ledger
@@ -23,6 +26,7 @@ from shapechanger.twin.wiring import Wiring
 
 __all__ = ["Trial", "TrialResult", "has"]
 
+_ATTEMPTS: Final = 3
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
 # How long after the promise is looked at whether everything stays at rest.
@@ -30,6 +34,10 @@ _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
 # A supervisor gives up after five restarts within a minute, which here would be a promise kept.
 _MOST_RESTARTS: Final = 4
+
+
+class _NotDriven(RobotError):
+    """The robot could not be driven, so nothing was tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,30 +116,65 @@ class Trial:
     def run(self, fault: Fault) -> TrialResult:
         """Drive, let the fault happen, and judge by the ledger.
 
+        A robot that cannot be driven, because a busy machine kept its guard from beating and it
+        started afresh, is replaced before anything is judged.
+
         Raises:
-            RobotError: If the robot cannot be driven.
+            RobotError: If no robot can be driven.
         """
-        robot = self._running()
-        with (
-            robot.operator() as operator,
-            BadNetwork(robot.port) as network,
-        ):
+        for attempt in range(_ATTEMPTS):
+            robot = self._running()
+            began_ns = time.monotonic_ns()
+            try:
+                with (
+                    robot.operator() as operator,
+                    BadNetwork(robot.port) as network,
+                    self._driven(robot, operator, network) as driver,
+                ):
+                    scene = Scene(robot, driver, network, operator)
+                    result = self._tried(fault, scene, began_ns)
+            except _NotDriven as error:
+                self.close()
+                if attempt == _ATTEMPTS - 1:
+                    raise RobotError(str(error)) from error
+            else:
+                self._recover(fault)
+                return result
+        raise AssertionError("There is at least one attempt.")
+
+    @contextmanager
+    def _driven(
+        self, robot: RunningRobot, operator: Operator, network: BadNetwork
+    ) -> Generator[Driver]:
+        """Somebody who drives the robot.
+
+        Raises:
+            _NotDriven: If it cannot be driven.
+        """
+        try:
             _calm(robot)
             operator.place(0)
-            began_ns = time.monotonic_ns()
-            with Driver(robot.known_at(f"127.0.0.1:{network.port}")) as driver:
+            driver = Driver(robot.known_at(f"127.0.0.1:{network.port}"))
+        except ShapechangerError as error:
+            raise _NotDriven(str(error)) from error
+        with driver:
+            try:
                 driver.await_commands(_COMMANDS)
-                self._await_drive(operator)
-                if fault.then == "starts afresh":
-                    robot.forget_ready()
-                scene = Scene(robot, driver, network, operator)
-                at_ns = fault.make(scene)
-                limit_ms = fault.limit_ms(self._plan.limits)
-                self._await_rest(operator, limit_ms)
-                result = self._judged(fault, began_ns, at_ns, limit_ms, driver.sent)
-                if fault.then != "is gone":
-                    fault.undo(scene)
-        self._recover(fault)
+            except ShapechangerError as error:
+                raise _NotDriven(str(error)) from error
+            self._await_drive(operator)
+            yield driver
+
+    def _tried(self, fault: Fault, scene: Scene, began_ns: int) -> TrialResult:
+        """Let the fault happen, and judge."""
+        if fault.then == "starts afresh":
+            scene.robot.forget_ready()
+        at_ns = fault.make(scene)
+        limit_ms = fault.limit_ms(self._plan.limits)
+        self._await_rest(scene.operator, limit_ms)
+        result = self._judged(fault, began_ns, at_ns, limit_ms, scene.driver.sent)
+        if fault.then != "is gone":
+            fault.undo(scene)
         return result
 
     def _running(self) -> RunningRobot:
