@@ -127,6 +127,11 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 }
 
 
+def _trials() -> str:
+    """What was asked for besides, as a shell takes it."""
+    return f"TRIALS={os.environ['TRIALS']} " if "TRIALS" in os.environ else ""
+
+
 def main() -> None:
     """Run the suites named on the command line, or all."""
     names = sys.argv[1:] or list(SUITES)
@@ -137,7 +142,7 @@ def main() -> None:
             table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
         RESULTS.mkdir(exist_ok=True)
         facts = {
-            "command": f"python -m benchmarks.run {name}",
+            "command": f"{_trials()}python -m benchmarks.run {name}",
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
             "python": platform.python_version(),
             "versions": {

@@ -65,6 +65,8 @@ class Selftest:
 
         if self.trials < 1:
             raise RobotError(f"At least one trial is needed, got {self.trials}.")
+        if not any(action.propels for action in profile.actions):
+            raise RobotError(f"Nothing of {profile.name} propels, so there is nothing to stop.")
         console = plain_console()
         table = Table("fault", "at rest after", "promised", "", box=None, pad_edge=False)
         good = True

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from shapechanger.cli.robot.running import RunningRobot
 from shapechanger.cli.robot.trial.driver import Driver
+from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.layout import Layout
 from shapechanger.link.messages import Role
+from shapechanger.link.proof import new_key
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault
@@ -32,12 +37,14 @@ class Scene:
         driver: Who drives it.
         network: What lies between the two.
         operator: Who stands beside the twin.
+        strangers: Connections that somebody opened and keeps open.
     """
 
     robot: RunningRobot
     driver: Driver
     network: BadNetwork
     operator: Operator
+    strangers: list[socket.socket] = field(default_factory=list[socket.socket])
 
 
 # Does something, and says when, on the machine's monotonic clock in ns.
@@ -57,7 +64,11 @@ class Fault:
             which a picture is stale.
         undo: Takes it back, so that the robot can be used again.
         then: What becomes of the robot: it goes on, its processes start afresh, or it is gone.
-        needs: What the profile must have: "", "camera", "bumper" or "button".
+        needs: What the profile must have: "", "camera", "bumper", "button" or "one-shot".
+        harms: Whether it keeps the driver from driving. What does not is followed by the driver's
+            own end, so that a stop is measured all the same.
+        silences: Whether commands count no more from then on, however many the driver sends.
+        guards_late: Whether the guard itself fails, so that its promised time comes on top.
     """
 
     name: str
@@ -66,7 +77,10 @@ class Fault:
     after: Literal["", "deadline", "camera"] = ""
     undo: Callable[[Scene], object] = lambda _: None
     then: Literal["goes on", "starts afresh", "is gone"] = "goes on"
-    needs: Literal["", "camera", "bumper", "button"] = ""
+    needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""
+    harms: bool = True
+    silences: bool = False
+    guards_late: bool = False
 
     def limit_ms(self, limits: LimitPlan) -> float:
         """What is promised for a robot with these limits, ms."""
@@ -123,6 +137,39 @@ def _be_prompt(scene: Scene) -> None:
     scene.network.latency_s = 0.0
 
 
+def _slice(scene: Scene) -> None:
+    scene.network.slice_bytes = 1
+
+
+def _mend(scene: Scene) -> None:
+    scene.network.slice_bytes = 0
+
+
+def _knock_with_a_wrong_key(scene: Scene) -> None:
+    known = replace(scene.robot.known, key=new_key())
+    for _ in range(3):
+        with contextlib.suppress(RobotRefused):
+            RobotClient.connect(known).close()
+
+
+def _say_too_much(scene: Scene) -> None:
+    with contextlib.suppress(LinkError), scene.robot.client(frames=False) as client:
+        client.command([1.0] * 125_000, answers=0)
+        client.ping()
+
+
+def _command_without_the_lease(client: RobotClient) -> None:
+    wanted = Layout.from_json(client.welcome.action_layout).size
+    for _ in range(10):
+        client.command([1.0] * wanted, answers=client.ask().message.seq)
+
+
+def _stand_at_the_door(scene: Scene) -> None:
+    """Open connections and never say hello, for as long as the robot lets them."""
+    for _ in range(40):
+        scene.strangers.append(socket.create_connection(("127.0.0.1", scene.robot.port)))
+
+
 def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
     """Let somebody else act, over a connection of their own."""
 
@@ -164,14 +211,49 @@ FAULTS: Final[dict[str, Fault]] = {
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
             20.0,
+            silences=True,
         ),
-        Fault("a person takes over", _by_another("person", lambda c: c.take()), 20.0),
-        Fault("a person disarms", _by_another("person", lambda c: c.disarm()), 20.0),
+        Fault(
+            "a person takes over", _by_another("person", lambda c: c.take()), 20.0, silences=True
+        ),
+        Fault("a person disarms", _by_another("person", lambda c: c.disarm()), 20.0, silences=True),
+        Fault("network in slices of 1 byte", _now(_slice), 20.0, "deadline", _mend, harms=False),
+        Fault(
+            "a stranger with a wrong key",
+            _now(_knock_with_a_wrong_key),
+            20.0,
+            "deadline",
+            harms=False,
+        ),
+        Fault("a message of 1 MB", _now(_say_too_much), 20.0, "deadline", harms=False),
+        Fault(
+            "a second program commands",
+            _by_another("program", _command_without_the_lease),
+            20.0,
+            "deadline",
+            harms=False,
+        ),
+        Fault(
+            "strangers who say nothing",
+            _now(_stand_at_the_door),
+            20.0,
+            "deadline",
+            lambda scene: [stranger.close() for stranger in scene.strangers],
+            harms=False,
+        ),
         Fault(
             "camera frozen", _break_camera("freeze"), 70.0, "camera", _mend_camera, needs="camera"
         ),
         Fault(
             "camera garbage", _break_camera("garbage"), 70.0, "camera", _mend_camera, needs="camera"
+        ),
+        Fault(
+            "camera sends half pictures",
+            _break_camera("short"),
+            70.0,
+            "camera",
+            _mend_camera,
+            needs="camera",
         ),
         Fault("camera off", _break_camera("off"), 70.0, "camera", _mend_camera, needs="camera"),
         Fault(
@@ -187,6 +269,7 @@ FAULTS: Final[dict[str, Fault]] = {
             40.0,
             undo=lambda s: s.operator.press_stop(down=False),
             needs="button",
+            silences=True,
         ),
         Fault("daemon killed", _signal("daemon", signal.SIGKILL), 20.0, then="starts afresh"),
         Fault(
@@ -196,19 +279,33 @@ FAULTS: Final[dict[str, Fault]] = {
             "deadline",
             then="starts afresh",
         ),
-        Fault("guard killed", _signal("guard", signal.SIGKILL), 100.0, then="starts afresh"),
+        Fault(
+            "guard killed",
+            _signal("guard", signal.SIGKILL),
+            100.0,
+            then="starts afresh",
+            guards_late=True,
+        ),
         Fault(
             "guard stopped",
             _signal("guard", signal.SIGSTOP),
             100.0,
             "deadline",
             then="starts afresh",
+            guards_late=True,
         ),
         Fault(
             "supervisor killed", _now(lambda s: s.robot.supervisor.kill()), 100.0, then="is gone"
         ),
         # Only hardware is left then: the one-shot of the enable line, 100 ms, and its slack.
-        Fault("guard and supervisor killed", _kill_both, 120.0, then="is gone"),
+        Fault(
+            "guard and supervisor killed",
+            _kill_both,
+            120.0,
+            then="is gone",
+            needs="one-shot",
+            guards_late=True,
+        ),
     )
 }
 """All faults, by name."""
