@@ -37,7 +37,7 @@ def test_the_robot_stops(trial: Trial, name: str) -> None:
         assert result.stopped_ms <= TOLERANCE * result.limit_ms, result
         # Beyond the deadline of the last command an output may be as late as a stop may.
         late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
-        assert sum(late_ms) <= (TOLERANCE - 1.0) * result.limit_ms, result
+        assert sum(late_ms) <= (TOLERANCE - 1.0) * fault.within_ms, result
 
 
 def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:

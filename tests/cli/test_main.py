@@ -95,3 +95,19 @@ def test_an_env_of_others_that_cannot_draw_is_one_sentence(tmp_path: os.PathLike
     assert done.returncode == 2
     assert done.stderr.startswith("error: pygame is not installed")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
+def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
+    """No traceback, neither at once nor at Python's end."""
+    code = COMMAND.format(arguments=["robot", "doctor", "car", "--port", "0"])
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            check=False,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert done.returncode == 2
+    assert done.stderr == "error: Not everything could be printed: No space left on device.\n"

@@ -207,3 +207,10 @@ def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -
     answers.join_thread()
     assert child.exitcode == 0
     assert client.ask().message.seq > 0
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
+def test_a_timeout_that_is_none_is_refused(timeout_s: float) -> None:
+    """Before anything is connected."""
+    with pytest.raises(LinkError, match="more than 0 s"):
+        RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

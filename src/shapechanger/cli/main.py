@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Final, NoReturn
@@ -64,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
         )
         command.run()
+        sys.stdout.flush()
     except ShapechangerError as error:
         _stop(f"error: {error}", _WRONG_USAGE)
     except gym.error.Error as error:
@@ -75,6 +77,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _stop(str(stop), _INTERRUPTED)
     except KeyboardInterrupt:
         _stop("Stopped.", _INTERRUPTED)
+    except OSError as error:
+        if not _cannot_print():
+            raise
+        if isinstance(error, BrokenPipeError):  # Whoever read has enough.
+            sys.exit(1)
+        _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
+
+
+def _cannot_print() -> bool:
+    """Whether the standard output takes no more, as on a full disk; what is left is dropped."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # Python tries once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 def _stop(message: str, code: int) -> NoReturn:

@@ -134,6 +134,8 @@ class RobotClient:
             RobotRefused: If the robot is another one than expected, or does not want us.
             LinkError: If nobody answers; without a fingerprint, with the one that is shown there.
         """
+        if not timeout_s > 0.0:
+            raise LinkError(f"The link's timeout is more than 0 s, got timeout_s={timeout_s:g}.")
         if not isinstance(robot, KnownRobot):
             if not fingerprint:
                 raise untrusted(parse_address(robot), timeout_s)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from shapechanger.errors import LinkError, UnknownName
+from shapechanger.errors import LinkError, OutputError, UnknownName
 from shapechanger.link.address import parse_address
 from shapechanger.link.proof import parse_key
 from shapechanger.remote.trust import INSECURE, parse_trust
@@ -95,18 +95,28 @@ def remember(robot: KnownRobot) -> Path:
 
     Returns:
         The file.
+
+    Raises:
+        OutputError: If it cannot be written; it is then as it was.
     """
     folder = known_folder()
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     # The strings of JSON are strings of TOML, but for one character, which no field holds.
     lines = [
         f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
     ]
-    # A temporary file is made for its owner alone.
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, delete=False) as file:
-        file.writelines(lines)
     path = folder / f"{robot.name}.toml"
-    os.replace(file.name, path)
+    written: Path | None = None
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        # A temporary file is made for its owner alone.
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, delete=False) as file:
+            written = Path(file.name)
+            file.writelines(lines)
+        written.replace(path)
+    except OSError as error:
+        if written is not None:
+            written.unlink(missing_ok=True)
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
     return path
 
 

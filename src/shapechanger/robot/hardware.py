@@ -13,6 +13,8 @@ import time
 from collections.abc import Sequence
 from typing import Any, Final, Protocol
 
+from shapechanger.errors import RobotError
+
 __all__ = [
     "REAL",
     "Clock",
@@ -161,11 +163,20 @@ class RealHardware:
         """The factory of gpiozero over lgpio, whatever the environment says.
 
         Its pins are low as soon as they are told so; see `lgpio_pins`.
+
+        Raises:
+            RobotError: If there are none, or they cannot be opened.
         """
         if self._pin_factory is None:
-            from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
+            try:
+                from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
 
-            self._pin_factory = LowAtOnceFactory()
+                self._pin_factory = LowAtOnceFactory()
+            except Exception as error:  # gpiozero's, lgpio's, or that one of them is missing.
+                raise RobotError(
+                    f"This machine's pins cannot be opened ({str(error) or type(error).__name__}); "
+                    "`shapechanger robot serve --twin` needs none."
+                ) from error
         return self._pin_factory
 
     def i2c(self, bus: int) -> I2cBus:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
+import os
 import shutil
 import signal
 import socket
@@ -16,6 +18,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
+from shapechanger.link.address import Address
+from shapechanger.remote.discover import FoundRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robots import CAR, changed, write_profile
 from tests.twin.robots import until
@@ -115,6 +119,8 @@ def test_help(run: Run, command: str) -> None:
         ("selftest test-car.toml", "lift its wheels"),
         ("selftest test-car.toml --cap 0", "The cap is above 0"),
         ("selftest test-car.toml --twin --trials 0", "At least one trial"),
+        ("serve test-car.toml --seed 4", "--seed means something with --twin only"),
+        ("calibrate test-car.toml", "lift its wheels"),
         ("calibrate car", "`shapechanger robot init car` writes one of your own"),
         ("calibrate test-car.toml --cap 2", "The cap is above 0"),
         ("calibrate test-car.toml --twin", "needs a terminal"),
@@ -227,3 +233,65 @@ def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPat
     assert run("forget", "one")[0] == 0
     assert files(home / "work") == before
     assert not list((home / "config").rglob("one*"))
+
+
+@pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
+@pytest.mark.parametrize("command", ["serve", "safe-pins"])
+def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
+    """The twin is named, and nothing starts that would fail again and again."""
+    code, _, said = run(command, fits(home))
+    assert code == 2
+    assert "serve --twin" in said
+    assert said.count("\n") == 1
+
+
+def test_a_full_disk_leaves_no_half_of_a_robot(
+    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever the disk is full first, nothing is empty, and `init` can be run again."""
+    real, left = os.fsync, 0
+
+    def fsync(fd: int) -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(fd)
+
+    monkeypatch.setattr("os.fsync", fsync)
+    for first in (0, 1, 2, 3, 1):  # What was made whole stays, and is not made again.
+        left = first
+        code, _, said = run("init", "car", "--name", "rover")
+        assert code == 2
+        assert "No space left" in said
+        assert not (home / "work" / "rover.toml").exists()
+        assert all(path.stat().st_size for path in home.rglob("*") if path.is_file())
+        assert not list(home.rglob(".*"))
+    left = 99
+    assert run("init", "car", "--name", "rover")[0] == 0
+
+
+def test_a_refused_init_leaves_nothing(run: Run, home: Path) -> None:
+    """No key for a robot whose profile could not be written."""
+    fits(home)
+    before = files(home)
+    assert run("init", "car", "--name", "rover", "--out", "test-car.toml")[0] == 2
+    assert files(home) == before
+
+
+def test_a_broken_file_of_a_known_robot_is_skipped(
+    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The others are found all the same."""
+    found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
+    monkeypatch.setattr("shapechanger.remote.discover.find", lambda _: [found])
+    monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
+    assert run("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)[0] == 0
+    broken = home / "config" / "shapechanger" / "known" / "broken.toml"
+    broken.write_text("key = ")
+    broken.chmod(0o600)
+    code, said, warned = run("find")
+    assert code == 0
+    assert "mine" in said
+    assert warned.startswith("broken is skipped: ")
+    assert warned.count("\n") == 1

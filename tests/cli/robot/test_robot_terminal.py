@@ -51,6 +51,25 @@ backward = 27
 mix = { throttle = 0.8 }
 """
 
+ESC = """\
+[robot]
+name = "esc-car"
+body = "car"
+
+[action.throttle]
+propels = true
+
+[output.drive]
+driver = "esc"
+part = "wheels"
+over = "lgpio"
+pin = 18
+backward_us = 1100
+neutral_us = 1500
+forward_us = 1900
+mix = { throttle = 1.0 }
+"""
+
 
 def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E arms, W drives, X disarms, Space stops, Q leaves; the wheels of the twin turn."""
@@ -126,6 +145,49 @@ def test_skipping_everything_writes_nothing(tmp_path: Path) -> None:
         assert person.end() == 0
         assert "nothing was written" in person.text
     assert profile.path.read_text() == SERVO
+
+
+def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
+    """At the cap it stays until the person says Y."""
+    profile = write_profile(tmp_path, ESC)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("slowest backward")
+        person.press("a" * 40)
+        read = person.read_until("Go beyond it?", read)
+        person.press("\r")
+        read = person.read_until("surely at rest", read)
+        person.press("\r")
+        read = person.read_until("fastest forward", read)
+        person.press("d" * 40)
+        read = person.read_until("Go beyond it?", read)
+        person.press("y" + "d" * 5 + "\r")
+        assert person.end() == 0, person.text
+    drive = tomllib.loads(profile.path.read_text())["output"]["drive"]
+    assert drive["backward_us"] == pytest.approx(1500 - 0.4 * 900)
+    assert drive["forward_us"] == pytest.approx(1500 + 0.5 * 900)
+
+
+@pytest.mark.parametrize("key", ["q", " "])
+def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
+    """Q ends and Space stops, also what was found before; N skips one output only."""
+    second = MOTOR.partition("[action.throttle]")
+    text = SERVO + "\n" + second[1] + second[2]
+    profile = write_profile(tmp_path, text)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("full left")
+        person.press("n")
+        read = person.read_until("begins to move", read)
+        person.press("dddd\r")
+        read = person.read_until("Y or N", read)
+        person.press(key)
+        assert person.end() == 0
+        assert "nothing was written" in person.text
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        person.read_until("full left")
+        person.press(key)
+        assert person.end() == 0
+        assert "begins to move" not in person.text
+    assert profile.path.read_text() == text
 
 
 def test_an_action_that_is_capped(tmp_path: Path) -> None:

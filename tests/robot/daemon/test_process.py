@@ -85,6 +85,7 @@ def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> 
     status, said = started.ended()
     assert status == 0
     assert "listens at 127.0.0.1" in said
+    assert "is not announced: only this machine reaches 127.0.0.1" in said
 
 
 def test_it_ends_with_the_guard(started: Started) -> None:

@@ -10,7 +10,7 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
-from shapechanger.robot.setup.doctor import UNIT, Finding, examine_robot
+from shapechanger.robot.setup.doctor import Finding, examine_robot, unit_name
 
 _CAMERA = CameraPlan("pattern")
 _MOTOR = OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}, settings={"forward": 22})
@@ -99,7 +99,7 @@ def test_the_systemd_unit_must_restart_and_make_safe(
     tmp_path: Path, unit: str, level: str, says: str
 ) -> None:
     """A unit that only starts the robot leaves its pins to chance after a crash."""
-    _write(tmp_path, f"etc/systemd/system/{UNIT}", f"[Service]\n{unit}")
+    _write(tmp_path, f"etc/systemd/system/{unit_name('car')}", f"[Service]\n{unit}")
     finding = _found(tmp_path)["systemd"]
     assert finding.level == level
     assert says in finding.sentence

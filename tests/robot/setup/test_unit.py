@@ -2,15 +2,16 @@
 
 from pathlib import Path
 
-from shapechanger.robot.setup.doctor import examine_robot
+from shapechanger.robot.setup.doctor import Finding, examine_robot
 from shapechanger.robot.setup.unit import unit_text, write_unit
 from tests.robot.setup.test_doctor import CAR
 
 
 def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
     """No place is left open, and nothing has to be edited."""
-    text = unit_text(tmp_path / "car.toml", "/opt/venv/bin/shapechanger", "pi")
-    assert f"ExecStart=/opt/venv/bin/shapechanger robot serve {tmp_path}/car.toml" in text
+    text = unit_text("car", tmp_path / "car.toml", "/opt/venv/bin/shapechanger", "pi", tmp_path)
+    started = f"ExecStart=/opt/venv/bin/shapechanger robot serve {tmp_path}/car.toml"
+    assert f"{started} --credentials {tmp_path}\n" in text
     assert "User=pi" in text
     assert "@" not in text
 
@@ -19,16 +20,24 @@ def test_the_doctor_is_content_with_the_unit(tmp_path: Path) -> None:
     """What `init` writes is what `doctor` looks for."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
-    path, is_new = write_unit(folder / "car.toml")
-    found = {finding.check: finding for finding in examine_robot(CAR, None, 0, tmp_path)}
+    path, is_new = write_unit("car", folder / "car.toml")
+
+    def finding(profile: Path) -> Finding:
+        findings = examine_robot(CAR, None, 0, tmp_path, profile=profile)
+        return next(finding for finding in findings if finding.check == "systemd")
+
     assert is_new
     assert path.parent == folder
-    assert found["systemd"].level == "good"
+    assert path.name == "shapechanger-car.service"
+    assert finding(folder / "car.toml").level == "good"
+    other = finding(folder / "other.toml")
+    assert other.level == "missing"
+    assert "is for another profile" in other.sentence
 
 
 def test_a_unit_that_somebody_changed_stays(tmp_path: Path) -> None:
     """It may hold the settings of another robot."""
-    path, _ = write_unit(tmp_path / "car.toml")
+    path, _ = write_unit("car", tmp_path / "car.toml")
     path.write_text("mine")
-    assert write_unit(tmp_path / "car.toml") == (path, False)
+    assert write_unit("car", tmp_path / "car.toml") == (path, False)
     assert path.read_text() == "mine"

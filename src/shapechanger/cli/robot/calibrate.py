@@ -23,11 +23,15 @@ class Calibrate:
     twin: bool = False
     """Practise on the twin: nothing real moves, and what is found is written all the same."""
     cap: float = 0.4
-    """Largest value that a motor is jogged with, 0 to 1."""
+    """Largest value that a motor or an ESC is jogged with, 0 to 1; of an ESC you are asked whether
+    to go beyond."""
+    wheels_up: bool = False
+    """Without --twin: the wheels are off the ground, so do not ask."""
 
     def run(self) -> None:
         """Jog, ask, and write what was found, all at once."""
         from shapechanger.cli.robot.jogging import Calibration
+        from shapechanger.cli.robot.wheels import ask_for_wheels_up
         from shapechanger.robot.profile.edit import rewrite
         from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
         from shapechanger.teleop.terminal import Terminal
@@ -41,6 +45,8 @@ class Calibrate:
                 f"`shapechanger robot init {path.stem}` writes one of your own."
             )
         profile = load_profile(path)
+        if not (self.twin or self.wheels_up):
+            ask_for_wheels_up()
         console = plain_console()
         with Terminal() as terminal:
             changes = Calibration(profile, terminal, console, self.cap, twin=self.twin).run()

@@ -45,7 +45,9 @@ class Doctor:
         if profile.calibrated is None:
             sentence = f"Never calibrated: shapechanger robot calibrate {profile.path}"
             findings.append(Finding("calibration", "unknown", sentence))
-        findings += examine_robot(profile.guard_plan(), profile.camera, self.port)
+        findings += examine_robot(
+            profile.guard_plan(), profile.camera, self.port, profile=profile.path.absolute()
+        )
         for finding in findings:
             console.print(
                 f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}", soft_wrap=True

@@ -12,7 +12,7 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import plain_console
-from shapechanger.errors import LinkError
+from shapechanger.errors import LinkError, ShapechangerError
 
 __all__ = ["Find", "Forget", "Remember"]
 
@@ -30,11 +30,10 @@ class Find:
         """Print a table, with the names under which robots are known here."""
         from shapechanger.link.messages import VERSION
         from shapechanger.remote.discover import find
-        from shapechanger.remote.known import known_names, recall
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
-        known = {recall(name).fingerprint: name for name in known_names()}
+        known = _known_here()
         found = find(self.seconds)
         console = plain_console()
         if not found:
@@ -84,6 +83,19 @@ class Forget:
         from shapechanger.remote.known import forget
 
         forget(self.name)
+
+
+def _known_here() -> dict[str, str]:
+    """The names of the robots that are known here, by fingerprint; a broken file is skipped."""
+    from shapechanger.remote.known import known_names, recall
+
+    known: dict[str, str] = {}
+    for name in known_names():
+        try:
+            known[recall(name).fingerprint] = name
+        except (ShapechangerError, OSError) as error:
+            plain_console(stderr=True).print(f"{name} is skipped: {error}", soft_wrap=True)
+    return known
 
 
 def _asked_key(name: str) -> str:

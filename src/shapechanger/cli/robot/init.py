@@ -33,18 +33,24 @@ class Init:
         from shapechanger.cli.robot.serving import credentials_of
         from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
         from shapechanger.remote.known import KnownRobot, check_name, remember
-        from shapechanger.robot.profile.starter import write_profile
+        from shapechanger.robot.profile.starter import starter_text, write_profile
         from shapechanger.robot.setup.unit import write_unit
 
         name = self.name or self.kind
         check_name(name)
-        profile = write_profile(self.kind, self.out or Path(f"{name}.toml"), name)
+        out = self.out or Path(f"{name}.toml")
+        starter_text(
+            self.kind, out, name
+        )  # Whatever is refused is refused before anything is made.
         credentials = credentials_of(name, self.credentials, make=True)
-        unit, is_new = write_unit(profile)
         key = credentials.key_file.read_text().strip()
         digits = fingerprint_hex(credentials.fingerprint)
         # So that the same machine can drive it, on a twin above all.
         remember(KnownRobot(name, "127.0.0.1", key, digits))
+        unit, is_new = write_unit(name, out, self.credentials)
+        # Last, since one that exists is refused: whatever failed before, such as on a full disk,
+        # can be done again.
+        profile = write_profile(self.kind, out, name)
         console = plain_console()
         console.print(
             f"wrote {profile}: look at its pins before anything moves\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
@@ -32,6 +32,7 @@ __all__ = ["Calibration", "Keys"]
 
 _STEP: Final = 0.02
 _START_STEP: Final = 0.05
+_STOP_LOOKS: Final = 50  # Observations until an emergency stop must be seen.
 _MOTORS: Final = ("hbridge", "phase_enable")
 
 
@@ -43,6 +44,10 @@ class Keys(Protocol):
         ...
 
 
+class _Ended(Exception):
+    """The person ends it all."""
+
+
 class Calibration:
     """One round over all outputs and encoders of a robot.
 
@@ -50,7 +55,7 @@ class Calibration:
         profile: The robot.
         keys: Where keys come from.
         console: Where to ask.
-        cap: Largest value that a motor is jogged with.
+        cap: Largest value that a motor is jogged with, and an ESC unless the person goes beyond.
         twin: Whether on the twin.
     """
 
@@ -67,15 +72,23 @@ class Calibration:
         """Go over everything.
 
         Returns:
-            What to write into the profile, by dotted name.
+            What to write into the profile, by dotted name; nothing where the person ends it.
 
         Raises:
             RobotError: If what was found cannot be.
         """
-        changes: dict[str, Any] = {}
         self._console.print(
-            "Lift the robot so that nothing can drive away. Enter accepts, N skips, Q ends."
+            "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
+            "Q ends without writing, Space stops everything and ends.",
+            soft_wrap=True,
         )
+        try:
+            return self._everything()
+        except _Ended:
+            return {}
+
+    def _everything(self) -> dict[str, Any]:
+        changes: dict[str, Any] = {}
         for output in self._profile.outputs:
             if not output.mix:
                 continue
@@ -100,14 +113,19 @@ class Calibration:
         self._console.print(f"\n{output.name}: A and D move it, Enter where it is …")
         with self._served(settings) as robot:
             jogger = _Jogger(robot, self._profile, output, self._keys)
+            # A servo's ends are what is looked for; an ESC's end is full speed.
+            cap = self._cap if output.driver == "esc" else 1.0
             found: list[float] = []
             for name in names:
                 self._console.print(f"  … {name}")
-                value = jogger.find(1.0)
+                value = jogger.find(cap, self._ask_beyond)
                 if value is None:
                     return {}
                 found.append(value)
         return dict(pulse_changes(wide, Jogging(*found)))
+
+    def _ask_beyond(self, cap: float) -> None:
+        self._console.print(f"  That is the cap of {cap:g}. Go beyond it? Y does.")
 
     def _motor(self, output: OutputPlan) -> dict[str, Any]:
         self._console.print(f"\n{output.name}: D raises its duty; Enter when it begins to move …")
@@ -136,7 +154,8 @@ class Calibration:
                 for key in self._keys.keys(0.0):
                     if key == "enter":
                         return dict(wheel_changes(name, wheel_m, 1.0, travelled_m))
-                    if key in {"n", "q"}:
+                    _end_if_asked(key, robot)
+                    if key == "n":
                         return {}
 
     @contextmanager
@@ -160,6 +179,7 @@ class Calibration:
     def _answer(self) -> Literal["forward", "backward"]:
         while True:
             for key in self._keys.keys(1.0):
+                _end_if_asked(key)  # Nothing is served here, so everything is at rest.
                 if key in {"y", "n"}:
                     return "forward" if key == "y" else "backward"
 
@@ -187,8 +207,13 @@ class _Jogger:
         self._action = profile.actions[self._place]
         self._way = math.copysign(1.0, output.mix[name])
 
-    def find(self, cap: float) -> float | None:
+    def find(self, cap: float, ask_beyond: Callable[[float], None] | None = None) -> float | None:
         """Jog until Enter.
+
+        Args:
+            cap: Largest value that is commanded.
+            ask_beyond: Asks, at the cap, whether to go beyond it, which Y then does; None where
+                nobody may.
 
         Returns:
             Where the output really is then; None where the person skips.
@@ -198,6 +223,7 @@ class _Jogger:
         newest = self._robot.newest
         seq = newest.message.seq if newest else 0
         accepted: int | None = None
+        asked = False
         before: tuple[float, ...] = ()
         while True:
             seen = self._robot.observation(seq).message
@@ -212,9 +238,15 @@ class _Jogger:
                     if key == "enter":
                         accepted = told + 1
                         break
-                    if key in {"n", "q"}:
+                    _end_if_asked(key, self._robot)
+                    if key == "n":
                         return None
+                    if key == "y" and asked:
+                        cap = 1.0
                     step = self._way * {"d": self._step, "a": -self._step}.get(key, 0.0)
+                    if abs(value + step) > cap and ask_beyond is not None and not asked and cap < 1:
+                        ask_beyond(cap)
+                        asked = True
                     value = min(max(value + step, -cap), cap)
                     value = min(max(value, self._action.low), self._action.high)
             # It may still be on its way there.
@@ -227,6 +259,19 @@ class _Jogger:
         mix = self._output.mix
         mixed = sum(mix.get(name, 0.0) * v for name, v in zip(self._names, applied, strict=True))
         return min(max(self._output.offset + mixed, -1.0), 1.0)
+
+
+def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
+    """Q ends it all; Space besides stops the robot, and waits until that is seen."""
+    if key == "space" and robot is not None:
+        robot.emergency_stop("calibrate")
+        for _ in range(_STOP_LOOKS):
+            newest = robot.newest
+            robot.acknowledge()
+            if not robot.observation(newest.message.seq if newest else 0).message.armed:
+                break
+    if key in {"q", "space"}:
+        raise _Ended
 
 
 def _number(value: object) -> float:

@@ -22,11 +22,13 @@ class SafePins:
 
     def run(self) -> None:
         """Do it, and say what could not be done."""
+        from shapechanger.cli.robot.pins_here import require_pins
         from shapechanger.robot.guard.safe_pins import make_safe
         from shapechanger.robot.hardware import REAL, connect
         from shapechanger.robot.profile.load import find_profile, load_profile
 
         plan = load_profile(find_profile(self.profile)).guard_plan()
+        require_pins(plan)
         hardware = connect(REAL, "")
         try:
             failures = make_safe(plan, hardware)

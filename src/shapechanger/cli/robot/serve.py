@@ -61,6 +61,7 @@ class Serve:
 
     def run(self) -> None:
         """Become the robot's supervisor; this returns only with an error."""
+        from shapechanger.cli.robot.pins_here import require_pins
         from shapechanger.cli.robot.serving import ServeOptions, serve_plan
         from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
         from shapechanger.robot.profile.load import find_profile, load_profile
@@ -84,6 +85,8 @@ class Serve:
                 board,
                 self.clock,
             )
+            if board is None:
+                require_pins(profile.guard_plan())
             _require_free(str(plan.daemon["host"]), self.port)
             with contextlib.suppress(OSError):  # A full disk takes words away, and no robot.
                 if board is not None:
@@ -98,6 +101,7 @@ class Serve:
             "--clock twin": self.clock == "twin",
             "--wired-as": bool(self.wired_as),
             "--twin-folder": self.twin_folder is not None,
+            "--seed": self.seed != 0,
         }
         for option, given in asked.items():
             if given and not self.twin:

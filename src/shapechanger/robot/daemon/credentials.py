@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import os
 import ssl
@@ -15,6 +16,7 @@ from shapechanger.link.address import is_loopback
 from shapechanger.link.fingerprint import fingerprint_of
 from shapechanger.link.proof import new_key, parse_key
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.new_file import write_new
 
 __all__ = [
     "Credentials",
@@ -82,12 +84,19 @@ def make_credentials(folder: Path, name: str) -> Credentials:
             "Move them away, and run `shapechanger robot init` again."
         )
     certificate, private_key = _self_signed(name)
+    is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        _write(folder / _KEY, (new_key() + "\n").encode(), 0o600)
-        _write(folder / _PRIVATE_KEY, private_key, 0o600)
-        _write(folder / _CERTIFICATE, certificate, 0o644)
+        write_new(folder / _KEY, (new_key() + "\n").encode(), 0o600)
+        write_new(folder / _PRIVATE_KEY, private_key, 0o600)
+        write_new(folder / _CERTIFICATE, certificate, 0o644)
     except OSError as error:
+        # On a full disk, say. Half of them would be in the way of the next try.
+        with contextlib.suppress(OSError):
+            for file in files:
+                file.unlink(missing_ok=True)
+            if is_new:
+                folder.rmdir()
         raise OutputError(f"The credentials cannot be written to {folder}: {error}.") from error
     return load_credentials(folder)
 
@@ -177,15 +186,6 @@ def _refuse_others(file: Path) -> None:
 
 def _missing(file: Path) -> RobotError:
     return RobotError(f"There is no {file}. Run `shapechanger robot init` to make it.")
-
-
-def _write(file: Path, data: bytes, mode: int) -> None:
-    # With O_EXCL and the mode from the start, nobody can read it in between.
-    fd = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(fd, "wb") as opened:
-        opened.write(data)
-        opened.flush()
-        os.fsync(fd)
 
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:

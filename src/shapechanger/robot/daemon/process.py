@@ -96,7 +96,11 @@ class Daemon:
         try:
             port = await server.start()
             self._say_ready(port, fingerprint)
-            if plan.discovery and not is_loopback(plan.host):
+            if plan.discovery and is_loopback(plan.host):
+                _log.info(
+                    "%s is not announced: only this machine reaches %s.", plan.robot, plan.host
+                )
+            elif plan.discovery:
                 announcement = Announcement(plan, port, fingerprint)
                 await announcement.start()
             await self._ended.wait()

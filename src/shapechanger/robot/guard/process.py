@@ -36,7 +36,7 @@ from shapechanger.robot.hardware import Hardware, connect
 __all__ = ["BEAT_S", "Guard", "main"]
 
 BEAT_S: Final = 0.01
-"""Real seconds between two heartbeats; the supervisor expects one every 25 ms."""
+"""Real seconds between two heartbeats; the supervisor allows `guard_silence_ms` between two."""
 
 _WAIT_S: Final = 0.01  # Real seconds of one wait at most, while a twin's time stands still.
 _STATE_EVERY_NS: Final = 20_000_000  # 50 states a second at least.

@@ -62,8 +62,8 @@ class Senses:
         self._conclude_collision()
 
     def _conclude_collision(self) -> None:
-        """A bumper is certain, a jolt likely; a stall is the last thing that tells."""
-        signs = [name for name in ("bump", "collision", "stall") if name in self.quantities]
+        """A bumper is certain; a stall is the last thing that tells."""
+        signs = [name for name in ("bump", "stall") if name in self.quantities]
         if not signs:
             return
         sign = next((name for name in signs if self.quantities[name] > 0.0), signs[0])

@@ -20,12 +20,10 @@ from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 
-__all__ = ["UNIT", "Finding", "examine_robot"]
-
-UNIT: Final = "shapechanger-robot.service"
-"""Name of the systemd unit."""
+__all__ = ["Finding", "examine_robot", "unit_name", "uses_pins"]
 
 _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
+_NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
 _CAMERA_S: Final = 5.0
 _STRICT: Final = re.compile(r"^\s*dtparam\s*=\s*([^#]*,)?strict_gpiod(=(on|1|true))?\s*(,|#|$)")
 
@@ -51,6 +49,7 @@ def examine_robot(
     port: int,
     root: Path = Path("/"),
     look: Callable[[CameraPlan], Camera] = open_camera,
+    profile: Path | None = None,
 ) -> Iterator[Finding]:
     """Look at everything that the robot's safety and work depend on.
 
@@ -60,10 +59,11 @@ def examine_robot(
         port: Port that it will be reached at.
         root: Root of the file system, for tests.
         look: Opens the camera.
+        profile: The robot's profile, which the systemd unit must name; None to leave that out.
     """
     yield _computer(root)
     yield _strict_gpiod(root)
-    yield _unit(root)
+    yield _unit(guard.name, profile, root)
     yield _one_shot(guard)
     yield from _output_enable(guard)
     yield from _devices(guard, root)
@@ -71,6 +71,11 @@ def examine_robot(
     if camera is not None:
         yield _camera(camera, look)
     yield _port(port)
+
+
+def unit_name(robot: str) -> str:
+    """Name of a robot's systemd unit, so that a computer may serve several robots."""
+    return f"shapechanger-{_NOT_IN_UNITS.sub('-', robot)}.service"
 
 
 def _computer(root: Path) -> Finding:
@@ -99,8 +104,8 @@ def _strict_gpiod(root: Path) -> Finding:
     return Finding("strict_gpiod", "unknown", "There is no config.txt of a Raspberry Pi here.")
 
 
-def _unit(root: Path) -> Finding:
-    path = root / "etc/systemd/system" / UNIT
+def _unit(robot: str, profile: Path | None, root: Path) -> Finding:
+    path = root / "etc/systemd/system" / unit_name(robot)
     if not path.exists():
         return Finding(
             "systemd",
@@ -117,6 +122,11 @@ def _unit(root: Path) -> Finding:
         )
         if not re.search(pattern, text, re.MULTILINE)
     ]
+    for word in ("serve", "safe-pins") if profile is not None else ():
+        named = rf"^Exec\w+=.*robot {word} {re.escape(str(profile))}(\s|$)"
+        if not lacks and not re.search(named, text, re.MULTILINE):
+            sentence = f"{path} is for another profile: `robot {word}` does not name {profile}."
+            return Finding("systemd", "missing", sentence)
     if lacks:
         return Finding("systemd", "missing", f"{path} lacks {' and '.join(lacks)}.")
     return Finding("systemd", "good", f"{path} restarts the robot and makes its pins safe.")
@@ -153,7 +163,7 @@ def _output_enable(guard: GuardPlan) -> Iterator[Finding]:
 def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
     """Whether the device files are there for this user."""
     wanted: dict[str, str] = {}
-    if any(_uses_pins(output) for output in guard.outputs):
+    if any(uses_pins(output) for output in guard.outputs):
         wanted["dev/gpiochip0"] = "gpio"
     plans = [*guard.outputs, *guard.sensors]
     for plan in plans:
@@ -177,7 +187,8 @@ def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
             yield Finding("devices", "good", f"{path} can be opened.")
 
 
-def _uses_pins(output: OutputPlan) -> bool:
+def uses_pins(output: OutputPlan) -> bool:
+    """Whether an output is on the computer's own pins, and not on a bus."""
     return output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
 
 

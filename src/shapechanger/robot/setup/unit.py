@@ -9,29 +9,46 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import OutputError
-from shapechanger.robot.setup.doctor import UNIT
+from shapechanger.robot.new_file import write_new
+from shapechanger.robot.setup.doctor import unit_name
 
 __all__ = ["unit_text", "write_unit"]
 
-_TEMPLATE: Final = Path(__file__).parent / UNIT
+_TEMPLATE: Final = Path(__file__).parent / "robot.service"
 
 
-def unit_text(profile: Path, program: str, user: str) -> str:
+def unit_text(
+    robot: str, profile: Path, program: str, user: str, credentials: Path | None = None
+) -> str:
     """The unit for a profile.
 
     Args:
+        robot: Name of the robot.
         profile: The robot's profile.
         program: The command `shapechanger`, with its folder.
         user: Who runs it; a member of the groups gpio, i2c and video.
+        credentials: Folder of the key and the certificate, if not the robot's own.
     """
     text = _TEMPLATE.read_text(encoding="utf-8")
-    for name, value in (("PROFILE", str(profile)), ("PROGRAM", program), ("USER", user)):
+    values = {
+        "UNIT": unit_name(robot).removesuffix(".service"),
+        "PROFILE": str(profile),
+        "PROGRAM": program,
+        "USER": user,
+        "OPTIONS": f" --credentials {credentials}" if credentials else "",
+    }
+    for name, value in values.items():
         text = text.replace(f"@{name}@", value)
     return text
 
 
-def write_unit(profile: Path) -> tuple[Path, bool]:
+def write_unit(robot: str, profile: Path, credentials: Path | None = None) -> tuple[Path, bool]:
     """Write the unit beside a profile; one that is there already stays.
+
+    Args:
+        robot: Name of the robot.
+        profile: Its profile, which need not be there yet.
+        credentials: Folder of its key and certificate, if not its own.
 
     Returns:
         The file, and whether it was written.
@@ -39,12 +56,12 @@ def write_unit(profile: Path) -> tuple[Path, bool]:
     Raises:
         OutputError: If it cannot be written.
     """
-    path = profile.absolute().parent / UNIT
+    path = profile.absolute().parent / unit_name(robot)
     program = shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"
-    text = unit_text(profile.absolute(), program, getpass.getuser())
+    folder = credentials.absolute() if credentials else None
+    text = unit_text(robot, profile.absolute(), program, getpass.getuser(), folder)
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        write_new(path, text.encode())
     except FileExistsError:
         return path, False
     except OSError as error:
