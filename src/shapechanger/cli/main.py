@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -78,22 +79,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         _stop("Stopped.", _INTERRUPTED)
     except OSError as error:
-        if not _cannot_print():
+        # With a file's name it is about that file, and a defect if nobody said it in words.
+        if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:
             raise
-        if isinstance(error, BrokenPipeError):  # Whoever read has enough.
+        # Python tries to write what is left once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if error.errno == errno.EPIPE:  # Whoever read has enough.
             sys.exit(1)
         _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
-
-
-def _cannot_print() -> bool:
-    """Whether the standard output takes no more, as on a full disk; what is left is dropped."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        # Python tries once more at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return True
-    return False
 
 
 def _stop(message: str, code: int) -> NoReturn:

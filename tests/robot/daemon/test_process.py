@@ -37,7 +37,7 @@ class Started:
 @pytest.fixture
 def started() -> Iterator[Started]:
     """A daemon that serves."""
-    daemon = car_plan(camera=None).to_dict()
+    daemon = car_plan(camera=None, discovery=True).to_dict()
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
     plan = plan_fd(ServePlan(guard_plan, daemon))
     guard, guard_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

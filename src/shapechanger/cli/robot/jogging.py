@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +32,9 @@ from shapechanger.robot.setup.calibration import (
 __all__ = ["Calibration", "Keys"]
 
 _STEP: Final = 0.02
+# How near to what was asked an output is there, and how long one that is held back is waited for.
+_THERE: Final = 0.07
+_SETTLES_S: Final = 4.0
 _START_STEP: Final = 0.05
 _STOP_LOOKS: Final = 50  # Observations until an emergency stop must be seen.
 _MOTORS: Final = ("hbridge", "phase_enable")
@@ -223,6 +227,7 @@ class _Jogger:
         newest = self._robot.newest
         seq = newest.message.seq if newest else 0
         accepted: int | None = None
+        accepted_s = 0.0
         asked = False
         before: tuple[float, ...] = ()
         while True:
@@ -236,7 +241,7 @@ class _Jogger:
             if accepted is None:
                 for key in self._keys.keys(0.0):
                     if key == "enter":
-                        accepted = told + 1
+                        accepted, accepted_s = told + 1, time.monotonic()
                         break
                     _end_if_asked(key, self._robot)
                     if key == "n":
@@ -249,9 +254,11 @@ class _Jogger:
                         asked = True
                     value = min(max(value + step, -cap), cap)
                     value = min(max(value, self._action.low), self._action.high)
-            # It may still be on its way there.
+            # It may still be on its way there: a slew, or a controller that is not awake yet.
             elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
-                return self._is_at(before)
+                is_there = abs(seen.action_applied[self._place] - value) < _THERE
+                if is_there or time.monotonic() > accepted_s + _SETTLES_S:
+                    return self._is_at(before)
             before = seen.action_applied
 
     def _is_at(self, applied: tuple[float, ...]) -> float:

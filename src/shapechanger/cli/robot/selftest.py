@@ -88,12 +88,13 @@ class Selftest:
         from shapechanger.cli.robot.checks import check_robot
         from shapechanger.cli.robot.jumper import check_jumper
         from shapechanger.cli.robot.running import run_robot
+        from shapechanger.cli.robot.wheels import ask_for_wheels_up
 
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
         console = plain_console()
         if not self.wheels_up:
-            _ask_for_wheels_up()
+            ask_for_wheels_up()
         good = True
         if self.jumper is not None:
             sentence = check_jumper(*self.jumper, profile.guard_plan())
@@ -116,11 +117,3 @@ def _times(results: list[TrialResult]) -> str:
         return "NEVER"
     middle = times[len(times) // 2]
     return f"{middle:.0f} ms, at most {times[-1]:.0f} ms" if len(times) > 1 else f"{middle:.0f} ms"
-
-
-def _ask_for_wheels_up() -> None:
-    if not sys.stdin.isatty():
-        raise RobotError("The robot will drive: lift its wheels, and say so with --wheels-up.")
-    answer = input("The robot will drive. Are its wheels off the ground? [yes/no] ")
-    if answer.strip().lower() != "yes":
-        raise RobotError("Nothing was moved.")
