@@ -24,7 +24,7 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import robots
+from benchmarks import robots, speed, speed_vector
 from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
@@ -120,6 +120,8 @@ def demo() -> list[Row]:
 SUITES: dict[str, Callable[[], list[Row]]] = {
     "bodies": bodies,
     "demo": demo,
+    "speed": speed.single,
+    "speed-vector": speed_vector.vector,
     "robot-link": robots.link,
     "robot-fuzz": robots.fuzz,
     "robot-hold": robots.hold,

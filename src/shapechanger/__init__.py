@@ -15,10 +15,11 @@ from importlib.metadata import version
 from typing import Final
 
 from shapechanger.envs.catalogue import register_all
+from shapechanger.envs.vector.make import make_vec
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
 
-__all__ = ["Element", "Feature", "Layout", "ShapechangerError", "__version__"]
+__all__ = ["Element", "Feature", "Layout", "ShapechangerError", "__version__", "make_vec"]
 
 __version__: Final = version("shapechanger")
 

@@ -8,6 +8,8 @@ ShapechangerError
 │   ├── BrokenModel                 the edited model does not compile
 │   └── EmptyShift                  source and target do the same, so nothing crosses
 ├── SpaceMismatch (ValueError)      two spaces that differ where they must not
+├── BadAction (ValueError)          an action that an env cannot take
+├── VectorEnvError (ValueError)     a vector env that cannot be made as it was asked for
 ├── MapError (ValueError)           a body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    a policy whose weights cannot be moved
 ├── StudyError (ValueError)         a study that cannot start
@@ -34,6 +36,7 @@ from collections.abc import Iterable
 from typing import Final
 
 __all__ = [
+    "BadAction",
     "BrokenModel",
     "CorruptStudy",
     "EmptyShift",
@@ -54,6 +57,7 @@ __all__ = [
     "StudyError",
     "TransplantError",
     "UnknownName",
+    "VectorEnvError",
 ]
 
 # A model of a humanoid has some forty names; a longer list hides the sentence it belongs to.
@@ -104,6 +108,14 @@ class EmptyShift(MorphologyError):
 
 class SpaceMismatch(ShapechangerError, ValueError):
     """Two spaces differ where they must be the same."""
+
+
+class BadAction(ShapechangerError, ValueError):
+    """An action that an env cannot take; the message names the env."""
+
+
+class VectorEnvError(ShapechangerError, ValueError):
+    """A vector env that cannot be made, or reset, as it was asked for."""
 
 
 class MapError(ShapechangerError, ValueError):

@@ -83,6 +83,7 @@ class Train:
                     on_evaluation=show,
                     on_steps=lambda done: progress(env.id, done, False),
                     tensorboard=self.tensorboard,
+                    threads=None,
                 )
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None

@@ -58,7 +58,7 @@ def draw(
         "azimuth": _AZIMUTH_DEG,
         "elevation": _ELEVATION_DEG,
     }
-    renderer = Renderer(lit, data, camera, width, height, camera_id=-1)
+    renderer = Renderer(lit, data, camera, width, height, camera_id=-1, shadows=True)
     try:
         picture, depth = renderer.render("rgbd_tuple")
     finally:

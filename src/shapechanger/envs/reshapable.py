@@ -22,16 +22,15 @@ from shapechanger.embodiments.family import BodyLike, Family
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.picture import body_reach, draw
 from shapechanger.envs.renderer import Renderer
+from shapechanger.envs.stepping.actions import check_action
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
-    floor_gap,
-    keep_within_limits,
+    StartRules,
     standing_height,
     start_pose,
     trunk_joint,
-    trunk_lift,
 )
 
 if TYPE_CHECKING:
@@ -41,6 +40,12 @@ __all__ = ["Reshapable"]
 
 # How far the camera is from a body that it follows; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
+# MuJoCo's warnings of a pose, a velocity or an acceleration that is not finite, or huge.
+_DIVERGED: Final = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
 
 
 class Reshapable(MujocoEnv):
@@ -48,6 +53,10 @@ class Reshapable(MujocoEnv):
 
     The env keeps its rewards, terminations, infos and arguments. What follows from the body is
     derived from it: model, spaces, layouts, start pose.
+
+    One argument is ours and every env's: `shadows` says whether frames have shadows, reflections
+    and smoothed edges; left out, frames of more than 256 x 256 pixels have, as films for people,
+    and smaller ones do not, as those that a camera gives a learner twenty times faster.
 
     Attributes:
         family: The bodies that the env can have.
@@ -73,7 +82,11 @@ class Reshapable(MujocoEnv):
             """Put the body at a pose (nq,) with velocities (nv,)."""
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
-        """What must be there before Gymnasium's constructor compiles the model."""
+        """What must be there before Gymnasium's constructor compiles the model.
+
+        Takes from the arguments what Gymnasium's constructor does not know.
+        """
+        self._shadows: bool | None = arguments.pop("shadows", None)
         self.body = self.family.body(body)
         mode = arguments.get("render_mode")
         if mode == "human":
@@ -86,6 +99,7 @@ class Reshapable(MujocoEnv):
             "camera_id": arguments.get("camera_id"),
             "camera_name": arguments.get("camera_name"),
             "visual_options": arguments.get("visual_options"),
+            "shadows": self._shadows,
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
@@ -99,6 +113,8 @@ class Reshapable(MujocoEnv):
         # Gymnasium's constructor has recorded its own arguments; these are ours.
         self._ezpickle_args: tuple[Any, ...] = ()
         self._ezpickle_kwargs: dict[str, Any] = {"body": to_json(self.body), **arguments}
+        if self._shadows is not None:
+            self._ezpickle_kwargs["shadows"] = self._shadows
 
     # The spec is what `gym.make`, Minari and a vector env build the env from again.
 
@@ -156,6 +172,49 @@ class Reshapable(MujocoEnv):
             self._change_body(self.family.body(options["body"]))
         return cast("Any", super()).reset(seed=seed, options=options)
 
+    def step(self, action: Any) -> Any:
+        """Act for one step, by Gymnasium's own methods.
+
+        Where MuJoCo finds that the simulation has diverged, `info["diverged"]` is true until the
+        next reset.
+
+        Args:
+            action: Shape (nu,), finite.
+
+        Raises:
+            BadAction: If the action is none; nothing has moved then.
+        """
+        check_action(self, action)
+        result = cast("Any", super()).step(action)
+        if self.diverged:
+            result[-1]["diverged"] = True
+        return result
+
+    def step_into(
+        self, action: Any, observation: NDArray[np.float64]
+    ) -> tuple[Any, bool, bool, dict[str, Any]]:
+        """Act for one step, as `step`, and write what is observed.
+
+        Args:
+            action: Shape (nu,), finite.
+            observation: Is overwritten; shape of the observation space, float64, contiguous.
+
+        Returns:
+            Reward, terminated, truncated and info.
+        """
+        seen, *rest = self.step(action)
+        observation[:] = seen
+        reward, terminated, truncated, info = rest
+        return reward, terminated, truncated, info
+
+    @property
+    def diverged(self) -> bool:
+        """Whether MuJoCo has found a number in the simulation bad since the last reset.
+
+        MuJoCo then starts over from the model's own pose by itself, unless the model forbids it.
+        """
+        return any(self.data.warning[kind].number for kind in _DIVERGED)
+
     def reset_model(self) -> NDArray[np.float64]:
         """Draw a start state as Gymnasium does, and make it possible.
 
@@ -163,17 +222,22 @@ class Reshapable(MujocoEnv):
         quaternions again, and a trunk whose feet the noise pushed into the floor is lifted.
         """
         observation = super().reset_model()
-        pose = keep_within_limits(self.model, self.data.qpos)
+        rules = self._start_rules()
+        pose = rules.keep_within_limits(self.data.qpos)
         mujoco.mj_normalizeQuat(self.model, pose)
         moved = not np.array_equal(pose, self.data.qpos)
         if moved:
             self.set_state(pose, self.data.qvel.copy())
-        lift = trunk_lift(self.model)
-        if lift is not None and (gap := floor_gap(self.model, self.data)) < 0.0:
+        lift = rules.lift
+        if lift is not None and (gap := rules.floor_gap(self.model, self.data)) < 0.0:
             lift.raise_by(pose, -gap)
             self.set_state(pose, self.data.qvel.copy())
             moved = True
         return self._get_obs() if moved else observation
+
+    def _start_rules(self) -> StartRules:
+        """What makes a start pose possible, for the model as it is now."""
+        return StartRules(self.model)
 
     def _change_body(self, body: Body) -> None:
         """Build another body of the same spaces; on any error the present one stays."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Lift",
+    "StartRules",
     "floor_gap",
     "keep_within_limits",
     "standing_height",
@@ -101,10 +102,7 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
 def keep_within_limits(model: mujoco.MjModel, pose: _Array) -> _Array:
     """The pose, shape (nq,), with every hinge and slide moved inside its limits."""
-    result = pose.copy()
-    places, lower, upper = _limits(model)
-    result[places] = np.clip(result[places], lower, upper)
-    return result
+    return _within(pose, *_limits(model))
 
 
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
@@ -136,15 +134,7 @@ def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     height field that is fixed to the world and can touch the body's geoms; 1000 where there is
     none.
     """
-    of_world = model.body_weldid[model.geom_bodyid] == 0
-    gap = _FAR_M
-    for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)):
-        touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
-            model.geom_conaffinity & model.geom_contype[floor]
-        )
-        for geom in np.flatnonzero(~of_world & (touching != 0)):
-            gap = min(gap, mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, None))
-    return gap
+    return _gap(model, data, _floors_and_geoms(model))
 
 
 def _gap_at(model: mujoco.MjModel, pose: _Array) -> float:
@@ -152,6 +142,54 @@ def _gap_at(model: mujoco.MjModel, pose: _Array) -> float:
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
     return floor_gap(model, data)
+
+
+class StartRules:
+    """What makes a start pose possible, read from a model once: for envs that start often.
+
+    Attributes:
+        lift: What raises the trunk, as of `trunk_lift`.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.lift = trunk_lift(model)
+        self._limits = _limits(model)
+        self._pairs = _floors_and_geoms(model)
+
+    def keep_within_limits(self, pose: _Array) -> _Array:
+        """As the function of this name."""
+        return _within(pose, *self._limits)
+
+    def floor_gap(self, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+        """As the function of this name."""
+        return _gap(model, data, self._pairs)
+
+
+def _within(pose: _Array, places: NDArray[np.intp], lower: _Array, upper: _Array) -> _Array:
+    """The pose with the numbers at these places between their limits."""
+    result = pose.copy()
+    result[places] = np.clip(pose[places], lower, upper)
+    return result
+
+
+def _floors_and_geoms(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """Each floor with each geom of the body that it can touch."""
+    of_world = model.body_weldid[model.geom_bodyid] == 0
+    pairs: list[tuple[int, int]] = []
+    for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)):
+        touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
+            model.geom_conaffinity & model.geom_contype[floor]
+        )
+        pairs += [(int(floor), int(geom)) for geom in np.flatnonzero(~of_world & (touching != 0))]
+    return pairs
+
+
+def _gap(model: mujoco.MjModel, data: mujoco.MjData, pairs: list[tuple[int, int]]) -> float:
+    """The smallest distance between the geoms of these pairs, m."""
+    gap = _FAR_M
+    for floor, geom in pairs:
+        gap = min(gap, mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, None))
+    return gap
 
 
 def _limits(model: mujoco.MjModel) -> tuple[NDArray[np.intp], _Array, _Array]:

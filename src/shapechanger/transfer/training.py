@@ -16,12 +16,13 @@ from shapechanger.transfer.evaluation import Evaluation, evaluate
 from shapechanger.transfer.policy_file import Card, Normalisation, TrainedPolicy, actor
 from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.transplant import transplant
+from shapechanger.transfer.vec_env import learner_envs
 
 try:
     import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
+    from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
@@ -41,9 +42,9 @@ OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
 
 
-def _make_training_envs(env: EnvRef, settings: LearnerSettings) -> VecEnv:
+def _make_training_envs(env: EnvRef, settings: LearnerSettings, threads: int | None) -> VecEnv:
     """The envs that a learner steps together, normalised if the settings say so."""
-    envs: VecEnv = VecMonitor(DummyVecEnv([env.make for _ in range(settings.n_envs)]))
+    envs: VecEnv = VecMonitor(learner_envs(env, settings.n_envs, threads))
     return VecNormalize(envs, gamma=settings.gamma) if settings.normalise else envs
 
 
@@ -114,6 +115,7 @@ def train(
     source: TrainedPolicy | None = None,
     body_map: BodyMap | None = None,
     tensorboard: Path | None = None,
+    threads: int | None = 1,
 ) -> TrainedPolicy:
     """Train a policy, evaluating it before the first step, along the way, and at the end.
 
@@ -128,13 +130,16 @@ def train(
         source: A policy of another body to begin with, in place of an untrained one.
         body_map: How that body and this one correspond; needed with `source`.
         tensorboard: Folder for TensorBoard's logs.
+        threads: How many threads step the env, None for one per core; the result is the same. One
+            by default: a study runs as many trainings at a time as there are cores.
 
     Raises:
         StudyError: If `steps` is smaller than one evaluation.
     """
     require_budget(steps, settings)
-    envs = _make_training_envs(env, settings)
+    # These import the module of the id, if it names one.
     evaluation_envs = [env.make() for _ in range(settings.eval_episodes)]
+    envs = _make_training_envs(env, settings, threads)
     try:
         if source is None or body_map is None:
             model = _fresh_model(envs, settings, seed, tensorboard)

@@ -1,0 +1,181 @@
+"""How fast one env steps and draws, against Gymnasium's own.
+
+Rounds are paired: in each both envs take the same actions from the same state, one after the other
+in an order that alternates, and give one ratio of CPU times. Resets are not timed.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import shapechanger.envs.stepping.twin as twins
+from benchmarks.row import Row
+
+__all__ = ["single"]
+
+ROUNDS: Final = 41
+# Env steps in a round: about 30 ms of either.
+ANT_STEPS: Final = 100
+PENDULUM_STEPS: Final = 1000
+# More than the steps after which an env looks for a faster model.
+WARM_UP: Final = 600
+FRAMES: Final = 60
+SLOW_FRAMES: Final = 8
+SIZE: Final = {"width": 128, "height": 128}
+# Pushes so small that the pole stays up for a while.
+_GENTLE: Final = 0.05
+
+
+def single() -> list[Row]:
+    """One env at a time: steps, resets, the search for a fast model, frames."""
+    ant, ant_reset = _compared("Ant", ANT_STEPS, 1.0)
+    pole, pole_reset = _compared("InvertedPendulum", PENDULUM_STEPS, _GENTLE)
+    stock, _ = _compared("Ant", ANT_STEPS, 1.0, fast_model=False)
+    plain_pole, _ = _compared("InvertedPendulum", PENDULUM_STEPS, _GENTLE, fast_model=False)
+    return [
+        _ratio_row("one Ant-v1 step against Ant-v5, CPU time", ant, 1.5),
+        _ratio_row("the same with fast_model=False", stock, None),
+        _ratio_row("one InvertedPendulum-v1 step against InvertedPendulum-v5, CPU time", pole, 1.3),
+        _ratio_row("the same with fast_model=False", plain_pole, None),
+        _ratio_row("one Ant-v1 reset against Ant-v5, CPU time", ant_reset, None),
+        _ratio_row("one InvertedPendulum-v1 reset, likewise", pole_reset, None),
+        _search_row(),
+        *_frame_rows(),
+    ]
+
+
+def _compared(
+    name: str, steps: int, reach: float, **arguments: Any
+) -> tuple[list[float], list[float]]:
+    """Of each round Gymnasium's time over ours, sorted: of steps and of resets."""
+    ours = gym.make(f"shapechanger/{name}-v1", **arguments)
+    theirs = gym.make(f"{name}-v5")
+    rng = np.random.default_rng(0)
+    shape = (*ours.action_space.shape,)
+    of_steps: list[float] = []
+    of_resets: list[float] = []
+    with ours, theirs:
+        for env in (ours, theirs):
+            env.reset(seed=0)
+            _step_s(env, list(np.zeros((WARM_UP, *shape), np.float32)), _state(ours))
+        for number in range(ROUNDS):
+            actions = list((reach * rng.uniform(-1.0, 1.0, (steps, *shape))).astype(np.float32))
+            ours.reset(seed=number)
+            start = _state(ours)
+            pair = (ours, theirs) if number % 2 else (theirs, ours)
+            stepped = {env: _step_s(env, actions, start) for env in pair}
+            reset = {env: _cpu_s(lambda env=env: [env.reset() for _ in range(10)]) for env in pair}
+            of_steps.append(stepped[theirs] / stepped[ours])
+            of_resets.append(reset[theirs] / reset[ours])
+    return sorted(of_steps), sorted(of_resets)
+
+
+def _state(env: gym.Env[Any, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    data: Any = env.unwrapped.data
+    return data.qpos.copy(), data.qvel.copy()
+
+
+def _step_s(
+    env: gym.Env[Any, Any],
+    actions: list[NDArray[np.float32]],
+    start: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> float:
+    """CPU time of these steps, s; where an episode ends the next begins from the same state."""
+    inner: Any = env.unwrapped
+    env.reset()
+    inner.set_state(*start)
+    spent = 0.0
+    began = time.thread_time()
+    for action in actions:
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            spent += time.thread_time() - began
+            env.reset()
+            inner.set_state(*start)
+            began = time.thread_time()
+    return spent + time.thread_time() - began
+
+
+def _cpu_s(work: Callable[[], object]) -> float:
+    began = time.thread_time()
+    work()
+    return time.thread_time() - began
+
+
+def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
+    median = statistics.median(ratios)
+    return Row(
+        name,
+        f"{median:.2f}x",
+        f"{ratios[0]:.2f} to {ratios[-1]:.2f} in {len(ratios)} paired rounds",
+        "none" if target is None else f">= {target:g}x",
+        target is None or median >= target,
+    )
+
+
+def _search_row() -> Row:
+    """What it costs to find the fast model of a body that has not been seen."""
+    times: list[float] = []
+    with gym.make("shapechanger/Ant-v1") as env:
+        inner: Any = env.unwrapped
+        watch = twins.ModelWatch(inner.model)
+        for _ in range(15):
+            twins.forget()
+            times.append(1e3 * _cpu_s(lambda: twins.find_twin(watch, lambda: _spec(inner))))
+    times.sort()
+    return Row(
+        "finding the fast model of Ant, once a body, CPU time",
+        f"{statistics.median(times):.1f} ms",
+        f"{times[0]:.1f} to {times[-1]:.1f} ms in {len(times)} rounds",
+        "none",
+        True,
+    )
+
+
+def _spec(env: Any) -> Any:
+    return env.family.load(env.fullpath)
+
+
+def _frame_rows() -> list[Row]:
+    """Frames a second of one core: CPU time of all threads, so that a driver's help counts."""
+    plain = _frame_ms(gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **SIZE), FRAMES)
+    theirs = _frame_ms(gym.make("Ant-v5", render_mode="rgb_array", **SIZE), SLOW_FRAMES)
+    median = statistics.median(plain)
+    return [
+        Row(
+            "frames of Ant-v1 at 128x128, one core",
+            f"{1e3 / median:.0f} frames/s",
+            f"{plain[0]:.1f} to {plain[-1]:.1f} ms in {len(plain)} frames",
+            ">= 150 frames/s",
+            1e3 / median >= 150.0,
+        ),
+        Row(
+            "the same of Ant-v5",
+            f"{1e3 / statistics.median(theirs):.0f} frames/s",
+            f"{theirs[0]:.1f} to {theirs[-1]:.1f} ms in {len(theirs)} frames",
+            "none",
+            True,
+        ),
+    ]
+
+
+def _frame_ms(env: gym.Env[Any, Any], frames: int) -> list[float]:
+    """CPU time of each frame, ms, sorted; the body moves in between."""
+    times: list[float] = []
+    with env:
+        env.reset(seed=0)
+        env.action_space.seed(0)
+        env.render()  # The first makes the context.
+        for _ in range(frames):
+            env.step(env.action_space.sample())
+            began = time.process_time()
+            env.render()
+            times.append(1e3 * (time.process_time() - began))
+    return sorted(times)

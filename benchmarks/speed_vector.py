@@ -1,0 +1,264 @@
+"""How fast many ants are stepped together, against the bare physics and against others.
+
+Rounds are paired: each runs both sides, one right after the other, in an order that alternates, and
+gives one ratio. A round begins with all envs of both sides in the same states where both are ours
+to set.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+import shapechanger
+from benchmarks.row import Row
+
+ROUNDS = 15
+STEPS = 8
+WARM_UP = 150
+# An interpreter that has EnvPool, if it is not this one.
+ENVPOOL_PYTHON = os.environ.get("SHAPECHANGER_ENVPOOL_PYTHON", sys.executable)
+PEER = Path(__file__).with_name("vector_peer.py")
+
+# What an integration starts from, the solver's first guess too.
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+class _Fleet:
+    """A vector env of ants under way, and the same ants elsewhere."""
+
+    def __init__(self, num_envs: int, threads: int = 1) -> None:
+        self.num_envs = num_envs
+        self.envs = shapechanger.make_vec("Ant", num_envs, threads=threads)
+        self.envs.reset(seed=0)
+        self._rng = np.random.default_rng(0)
+        for action in self.actions(WARM_UP):
+            self.envs.step(action)
+
+    def actions(self, steps: int) -> NDArray[np.float32]:
+        """Random actions for so many steps."""
+        return self._rng.uniform(-1.0, 1.0, (steps, self.num_envs, 8)).astype(np.float32)
+
+    def bodies(self) -> list[tuple[Any, Any]]:
+        """Model and data of each ant."""
+        return [(env.unwrapped.model, env.unwrapped.data) for env in self.envs.envs]
+
+    def put_into(self, others: list[tuple[Any, Any]]) -> None:
+        """Bring other ants into the states of these."""
+        for (model, data), (other_model, other_data) in zip(self.bodies(), others, strict=True):
+            state = np.empty(mujoco.mj_stateSize(model, _STATE))
+            mujoco.mj_getState(model, data, state, _STATE)
+            mujoco.mj_setState(other_model, other_data, state, _STATE)
+
+
+def _timed(work: Callable[[], object], clock: Callable[[], float]) -> float:
+    began = clock()
+    work()
+    return clock() - began
+
+
+def _paired(
+    theirs: Callable[[], float], ours: Callable[[], float], rounds: int = ROUNDS
+) -> list[float]:
+    """Their time over ours, of each round, sorted."""
+    ratios: list[float] = []
+    for number in range(rounds):
+        if number % 2:
+            our, their = ours(), theirs()
+        else:
+            their, our = theirs(), ours()
+        ratios.append(their / our)
+    return sorted(ratios)
+
+
+def _row(name: str, ratios: list[float], target: float) -> Row:
+    middle = statistics.median(ratios)
+    spread = f"{ratios[0]:.2f} to {ratios[-1]:.2f} in {len(ratios)} rounds"
+    return Row(name, f"{middle:.2f}x", spread, f">= {target:g}x", middle >= target)
+
+
+def _missing(name: str, why: str, target: float) -> Row:
+    return Row(name, "not measured", why, f">= {target:g}x", False)
+
+
+def against_physics(num_envs: int) -> Row:
+    """CPU time of `mj_step(nstep=5)` alone, called from Python, over that of a step of ours."""
+    fleet = _Fleet(num_envs)
+    model = gym.make("Ant-v5").unwrapped.model
+    bare = [(model, mujoco.MjData(model)) for _ in range(num_envs)]
+    controls: list[Any] = [data.ctrl for _, data in bare]
+    actions = fleet.actions(STEPS)
+
+    def physics() -> float:
+        fleet.put_into(bare)
+
+        def work() -> None:
+            step = mujoco.mj_step
+            for row in actions:
+                for (_, data), control, action in zip(bare, controls, row, strict=True):
+                    control[:] = action
+                    step(model, data, 5)
+
+        return _timed(work, time.process_time)
+
+    def ours() -> float:
+        return _timed(lambda: [fleet.envs.step(row) for row in actions], time.process_time)
+
+    ratios: list[float] = []
+    for _ in range(ROUNDS):  # Physics first: it starts where ours will start.
+        actions = fleet.actions(STEPS)
+        ratios.append(physics() / ours())
+    fleet.envs.close()
+    name = f"Ant, N={num_envs}, 1 thread: mj_step loop (from Python) over ours, CPU"
+    return _row(name, sorted(ratios), 1.08)
+
+
+def against_sync(num_envs: int) -> Row:
+    """CPU time of Gymnasium's `SyncVectorEnv` over its own Ant-v5, over that of ours."""
+    fleet = _Fleet(num_envs)
+    sync = gym.make_vec("Ant-v5", num_envs=num_envs, vectorization_mode="sync")
+    sync.reset(seed=0)
+    theirs = [(env.unwrapped.model, env.unwrapped.data) for env in sync.envs]
+    ratios: list[float] = []
+    for _ in range(ROUNDS):
+        actions = fleet.actions(STEPS)
+        sync.reset()
+        fleet.put_into(theirs)
+        their = _timed(lambda: [sync.step(row) for row in actions], time.process_time)  # noqa: B023
+        our = _timed(lambda: [fleet.envs.step(row) for row in actions], time.process_time)  # noqa: B023
+        ratios.append(their / our)
+    fleet.envs.close()
+    sync.close()
+    name = f"Ant, N={num_envs}, 1 thread: SyncVectorEnv of Ant-v5 over ours, CPU"
+    return _row(name, sorted(ratios), 1.75)
+
+
+class _Peer:
+    """A vector env in another process."""
+
+    def __init__(self, kind: str, num_envs: int, threads: int) -> None:
+        python = ENVPOOL_PYTHON if kind == "envpool" else sys.executable
+        self._process = subprocess.Popen(
+            [python, str(PEER), kind, str(num_envs), str(threads)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def ready(self) -> str:
+        """Its version, once it is under way; raise what it said if it does not start."""
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
+        said = self._process.stdout.readline().split()
+        if said[:1] != ["ready"]:
+            lines = self._process.stderr.read().strip().splitlines()
+            raise RuntimeError(lines[-1] if lines else "it ended without a word")
+        return said[1]
+
+    def begin(self, steps: int) -> None:
+        """Let it step."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{steps}\n")
+        self._process.stdin.flush()
+
+    def seconds(self) -> float:
+        """How long that took."""
+        assert self._process.stdout is not None
+        return float(self._process.stdout.readline())
+
+    def close(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.communicate()
+
+
+def against_envpool() -> Row:
+    """Wall-clock time of EnvPool over ours, two threads each."""
+    name = "Ant, N=128, 2 threads: EnvPool over ours, wall clock"
+    peer = _Peer("envpool", 128, 2)
+    try:
+        made_by = peer.ready()
+    except RuntimeError as error:
+        peer.close()
+        return _missing(name, f"EnvPool does not start: {error}", 1.2)
+    fleet = _Fleet(128, threads=2)
+
+    def theirs() -> float:
+        peer.begin(STEPS)
+        return peer.seconds()
+
+    def ours() -> float:
+        actions = fleet.actions(STEPS)
+        return _timed(lambda: [fleet.envs.step(row) for row in actions], time.perf_counter)
+
+    ratios = _paired(theirs, ours)
+    peer.close()
+    fleet.envs.close()
+    return _row(f"{name} (EnvPool {made_by})", ratios, 1.2)
+
+
+def against_processes() -> Row:
+    """Wall-clock time of two processes of 64 envs and one thread, over 128 envs and two threads."""
+    peers = [_Peer("ours", 64, 1) for _ in range(2)]
+    for peer in peers:
+        peer.ready()
+    fleet = _Fleet(128, threads=2)
+
+    def theirs() -> float:
+        for peer in peers:
+            peer.begin(STEPS)
+        return max(peer.seconds() for peer in peers)
+
+    def ours() -> float:
+        actions = fleet.actions(STEPS)
+        return _timed(lambda: [fleet.envs.step(row) for row in actions], time.perf_counter)
+
+    ratios = _paired(theirs, ours)
+    for peer in peers:
+        peer.close()
+    fleet.envs.close()
+    return _row("Ant, N=128: two processes over two threads, wall clock", ratios, 0.92)
+
+
+def memory() -> Row:
+    """Resident memory per env, of 1,024 of them."""
+    command = [sys.executable, str(PEER), "memory", "1024", "1"]
+    run = subprocess.run(command, check=True, capture_output=True, text=True)
+    megabytes = float(run.stdout) / 1e6
+    return Row(
+        "Ant, N=1024: resident memory per env",
+        f"{megabytes:.2f} MB",
+        "one round",
+        "<= 1 MB",
+        megabytes <= 1.0,
+    )
+
+
+def vector() -> list[Row]:
+    """All of it."""
+    return [
+        against_physics(32),
+        against_physics(128),
+        against_sync(32),
+        against_sync(128),
+        against_envpool(),
+        against_processes(),
+        memory(),
+    ]
+
+
+if __name__ == "__main__":
+    for row in vector():
+        print(row)

@@ -1,0 +1,245 @@
+"""A model that moves like another to the last bit, and costs less.
+
+Three things of MuJoCo cost time and change no number of an ant or a pendulum:
+
+- **Islands.** The solver splits the constraints into islands that do not touch. One tree of bodies
+  has at most one island, which holds all constraints; not looking for it gives the same sums in the
+  same order.
+- **The search for contacts.** The candidates of one floor and a few geoms are known beforehand.
+  Given as explicit pairs, in the order in which the search would find them and with the numbers
+  that it would mix, they make the same contacts. Margins are *summed*.
+- **Collisions where there can be none**, as on a pendulum.
+
+Which of these hold is decided twice: by rules on the model, which keep every pair that the original
+could ever generate, and then by a test that runs both models side by side. A model for which either
+says no keeps the search for contacts, or has no twin at all.
+"""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from typing import Any, Final, cast
+from weakref import WeakValueDictionary
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.envs.stepping.comparison import moves_equally
+from shapechanger.envs.stepping.watch import ModelWatch
+from shapechanger.morphology.effective.collisions import colliding_pairs
+
+__all__ = ["Demand", "demand_for", "find_twin", "forget", "known_twin"]
+
+_Ints = NDArray[np.int64]
+
+_BIT: Final = mujoco.mjtDisableBit
+_NO_ISLANDS: Final = int(_BIT.mjDSBL_ISLAND)
+_NO_SEARCH: Final = int(_BIT.mjDSBL_MIDPHASE)
+_NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
+# What would let bodies of one tree be solved apart, or tie them to what the rules do not look at.
+_UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
+# Models that are remembered; those of envs that are in use live on by themselves.
+_REMEMBERED: Final = 32
+_SMALLEST_MIX: Final = float(cast("Any", mujoco).mjMINVAL)
+
+_twins: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()
+_demands: WeakValueDictionary[bytes, Demand] = WeakValueDictionary()
+_lock = threading.Lock()
+
+
+def find_twin(watch: ModelWatch, make_spec: Callable[[], mujoco.MjSpec]) -> mujoco.MjModel | None:
+    """A model that steps the data of the watched model, moves equally, and costs less.
+
+    The answer is remembered, and one twin is shared by all envs of a body: nobody may write to it.
+
+    Args:
+        watch: The watch of the compiled model, which is unedited.
+        make_spec: Makes what the model was compiled from.
+
+    Returns:
+        The twin; None if there is none that is sure to move equally.
+    """
+    if not watch.sees:
+        return None
+    name = watch.digest
+    with _lock:  # Of several threads with the same body, one looks.
+        if name not in _twins:
+            _twins[name] = next(
+                (
+                    candidate
+                    for candidate in _candidates(watch.model, make_spec)
+                    if moves_equally(watch.model, candidate)
+                ),
+                None,
+            )
+            while len(_twins) > _REMEMBERED:
+                _twins.popitem(last=False)
+        return _twins[name]
+
+
+def forget() -> None:
+    """Forget all twins, as for a measurement of what it takes to find one."""
+    with _lock:
+        _twins.clear()
+
+
+class Demand:
+    """How much a twin would be used.
+
+    Attributes:
+        steps: How many steps all envs with one body have taken without.
+    """
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+
+def demand_for(watch: ModelWatch) -> Demand:
+    """The demand for a twin of the watched model, shared by all envs of its body."""
+    name = watch.digest
+    with _lock:
+        demand = _demands.get(name)
+        if demand is None:
+            demand = _demands[name] = Demand()
+        return demand
+
+
+def known_twin(watch: ModelWatch) -> mujoco.MjModel | None:
+    """The twin of the watched model, as it was when the watch began, if it has been found."""
+    name = watch.digest
+    with _lock:
+        if name in _twins:
+            _twins.move_to_end(name)
+        return _twins.get(name)
+
+
+def _candidates(
+    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
+) -> Iterator[mujoco.MjModel]:
+    """What the rules allow, the cheapest first."""
+    if _is_one_tree(model):
+        without_search = _without_search(model, make_spec)
+        if without_search is not None:
+            yield without_search
+        yield _in_one_piece(model)
+
+
+def _is_one_tree(model: mujoco.MjModel) -> bool:
+    """Whether all constraints are about one tree, and nothing unknown is in the model."""
+    return (
+        model.ntree == 1
+        and not model.opt.enableflags
+        and not any(getattr(model, size) for size in _UNKNOWN)
+        and mujoco.get_mjcb_contactfilter() is None
+    )
+
+
+def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model without the search for islands."""
+    result = copy.copy(model)
+    result.opt.disableflags |= _NO_ISLANDS
+    return result
+
+
+def _without_search(
+    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
+) -> mujoco.MjModel | None:
+    """The model without islands and with all its contacts as explicit pairs."""
+    if model.npair:
+        return None
+    _, pairs = colliding_pairs(model)
+    if not pairs.size:
+        result = copy.copy(model)
+        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS
+        return result
+    names = [model.geom(geom).name for geom in range(model.ngeom)]
+    if not _on_one_floor(model, pairs) or not all(names):
+        return None
+    spec = make_spec()
+    for first, second in pairs.tolist():
+        cast("Any", spec).add_pair(geomname1=names[first], geomname2=names[second])
+    result = spec.compile()
+    if not _same_but_for_pairs(model, result):
+        return None
+    _mix(result)
+    # No geom is left for the search, by itself or by its body.
+    for bits in (
+        result.geom_contype,
+        result.geom_conaffinity,
+        result.body_contype,
+        result.body_conaffinity,
+    ):
+        bits[:] = 0
+    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH
+    return result
+
+
+def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
+    """Whether each pair is the one fixed geom with the one geom of a body, mixed alike.
+
+    Then the order of the pairs, which is that of their bodies, leaves nothing open.
+    """
+    bodies = model.geom_bodyid[pairs]
+    fixed = model.body_weldid[bodies] == 0
+    floor = np.unique(pairs[fixed])
+    moving = bodies[~fixed]
+    involved = np.unique(pairs)
+    return bool(
+        (fixed.sum(axis=1) == 1).all()
+        and floor.size == 1
+        and np.unique(moving).size == moving.size
+        and np.unique(model.geom_priority[involved]).size == 1
+        and not model.geom_adhesion[involved].any()
+        and not model.geom_surfacevel[involved].any()
+    )
+
+
+def _mix(model: mujoco.MjModel) -> None:
+    """Give each pair the numbers that the search would have mixed from its geoms.
+
+    Source: MuJoCo 4.0.0, `mujoco/doc/modeling.rst`, "Contact parameters"; margins and gaps are
+    summed, as measured.
+    """
+    one, other = model.pair_geom1, model.pair_geom2
+    model.pair_margin[:] = model.geom_margin[one] + model.geom_margin[other]
+    model.pair_gap[:] = model.geom_gap[one] + model.geom_gap[other]
+    model.pair_dim[:] = np.maximum(model.geom_condim[one], model.geom_condim[other])
+    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
+    model.pair_friction[:] = friction[:, [0, 0, 1, 2, 2]]
+    model.pair_solreffriction[:] = 0.0
+    for pair, (first, second) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
+        part = _part(*model.geom_solmix[[first, second]].tolist())
+        both = model.geom_solref[[first, second]]
+        model.pair_solref[pair] = (
+            part * both[0] + (1.0 - part) * both[1]
+            if (both[:, 0] > 0.0).all()
+            else both.min(axis=0)  # Given directly, not as time and damping.
+        )
+        model.pair_solimp[pair] = (
+            part * model.geom_solimp[first] + (1.0 - part) * model.geom_solimp[second]
+        )
+
+
+def _part(one: float, other: float) -> float:
+    """The part of the first geom in a mix."""
+    if one >= _SMALLEST_MIX and other >= _SMALLEST_MIX:
+        return one / (one + other)
+    if one < _SMALLEST_MIX and other < _SMALLEST_MIX:
+        return 0.5
+    return 0.0 if one < _SMALLEST_MIX else 1.0
+
+
+def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
+    """Whether two models hold the same numbers, names and pairs apart."""
+    for name in dir(model):
+        mine: Any = getattr(model, name)
+        if type(mine) is not np.ndarray or name.startswith(("pair_", "name", "_")):
+            continue
+        its: Any = getattr(other, name)
+        if its.dtype != mine.dtype or not np.array_equal(its, mine):
+            return False
+    return True

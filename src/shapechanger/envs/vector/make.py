@@ -1,0 +1,116 @@
+"""Making a vector env from an id."""
+
+from __future__ import annotations
+
+import copy as copying
+import operator
+import os
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+from gymnasium.vector import AutoresetMode
+
+from shapechanger.envs.catalogue import CATALOGUE, find
+from shapechanger.envs.vector.env import ThreadVectorEnv
+from shapechanger.errors import UnknownName, VectorEnvError
+
+if TYPE_CHECKING:
+    from shapechanger.embodiments.family import BodyLike
+
+__all__ = ["make_vec"]
+
+
+def make_vec(
+    env_id: str,
+    num_envs: int = 1,
+    *,
+    threads: int | None = None,
+    bodies: Sequence[BodyLike] | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    copy: bool = True,
+    **arguments: Any,
+) -> ThreadVectorEnv:
+    """Envs of one id that step together; `gymnasium.make_vec` gives the same.
+
+    Args:
+        env_id: A registered id; of the catalogue its name alone, such as `BigAnt`, will do. The
+            envs of any other class must not share what they change, as they step in threads.
+        num_envs: How many envs.
+        threads: How many threads step them, with that of the caller: 1 starts none. None for as
+            many as there are cores that this process may use. The numbers are the same with any.
+        bodies: For each env its body, in place of one for all. Lengths and masses may differ; the
+            spaces may not.
+        autoreset_mode: When an env that has ended starts again, as Gymnasium's vector envs.
+        copy: Whether observations are copies; else the next step writes into them.
+        **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.
+
+    Raises:
+        UnknownName: If there is no such env, mode or body.
+        VectorEnvError: If the number of envs or threads is below one, or there are not as many
+            bodies as envs.
+        SpaceMismatch: If the spaces of two bodies differ.
+    """
+    count = _at_least_one("env", num_envs)
+    cores = _cores() if threads is None else _at_least_one("thread", threads)
+    each: Sequence[dict[str, Any]] = [arguments] * count
+    if bodies is not None:
+        if len(bodies) != count:
+            raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
+        each = [{**arguments, "body": body} for body in bodies]
+    made_from = _known_id(env_id)
+    envs = ThreadVectorEnv(
+        [partial(_make, made_from, one) for one in each],
+        threads=min(cores, count),
+        autoreset_mode=_mode(autoreset_mode),
+        copy=copy,
+    )
+    # What `gymnasium.make_vec(spec)` makes the same from; it fills the spec in by itself too.
+    spec = copying.deepcopy(envs.envs[0].spec)
+    if spec is not None and spec.vector_entry_point is not None:
+        spec.kwargs.update(arguments, num_envs=count, vectorization_mode="vector_entry_point")
+        spec.kwargs.update(autoreset_mode=_mode(autoreset_mode).value, copy=copy)
+        spec.kwargs.update({} if threads is None else {"threads": threads})
+        spec.kwargs.update({} if bodies is None else {"bodies": list(bodies)})
+        envs.spec = spec
+    return envs
+
+
+def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
+    try:
+        return gym.make(env_id, **arguments)
+    except (gym.error.UnregisteredEnv, ModuleNotFoundError) as error:
+        raise UnknownName("environment", env_id, CATALOGUE) from error
+
+
+def _known_id(env_id: str) -> str:
+    """The id, where its name alone was given."""
+    if env_id in gym.registry or ":" in env_id or "/" in env_id:
+        return env_id
+    return find(env_id).id
+
+
+def _cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _at_least_one(what: str, number: int) -> int:
+    try:
+        count = operator.index(number)
+    except TypeError:
+        count = 0
+    if count < 1:
+        raise VectorEnvError(f"A vector env needs at least one {what}, got {number!r}.")
+    return count
+
+
+def _mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = [known.value for known in AutoresetMode]
+        raise UnknownName("autoreset mode", str(mode), known) from None

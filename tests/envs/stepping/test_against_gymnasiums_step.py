@@ -1,0 +1,182 @@
+"""The tuned step on the fast model gives the bits of Gymnasium's own methods on the stock model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.envs.ant import AntEnv
+from shapechanger.envs.pendulum import InvertedPendulumEnv
+from shapechanger.morphology import Body
+from tests.envs.stepping.side_by_side import random_ant, random_pendulum, same, step_together
+
+_ANTS = ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt")
+_POLES = ("InvertedPendulum", "SmallInvertedPendulum", "BigInvertedPendulum")
+
+
+class _GymnasiumsAnt(AntEnv):
+    """An ant that steps by Gymnasium's methods, because it overrides one of them."""
+
+    def do_simulation(self, ctrl: Any, n_frames: int) -> None:
+        super().do_simulation(ctrl, n_frames)
+
+
+class _GymnasiumsPendulum(InvertedPendulumEnv):
+    """A pendulum that steps by Gymnasium's methods."""
+
+    def do_simulation(self, ctrl: Any, n_frames: int) -> None:
+        super().do_simulation(ctrl, n_frames)
+
+
+def _ants(body: Body | str, **arguments: Any) -> tuple[AntEnv, _GymnasiumsAnt]:
+    return AntEnv(body, **arguments), _GymnasiumsAnt(body, fast_model=False, **arguments)
+
+
+def _has_twin(env: Any) -> bool:
+    return env._bound.has_twin is True and env._bound.stepping is not env.model
+
+
+@pytest.mark.parametrize("name", _ANTS)
+def test_named_ants(name: str) -> None:
+    """All four, falling over and starting again."""
+    ours, theirs = _ants(name)
+    ends, touches = step_together(ours, theirs, 250, seed=1)
+    assert _has_twin(ours)
+    assert not hasattr(theirs, "_bound") or theirs._bound is None
+    assert touches > 20 or ends
+
+
+@pytest.mark.parametrize("name", _POLES)
+def test_named_pendulums(name: str) -> None:
+    """All three, falling over and starting again."""
+    ours, theirs = InvertedPendulumEnv(name), _GymnasiumsPendulum(name)
+    ends, _ = step_together(ours, theirs, 400, seed=1)
+    assert _has_twin(ours)
+    assert ends > 3
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"fast_model": False},
+        {"exclude_current_positions_from_observation": False, "contact_force_range": (-5.0, 0.0)},
+        {"include_cfrc_ext_in_observation": False, "forward_reward_weight": 2.0, "frame_skip": 2},
+        {"main_body": "shank_1", "ctrl_cost_weight": 3, "healthy_reward": 0},
+        {"healthy_z_range": (0.3, 0.9), "contact_cost_weight": 1e-2},
+        {"terminate_when_unhealthy": False, "healthy_z_range": (0.5, 0.7)},
+    ],
+    ids=["stock model", "place seen", "contacts unseen", "a shank", "low", "goes on"],
+)
+def test_arguments_of_the_ant(arguments: dict[str, Any]) -> None:
+    """Whatever Gymnasium's env can be asked for."""
+    ours = AntEnv(**arguments)
+    theirs = _GymnasiumsAnt(**{**arguments, "fast_model": False})
+    step_together(ours, theirs, 60, seed=2)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.float16, np.int64, bool])
+def test_types_of_actions(kind: type) -> None:
+    """The cost of an action is summed in the precision that it has; lists are taken too."""
+    ours, theirs = _ants("Ant")
+    for env in (ours, theirs):
+        env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        action = (3.0 * rng.uniform(-1.0, 1.0, 16)).astype(kind)
+        for given in (action[:8], action[::2], action[:8].tolist(), tuple(action[:8].tolist())):
+            assert same(ours.step(given), theirs.step(given))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_random_ants(seed: int) -> None:
+    """Bodies that no id names."""
+    ours, theirs = _ants(random_ant(seed))
+    step_together(ours, theirs, 120, seed=seed)
+    assert _has_twin(ours)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(25))
+def test_many_random_ants(seed: int) -> None:
+    """1,000 steps each, with falls, resets and contacts."""
+    ours, theirs = _ants(random_ant(seed), healthy_z_range=(0.1, 3.0) if seed % 2 else None)
+    ends, touches = step_together(ours, theirs, 1000, seed=seed)
+    assert _has_twin(ours)
+    assert ends
+    assert touches > 100
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_random_pendulums(seed: int) -> None:
+    """Poles that no id names."""
+    body = random_pendulum(seed)
+    ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
+    step_together(ours, theirs, 200, seed=seed)
+    assert _has_twin(ours)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(25))
+def test_many_random_pendulums(seed: int) -> None:
+    """1,000 steps each, at the ends of the rail too."""
+    body = random_pendulum(seed)
+    ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
+    step_together(ours, theirs, 1000, seed=seed, reach=1.0 if seed % 2 else 0.1)
+    assert _has_twin(ours)
+
+
+@pytest.mark.parametrize(
+    "env_id", [f"shapechanger/{name}-v1" for name in (*_ANTS, *_POLES, "Hopper", "Humanoid")]
+)
+def test_stepping_into_a_row_is_stepping(env_id: str) -> None:
+    """Whether the env is tuned or not; the row is all that is written."""
+    with gym.make(env_id) as one, gym.make(env_id) as two:
+        ours: Any = one.unwrapped
+        theirs: Any = two.unwrapped
+        ours.reset(seed=0)
+        theirs.reset(seed=0)
+        ours.action_space.seed(0)
+        rows = np.full((3, *ours.observation_space.shape), 7.0)
+        for _ in range(30):
+            action = ours.action_space.sample()
+            observation, *rest = theirs.step(action)
+            assert same(list(ours.step_into(action, rows[1])), rest)
+            assert same(rows[1], observation)
+        assert (rows[[0, 2]] == 7.0).all()
+
+
+def test_the_twin_is_shared() -> None:
+    """One for all envs of a body, found once."""
+    envs = [AntEnv("BigAnt") for _ in range(3)]
+    for env in envs:
+        env.reset(seed=0)
+        env.step(np.zeros(8))
+    assert len({id(env._bound.stepping) for env in envs}) == 1
+
+
+def test_a_new_body_is_stepped_by_its_own_twin() -> None:
+    """At a reset the body changes, and what steps it."""
+    ours, theirs = _ants("Ant")
+    for body in ("Ant", "BigAnt", "AmputatedAnt", "Ant"):
+        for env in (ours, theirs):
+            env.reset(seed=1, options={"body": body})
+        for _ in range(20):
+            action = np.full(8, 0.5, np.float32)
+            assert same(ours.step(action), theirs.step(action))
+        assert _has_twin(ours)
+
+
+def test_a_state_that_is_set_is_stepped_from() -> None:
+    """`set_state`, and whatever is written to the public data."""
+    ours, theirs = _ants("Ant")
+    for env in (ours, theirs):
+        env.reset(seed=0)
+        env.step(np.ones(8))
+        env.set_state(env.init_qpos + 0.01, env.init_qvel + 1.0)
+        env.data.qvel[7] = 3.0
+        env.data.xfrc_applied[1, 2] = 5.0
+    for _ in range(20):
+        assert same(ours.step(np.zeros(8)), theirs.step(np.zeros(8)))

@@ -1,0 +1,274 @@
+"""Whatever a user writes into the public model is stepped with, from the next step on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.envs.ant import AntEnv
+from shapechanger.envs.pendulum import InvertedPendulumEnv
+from shapechanger.envs.stepping import ModelWatch, twin
+from tests.envs.stepping.side_by_side import same
+
+_MODEL = AntEnv().model
+# Every array of the model that holds numbers, and every option.
+_ARRAYS = [
+    name
+    for name in dir(_MODEL)
+    if not name.startswith("_")
+    and isinstance(getattr(_MODEL, name), np.ndarray)
+    and getattr(_MODEL, name).size
+    and getattr(_MODEL, name).dtype != object
+    and name != "tex_data"
+]
+_OPTIONS = [name for name in dir(_MODEL.opt) if not name.startswith("_")]
+_STATISTICS = [name for name in dir(_MODEL.stat) if not name.startswith("_")]
+
+Edit = Callable[[Any], None]
+
+
+def _gravity(model: Any) -> None:
+    model.opt.gravity[2] = -3.0
+
+
+def _timestep(model: Any) -> None:
+    model.opt.timestep = 0.005
+
+
+def _iterations(model: Any) -> None:
+    model.opt.iterations = 1
+    model.opt.solver = mujoco.mjtSolver.mjSOL_CG
+
+
+def _integrator(model: Any) -> None:
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+
+
+def _flags(model: Any) -> None:
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+
+
+def _scale(name: str, factor: float) -> Edit:
+    def edit(model: Any) -> None:
+        getattr(model, name)[...] *= factor
+
+    edit.__name__ = name
+    return edit
+
+
+def _springs(model: Any) -> None:
+    model.jnt_stiffness[1:] = 2.0
+
+
+def _no_floor(model: Any) -> None:
+    model.geom_contype[:] = 0
+    model.geom_conaffinity[:] = 0
+
+
+def _touching_legs(model: Any) -> None:
+    model.geom_conaffinity[:] = 1
+
+
+_EDITS: list[Edit] = [
+    _gravity,
+    _timestep,
+    _iterations,
+    _integrator,
+    _flags,
+    _springs,
+    _no_floor,
+    _touching_legs,
+    *(
+        _scale(name, factor)
+        for name, factor in {
+            "body_mass": 2.0,
+            "body_inertia": 3.0,
+            "geom_friction": 0.1,
+            "geom_size": 1.2,
+            "geom_margin": 0.5,
+            "geom_solref": 1.5,
+            "geom_solimp": 0.9,
+            "geom_pos": 1.1,
+            "actuator_gear": 0.5,
+            "actuator_ctrlrange": 0.5,
+            "dof_damping": 4.0,
+            "dof_armature": 0.5,
+            "jnt_range": 0.5,
+            "qpos_spring": 1.5,
+            "body_pos": 1.1,
+            "body_ipos": 1.1,
+        }.items()
+    ),
+]
+
+
+def _ants() -> tuple[AntEnv, AntEnv]:
+    return AntEnv(), AntEnv(fast_model=False)
+
+
+def _play(envs: tuple[Any, Any], steps: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        action = rng.uniform(-1.0, 1.0, envs[0].action_space.shape).astype(np.float32)
+        one, other = (env.step(action) for env in envs)
+        assert same(one, other)
+        assert same(envs[0].data.qpos, envs[1].data.qpos)
+
+
+@pytest.mark.parametrize("edit", _EDITS, ids=lambda edit: edit.__name__)
+def test_an_edit_is_stepped_with(edit: Edit) -> None:
+    """Between resets, in the middle of an episode, and no more once it is taken back."""
+    ours, _ = envs = _ants()
+    kept = [(env.model, _saved(env.model)) for env in envs]
+    for env in envs:
+        env.reset(seed=0)
+    _play(envs, 10, seed=0)
+    assert ours._bound.has_twin
+    before = ours.data.qpos.copy()
+    for env in envs:
+        edit(env.model)
+    assert not ours._watch.unedited()
+    _play(envs, 15, seed=1)
+    for env in envs:
+        env.reset(seed=1)
+    _play(envs, 15, seed=2)
+    for model, saved in kept:
+        _restore(model, saved)
+    assert ours._watch.unedited()
+    _play(envs, 15, seed=3)
+    assert not np.array_equal(before, ours.data.qpos)
+
+
+def test_an_edit_before_the_first_step_is_stepped_with() -> None:
+    """The twin is looked for only when the model is as it was compiled."""
+    twin.forget()
+    ours, theirs = envs = _ants()
+    for env in envs:
+        env.model.body_mass[1] *= 1.75
+        env.reset(seed=0)
+    _play(envs, 20, seed=0)
+    assert ours._bound.has_twin is None
+    for env in envs:
+        env.model.body_mass[1] /= 1.75
+    _play(envs, 20, seed=1)
+    assert ours._bound.has_twin is True
+    assert theirs._bound.has_twin is None
+
+
+def test_edits_of_a_pendulum_are_stepped_with() -> None:
+    """Its twin has no contacts at all."""
+    envs = (InvertedPendulumEnv(), InvertedPendulumEnv(fast_model=False))
+    for env in envs:
+        env.reset(seed=0)
+    _play(envs, 3, seed=0)
+    for env in envs:
+        env.model.geom_contype[:] = 1
+        env.model.geom_conaffinity[:] = 1
+        env.model.actuator_gear[0, 0] = 30.0
+        env.reset(seed=1)
+    _play(envs, 10, seed=1)
+
+
+def test_a_model_and_data_in_their_place_are_stepped() -> None:
+    """Some programs put another model into the env."""
+    envs = _ants()
+    for env in envs:
+        env.reset(seed=0)
+    _play(envs, 5, seed=0)
+    for env in envs:
+        model = AntEnv("BigAnt").model
+        env.model, env.data = model, mujoco.MjData(model)
+        env.reset(seed=1)
+    _play(envs, 10, seed=1)
+    for env in envs:
+        env.data = mujoco.MjData(env.model)
+        env.reset(seed=2)
+    _play(envs, 10, seed=2)
+
+
+# The watch.
+
+
+@pytest.mark.parametrize("name", _ARRAYS)
+def test_every_number_of_every_array_is_watched(name: str) -> None:
+    """The first and the last of each; and taking it back is noticed."""
+    watch = ModelWatch(_MODEL)
+    flat = getattr(_MODEL, name).reshape(-1)
+    for place in (0, -1):
+        before = flat[place].copy()
+        flat[place] = not before if flat.dtype == bool else _other(before, flat.dtype)
+        assert not watch.unedited(), f"{name}[{place}]"
+        flat[place] = before
+        assert watch.unedited()
+
+
+@pytest.mark.parametrize("name", _OPTIONS)
+def test_every_option_is_watched(name: str) -> None:
+    """Numbers, vectors and flags."""
+    _change_one(_MODEL.opt, name)
+
+
+@pytest.mark.parametrize("name", _STATISTICS)
+def test_every_statistic_is_watched(name: str) -> None:
+    """The solver scales its tolerance by one of them."""
+    _change_one(_MODEL.stat, name)
+
+
+def test_a_model_that_is_not_edited_is_not_edited() -> None:
+    """Steps, resets, pictures and a copy change nothing; the name is that of the numbers."""
+    env = AntEnv()
+    watch = ModelWatch(env.model)
+    env.reset(seed=0)
+    env.step(np.ones(8))
+    assert watch.sees
+    assert watch.unedited()
+    assert watch.digest == ModelWatch(AntEnv().model).digest
+    assert watch.digest != ModelWatch(AntEnv("BigAnt").model).digest
+
+
+def _change_one(part: Any, name: str) -> None:
+    watch = ModelWatch(_MODEL)
+    value = getattr(part, name)
+    before = np.copy(value)
+    if isinstance(value, np.ndarray):
+        value[-1] += 1
+    else:
+        setattr(part, name, value + 1)
+    assert not watch.unedited()
+    if isinstance(value, np.ndarray):
+        value[:] = before
+    else:
+        setattr(part, name, before.item())
+    assert watch.unedited()
+
+
+def _other(value: Any, kind: np.dtype[Any]) -> Any:
+    """Another value of the same kind."""
+    if kind.kind == "S":
+        return b"x" if value != b"x" else b"y"
+    return np.nextafter(value, np.inf, dtype=kind) if kind.kind == "f" else value ^ 1
+
+
+def _saved(model: Any) -> bytes:
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def _restore(model: Any, saved: bytes) -> None:
+    """Write all numbers of a saved model back."""
+    original = mujoco.MjModel.from_binary_path("m", {"m": saved})
+    for name in (*_ARRAYS,):
+        getattr(model, name)[...] = getattr(original, name)
+    for part in ("opt", "stat"):
+        for name in dir(getattr(model, part)):
+            if not name.startswith("_"):
+                value = getattr(getattr(original, part), name)
+                if isinstance(value, np.ndarray):
+                    getattr(getattr(model, part), name)[:] = value
+                else:
+                    setattr(getattr(model, part), name, value)

@@ -1,0 +1,116 @@
+"""A simulation that comes apart ends its own episode, and nobody else's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+import shapechanger
+from shapechanger.envs.vector import ThreadVectorEnv
+from tests.envs.vector.sameness import MODES, require_same
+
+
+@pytest.fixture(autouse=True)
+def log_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo writes its warnings into the present folder."""
+    monkeypatch.chdir(tmp_path)
+
+
+def _break(env: Any) -> None:
+    env.unwrapped.data.qvel[0] = 1e12
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", ["Ant", "Hopper", "InvertedPendulum"])
+def test_the_others_go_on(name: str, mode: str, threads: int) -> None:
+    """Env 1 of 3 diverges; the numbers of the others are those of a run where it does not."""
+    whole, broken = (
+        shapechanger.make_vec(name, 3, threads=threads, autoreset_mode=mode) for _ in range(2)
+    )
+    for envs in (whole, broken):
+        envs.reset(seed=0)
+    _break(broken.envs[1])
+    still = np.zeros(whole.action_space.shape, np.float32)
+    expected, found = whole.step(still), broken.step(still)
+    for one, other in zip(found[:4], expected[:4], strict=True):
+        require_same(one[[0, 2]], other[[0, 2]])
+    observations, rewards, terminated, _, infos = found
+    assert terminated.tolist() == [False, True, False]
+    assert rewards[1] == 0.0
+    assert np.isfinite(observations).all()
+    told = infos["final_info"] if mode == "SameStep" else infos
+    assert told["diverged"].tolist() == told["_diverged"].tolist() == [False, True, False]
+    if mode == "Disabled":
+        broken.reset(options={"reset_mask": terminated})
+    for _ in range(5):
+        *_, infos = broken.step(still)
+        assert "diverged" not in infos
+    for envs in (whole, broken):
+        envs.close()
+
+
+class _Uncertain(gym.Env[Any, Any]):
+    """Observes what is not finite in its second step, and does not say."""
+
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def __init__(self, terminates: bool) -> None:
+        self.terminates = terminates
+
+    def reset(self, *, seed: Any = None, options: Any = None) -> Any:
+        """Begin."""
+        self.steps = 0
+        return np.zeros(2), {}
+
+    def step(self, action: Any) -> Any:
+        """Go on."""
+        self.steps += 1
+        bad = self.steps == 2
+        return np.array([1.0, np.nan if bad else 1.0]), 1.0, bad and self.terminates, False, {}
+
+
+@pytest.mark.parametrize("terminates", [True, False])
+@pytest.mark.parametrize("mode", MODES)
+def test_an_observation_that_is_not_finite_ends_the_episode(mode: str, terminates: bool) -> None:
+    """The last observation reads 0 there, so that no learner takes it in."""
+    envs = ThreadVectorEnv(
+        [lambda: _Uncertain(terminates)] * 2, threads=2, autoreset_mode=AutoresetMode(mode)
+    )
+    envs.reset()
+    envs.step(np.zeros((2, 1)))
+    observations, rewards, terminated, _, infos = envs.step(np.zeros((2, 1)))
+    assert terminated.all()
+    assert rewards.tolist() == [0.0, 0.0]
+    if mode == "SameStep":
+        assert infos["final_info"]["diverged"].all()
+        assert [final.tolist() for final in infos["final_obs"]] == [[1.0, 0.0]] * 2
+        assert observations.tolist() == [[0.0, 0.0]] * 2
+    else:
+        assert infos["diverged"].all()
+        assert observations.tolist() == [[1.0, 0.0]] * 2
+    envs.close()
+
+
+def test_a_model_that_may_not_start_over_ends_too() -> None:
+    """Without MuJoCo's automatic reset the state itself is not finite."""
+    envs = shapechanger.make_vec("HalfCheetah", 2)
+    envs.envs[0].unwrapped.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    envs.reset(seed=0)
+    envs.envs[0].unwrapped.data.qvel[:] = 1e30
+    ended = False
+    for _ in range(3):
+        observations, rewards, terminated, _, infos = envs.step(np.zeros((2, 6)))
+        assert np.isfinite(observations).all()
+        assert np.isfinite(rewards).all()
+        ended = ended or (bool(terminated[0]) and bool(infos["diverged"][0]))
+        assert not terminated[1]
+    assert ended
+    envs.close()

@@ -1,0 +1,169 @@
+"""Making vector envs, and what they offer besides stepping."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
+
+import shapechanger
+from shapechanger.envs import CATALOGUE
+from shapechanger.envs.vector import ThreadVectorEnv, entry_points
+from shapechanger.morphology import Stretch
+from tests.envs.vector.sameness import require_same
+
+
+@pytest.mark.parametrize("env_id", CATALOGUE)
+def test_gymnasium_makes_ours(env_id: str) -> None:
+    """Both ways of making give the same, and the spec makes it again."""
+    ours = shapechanger.make_vec(env_id, 2, threads=1)
+    envs: list[Any] = [ours, gym.make_vec(env_id, num_envs=2, threads=1)]
+    envs += [gym.make_vec(one.spec) for one in envs]
+    expected = ours.reset(seed=1)
+    for one in envs:
+        assert isinstance(one, ThreadVectorEnv)
+        assert one.num_envs == 2
+        assert one.threads == 1
+        assert one.spec is not None
+        assert one.spec.id == env_id
+        assert one.spec.max_episode_steps == 1000
+        assert one.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+        require_same(one.reset(seed=1), expected)
+        one.close()
+
+
+def test_gymnasiums_own_are_still_there() -> None:
+    """Who asks for them gets them."""
+    envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2, vectorization_mode="sync")
+    assert isinstance(envs, gym.vector.SyncVectorEnv)
+    envs.close()
+
+
+def test_spaces_are_those_of_gymnasiums() -> None:
+    """Single and batched."""
+    ours = shapechanger.make_vec("Ant", 3)
+    theirs = gym.make_vec("shapechanger/Ant-v1", num_envs=3, vectorization_mode="sync")
+    for name in ("observation_space", "action_space"):
+        for whole in (name, f"single_{name}"):
+            assert getattr(ours, whole) == getattr(theirs, whole)
+    ours.close()
+    theirs.close()
+
+
+def test_a_spec_survives_json_with_its_vector_env() -> None:
+    """Its entry point is a string, which names the id."""
+    spec = gym.spec("shapechanger/BigAnt-v1")
+    again = gym.envs.registration.EnvSpec.from_json(spec.to_json())
+    assert again == spec
+    envs = gym.make_vec(again, num_envs=2)
+    assert len(envs.get_attr("body")[0]) == 1
+    envs.close()
+    assert not hasattr(entry_points, "_private")
+
+
+def test_each_env_may_have_a_body_of_its_own() -> None:
+    """Names, edits and JSON; their specs remember."""
+    bodies = [
+        "Ant",
+        "BigAnt",
+        Stretch("shank_1", 1.3),
+        '[{"edit":"cut","body":"shank_4","keep":0.5}]',
+    ]
+    for envs in (
+        shapechanger.make_vec("Ant", 4, bodies=bodies),
+        gym.make_vec("shapechanger/Ant-v1", num_envs=4, bodies=bodies),
+    ):
+        lengths = [
+            [model.geom_size[model.body(f"shank_{leg}").geomadr[0], 1] for leg in (1, 4)]
+            for model in envs.get_attr("model")
+        ]
+        plain = lengths[0][0]
+        parts = np.array(lengths) / plain
+        np.testing.assert_allclose(parts, [[1.0, 1.0], [2.0, 2.0], [1.3, 1.0], [1.0, 0.5]])
+        envs.close()
+
+
+def test_an_id_of_a_user_needs_no_entry_point() -> None:
+    """Any class of boxes may be stepped by threads."""
+    envs = shapechanger.make_vec("Hopper-v5", 2, threads=2)
+    observations, _ = envs.reset(seed=0)
+    assert observations.shape == (2, 11)
+    assert envs.spec is None
+    envs.close()
+
+
+@pytest.mark.parametrize("copy", [True, False])
+def test_observations_are_copies_if_asked_for(copy: bool) -> None:
+    """As Gymnasium's: a learner may keep them, or save the copying."""
+    envs = shapechanger.make_vec("InvertedPendulum", 2, copy=copy)
+    first, _ = envs.reset(seed=0)
+    before = first.copy()
+    second, *_ = envs.step(np.ones((2, 1), np.float32))
+    assert np.may_share_memory(first, second) is not copy
+    assert np.array_equal(first, before) is copy
+    envs.close()
+
+
+def test_attributes_and_methods_are_reached() -> None:
+    """Of each env its own; tuples."""
+    envs = shapechanger.make_vec("Ant", 2)
+    envs.reset(seed=0)
+    assert envs.get_attr("dt") == (0.05, 0.05)
+    assert len(envs.call("state_vector")) == 2
+    envs.set_attr("mood", ["good", "bad"])
+    assert envs.get_attr("mood") == ("good", "bad")
+    envs.set_attr("mood", "fair")
+    assert envs.get_attr("mood") == ("fair", "fair")
+    envs.close()
+
+
+def test_gymnasiums_vector_wrappers_fit() -> None:
+    """Statistics of episodes, and the same with rewards normalised."""
+    envs: Any = shapechanger.make_vec(
+        "InvertedPendulum", 2, max_episode_steps=4, autoreset_mode="SameStep"
+    )
+    envs = wrappers.NormalizeReward(wrappers.RecordEpisodeStatistics(envs))
+    envs.reset(seed=0)
+    for _ in range(4):
+        *_, infos = envs.step(np.zeros((2, 1), np.float32))
+    assert infos["episode"]["l"].tolist() == [4, 4]
+    envs.close()
+
+
+@pytest.mark.gl
+def test_frames_come_one_per_env(gl: None) -> None:
+    """Each shows its own body."""
+    envs = shapechanger.make_vec(
+        "Ant", 2, bodies=["Ant", "BigAnt"], render_mode="rgb_array", width=64, height=64
+    )
+    envs.reset(seed=0)
+    envs.step(np.zeros((2, 8), np.float32))
+    frames = envs.render()
+    assert [frame.shape for frame in frames] == [(64, 64, 3)] * 2
+    assert not np.array_equal(*frames)
+    envs.close()
+
+
+def test_the_envs_keep_their_specs() -> None:
+    """Each can be made again from its own, and pickled."""
+    envs = shapechanger.make_vec("Ant", 2, bodies=["Ant", "BigAnt"])
+    for env, edits in zip(envs.envs, (0, 1), strict=True):
+        assert env.spec is not None
+        with gym.make(env.spec) as again:
+            assert len(again.unwrapped.body) == edits
+        assert len(pickle.loads(pickle.dumps(env.unwrapped)).body) == edits
+    envs.close()
+
+
+def test_exporting_it_loads_no_simulator() -> None:
+    """Whoever imports the package for its layouts must not wait for MuJoCo."""
+    script = "import sys\nfrom shapechanger import make_vec\nprint('mujoco' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert run.stdout == "False\n"

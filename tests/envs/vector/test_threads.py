@@ -1,0 +1,237 @@
+"""Threads: what one raises reaches the caller, and none outlives what it was made for."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import shapechanger
+from shapechanger.envs.vector import ThreadVectorEnv
+from shapechanger.envs.vector.pool import Pool
+
+
+class _Plain(gym.Env[Any, Any]):
+    """Counts its steps, and raises in the one that it is told to."""
+
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def __init__(self, raises: BaseException | None = None) -> None:
+        self.raises = raises
+        self.steps = 0
+        self.thread: int | None = None
+
+    def reset(self, *, seed: Any = None, options: Any = None) -> Any:
+        """Begin."""
+        return np.zeros(1), {}
+
+    def step(self, action: Any) -> Any:
+        """Go on."""
+        self.thread = threading.get_ident()
+        if self.raises is not None:
+            raise self.raises
+        self.steps += 1
+        return np.full(1, float(self.steps)), 0.0, False, False, {}
+
+
+def _plain(raising: dict[int, BaseException], threads: int = 2) -> tuple[Any, list[_Plain]]:
+    members = [_Plain(raising.get(i)) for i in range(4)]
+    makers: list[Callable[[], _Plain]] = [lambda one=one: one for one in members]
+    envs = ThreadVectorEnv(makers, threads=threads)
+    envs.reset()
+    return envs, members
+
+
+def _ours() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "shapechanger-vector"]
+
+
+def _wait_until(condition: Callable[[], bool]) -> None:
+    until = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < until
+        threading.Event().wait(0.01)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 4])
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_an_error_names_its_env_and_the_others_finish(number: int, threads: int) -> None:
+    """Whichever thread it comes from; after that only a reset helps."""
+    envs, members = _plain({number: RuntimeError("it broke")}, threads)
+    with pytest.raises(RuntimeError, match="it broke") as caught:
+        envs.step(np.zeros((4, 1)))
+    assert caught.value.__notes__ == [f"This was raised by env {number} of the vector env."]
+    assert [one.steps for one in members] == [int(i != number) for i in range(4)]
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step(np.zeros((4, 1)))
+    members[number].raises = None
+    envs.reset()
+    envs.step(np.zeros((4, 1)))
+    envs.close()
+
+
+def test_of_several_errors_the_first_env_counts() -> None:
+    """As if they had been stepped one after another."""
+    envs, _ = _plain({1: RuntimeError("one"), 2: ValueError("two")})
+    with pytest.raises(RuntimeError, match="one"):
+        envs.step(np.zeros((4, 1)))
+    envs.close()
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_an_interruption_leaves_the_envs_usable(number: int) -> None:
+    """Ctrl-C in the caller's thread, or an env that asks to exit in another."""
+    envs, members = _plain({number: KeyboardInterrupt()})
+    with pytest.raises(KeyboardInterrupt):
+        envs.step(np.zeros((4, 1)))
+    members[number].raises = None
+    envs.reset()
+    *_, infos = envs.step(np.zeros((4, 1)))
+    assert infos == {}
+    envs.close()
+    assert _ours() == []
+
+
+def test_envs_stay_with_their_thread() -> None:
+    """Neighbours share one, and it is the same at every step."""
+    envs, members = _plain({})
+    seen: list[list[int | None]] = []
+    for _ in range(3):
+        envs.step(np.zeros((4, 1)))
+        seen.append([one.thread for one in members])
+    assert seen[0] == seen[1] == seen[2]
+    assert seen[0][:2] == [threading.get_ident()] * 2
+    assert seen[0][2] == seen[0][3] != threading.get_ident()
+    envs.close()
+
+
+@pytest.mark.parametrize(("asked", "started"), [(1, 0), (2, 1), (3, 2), (9, 2)])
+def test_there_are_as_many_threads_as_asked_for(asked: int, started: int) -> None:
+    """The caller's is one of them, and more than envs are none."""
+    envs = shapechanger.make_vec("InvertedPendulum", 3, threads=asked)
+    envs.reset(seed=0)
+    assert len(_ours()) == started
+    envs.close()
+    assert _ours() == []
+
+
+def test_who_forgets_to_close_leaves_no_threads() -> None:
+    """They end with the vector env."""
+    envs = shapechanger.make_vec("InvertedPendulum", 3, threads=2)
+    envs.reset(seed=0)
+    assert len(_ours()) == 1
+    del envs
+    gc.collect()
+    _wait_until(lambda: _ours() == [])
+
+
+def test_a_second_interruption_does_not_wait() -> None:
+    """A thread that never ends is left behind, and nothing touches its envs."""
+    pool, hold, working = Pool(2), threading.Event(), threading.Event()
+
+    def work() -> None:
+        working.set()
+        hold.wait()
+
+    def press_twice() -> None:
+        working.wait()
+        for _ in range(2):
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            threading.Event().wait(0.2)
+
+    presser = threading.Thread(target=press_twice)
+    presser.start()
+    with pytest.raises(KeyboardInterrupt):
+        pool.run([lambda: None, work])
+    presser.join()
+    assert pool.lost
+    hold.set()
+    _wait_until(lambda: _ours() == [])
+
+
+_SCRIPT = """
+import os, signal, sys, threading
+import numpy as np, shapechanger
+envs = shapechanger.make_vec("Ant", 8, threads=2)
+envs.reset(seed=0)
+actions = np.zeros((8, 8), np.float32)
+{body}
+"""
+
+
+def _run(body: str) -> subprocess.CompletedProcess[str]:
+    script = _SCRIPT.format(body=textwrap.dedent(body))
+    return subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_ctrl_c_at_any_moment_hangs_nothing() -> None:
+    """Thirty interruptions at random moments of steps; the envs step on after each."""
+    run = _run(
+        """
+        import random, time
+        random.seed(0)
+        main = threading.main_thread().ident
+        hits = 0
+        for _ in range(30):
+            wait = random.uniform(0.0, 0.01)
+            def press():
+                time.sleep(wait)
+                signal.pthread_kill(main, signal.SIGINT)
+            presser = threading.Thread(target=press)
+            try:
+                presser.start()
+                while True:
+                    envs.step(actions)
+            except KeyboardInterrupt:
+                hits += 1
+            presser.join()
+            assert not envs.closed
+            envs.reset()
+        envs.step(actions)
+        envs.close()
+        print(hits, threading.active_count())
+        """
+    )
+    assert (run.stdout, run.stderr) == ("30 1\n", "")
+
+
+@pytest.mark.parametrize(
+    "end",
+    ["sys.exit(0)", "pass", "del envs", "raise SystemExit(0)"],
+    ids=["exit", "end", "del", "raise"],
+)
+def test_a_program_ends_though_nobody_closes(end: str) -> None:
+    """No thread keeps the interpreter alive, and nothing is said."""
+    run = _run(f"envs.step(actions)\n{end}")
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="Nothing forks here.")
+def test_a_forked_process_steps_with_threads_of_its_own() -> None:
+    """Those of its parent are not in it."""
+    run = _run(
+        """
+        envs.step(actions)
+        child = os.fork()
+        if child == 0:
+            envs.step(actions)
+            print(threading.active_count(), flush=True)
+            os._exit(0)
+        os.waitpid(child, 0)
+        """
+    )
+    assert run.stdout == "2\n"

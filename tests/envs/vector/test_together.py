@@ -1,0 +1,227 @@
+"""Ants of a vector env are concluded together: the numbers are those of each alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import shapechanger
+from shapechanger.envs.ant import AntEnv
+from shapechanger.envs.stepping.tuned import TunedStep
+from shapechanger.envs.vector import ThreadVectorEnv
+from tests.envs.vector.sameness import MODES, play_side_by_side, random_bodies, require_same
+
+_ANT = "shapechanger/Ant-v1"
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast models are looked for at the first step; what is not looked for is not at fault."""
+    monkeypatch.setattr(TunedStep, "patience", 0)
+
+
+@pytest.fixture
+def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many ants were concluded together, each time."""
+    counts: list[int] = []
+    original: Any = AntEnv.conclude.__func__  # type: ignore[attr-defined]
+
+    def counting(cls: Any, envs: Any, *rest: Any) -> Any:
+        counts.append(len(envs))
+        return original(cls, envs, *rest)
+
+    monkeypatch.setattr(AntEnv, "conclude", classmethod(counting))
+    return counts
+
+
+def _pair(each: list[dict[str, Any]], threads: int = 1, mode: str = "NextStep") -> tuple[Any, Any]:
+    """Ours with fast models, and Gymnasium's over the same envs without."""
+    ours = ThreadVectorEnv(
+        [partial(gym.make, _ANT, **one) for one in each],
+        threads=threads,
+        autoreset_mode=AutoresetMode(mode),
+    )
+    theirs = SyncVectorEnv(
+        [partial(gym.make, _ANT, **{**one, "fast_model": False}) for one in each],
+        autoreset_mode=AutoresetMode(mode),
+    )
+    return ours, theirs
+
+
+def _close(*envs: Any) -> None:
+    for one in envs:
+        one.close()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("mode", MODES)
+def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[int]) -> None:
+    """Kinds are told apart, and ends do not disturb the others."""
+    kinds: list[dict[str, Any]] = [
+        *({"body": body} for body in random_bodies(_ANT, 3)),
+        {"healthy_reward": 0, "forward_reward_weight": 2, "ctrl_cost_weight": 3},
+        {"contact_force_range": (-5.0, 0.0), "terminate_when_unhealthy": False},
+        {"frame_skip": 2, "contact_cost_weight": 1e-2, "main_body": "shank_1"},
+        {"healthy_z_range": (0.3, 0.7)},
+        {"fast_model": False},
+    ]
+    ours, theirs = _pair([{"max_episode_steps": 40, **kind} for kind in kinds], threads, mode)
+    assert play_side_by_side(ours, theirs, 120, mode) > 10
+    assert max(concluded) >= 3 - threads // 2
+    _close(ours, theirs)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"exclude_current_positions_from_observation": False},
+        {"include_cfrc_ext_in_observation": False},
+    ],
+    ids=["place seen", "contacts unseen"],
+)
+def test_other_observations(arguments: dict[str, Any], concluded: list[int]) -> None:
+    """With a place, and without contacts."""
+    ours, theirs = _pair([arguments] * 4)
+    play_side_by_side(ours, theirs, 40, "NextStep")
+    assert max(concluded) == 4
+    _close(ours, theirs)
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.int64])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_precision_and_order_of_actions(kind: Any, order: Any) -> None:
+    """Costs are summed in the precision of the actions, wherever they lie in memory."""
+    ours, theirs = _pair([{}] * 5)
+    for envs in (ours, theirs):
+        envs.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        actions = np.array(rng.uniform(-3.0, 3.0, (5, 8)), kind, order=order)
+        require_same(ours.step(actions), theirs.step(actions))
+    _close(ours, theirs)
+
+
+def _lighter(model: Any) -> None:
+    model.body_mass[1] *= 0.5
+
+
+def _slower(model: Any) -> None:
+    model.opt.timestep = 0.005
+
+
+@pytest.mark.parametrize("edit", [_lighter, _slower])
+def test_an_edit_counts_from_the_next_reset_on(edit: Callable[[Any], None]) -> None:
+    """Of the env that it was made in, and until it is taken back."""
+    ours, theirs = _pair([{"terminate_when_unhealthy": False}] * 3, mode="Disabled")
+    for envs in (ours, theirs):
+        envs.reset(seed=0)
+    rng = np.random.default_rng(0)
+
+    def play() -> None:
+        for _ in range(8):
+            actions = rng.uniform(-1.0, 1.0, (3, 8)).astype(np.float32)
+            require_same(ours.step(actions), theirs.step(actions))
+
+    play()
+    middle = np.array([False, True, False])
+    fast = ours.envs[1].unwrapped._bound.stepping
+    model = ours.envs[1].unwrapped.model
+    mass, timestep = float(model.body_mass[1]), model.opt.timestep
+    for envs in (ours, theirs):
+        envs.reset(seed=1, options={"reset_mask": middle})
+        edit(envs.envs[1].unwrapped.model)  # After the reset, and before its first step.
+    play()
+    for envs in (ours, theirs):
+        envs.reset(seed=2, options={"reset_mask": middle})
+    play()
+    for envs in (ours, theirs):  # Taken back: noticed at once.
+        envs.envs[1].unwrapped.model.body_mass[1] = mass
+        envs.envs[1].unwrapped.model.opt.timestep = timestep
+    play()
+    assert ours.envs[1].unwrapped._bound.stepping is fast
+    # In the middle of an episode the compiled model goes on.
+    edit(ours.envs[1].unwrapped.model)
+    play()
+    edit(theirs.envs[1].unwrapped.model)
+    for envs in (ours, theirs):
+        envs.reset(seed=3)
+    play()
+    _close(ours, theirs)
+
+
+def test_another_model_in_its_place_is_stepped_at_once() -> None:
+    """Even in the middle of an episode."""
+    ours, theirs = _pair([{}] * 2)
+    for envs in (ours, theirs):
+        envs.reset(seed=0)
+        envs.step(np.zeros((2, 8), np.float32))
+        inner = envs.envs[0].unwrapped
+        inner.model = AntEnv("BigAnt").model
+        inner.data = mujoco.MjData(inner.model)
+        mujoco.mj_forward(inner.model, inner.data)
+    for _ in range(5):
+        actions = np.full((2, 8), 0.3, np.float32)
+        require_same(ours.step(actions), theirs.step(actions))
+    _close(ours, theirs)
+
+
+def test_who_overrides_the_step_is_asked() -> None:
+    """A class, or one env."""
+
+    class Generous(AntEnv):
+        def step(self, action: Any) -> Any:
+            observation, reward, *rest = super().step(action)
+            return (observation, reward + 1000.0, *rest)
+
+    plain = gym.make(_ANT).unwrapped
+    plain.step = lambda action: (np.zeros(105), 7.0, False, False, {})  # type: ignore[method-assign]
+    envs = ThreadVectorEnv([Generous, AntEnv, lambda: plain])
+    envs.reset(seed=0)
+    _, rewards, *_ = envs.step(np.zeros((3, 8), np.float32))
+    assert rewards[0] > 900.0 > rewards[1] != rewards[2] == 7.0
+    envs.close()
+
+
+def test_an_ant_that_diverges_among_others(
+    concluded: list[int], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is terminated, and the rest of its info is that of its own step."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log.
+    ours, alone = shapechanger.make_vec("Ant", 3, threads=1), gym.make(_ANT)
+    ours.reset(seed=[5, 6, 7])
+    alone.reset(seed=6)
+    for inner in (ours.envs[1].unwrapped, alone.unwrapped):
+        inner.data.qvel[0] = np.nan
+    _, rewards, terminated, _, infos = ours.step(np.zeros((3, 8), np.float32))
+    *_, expected = alone.step(np.zeros(8, np.float32))
+    assert concluded == [3]
+    assert (rewards[1], terminated.tolist()) == (0.0, [False, True, False])
+    for key, value in expected.items():
+        np.testing.assert_array_equal(infos[key][1], value)
+    _close(ours, alone)
+
+
+def test_what_an_ant_raises_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others finish their step."""
+    envs = shapechanger.make_vec("Ant", 4, threads=1)
+    envs.reset(seed=0)
+    envs.step(np.zeros((4, 8), np.float32))
+    times = [env.unwrapped.data.time for env in envs.envs]
+
+    def broken(action: Any) -> None:
+        raise RuntimeError("it broke")
+
+    monkeypatch.setattr(envs.envs[2].unwrapped._bound, "move", broken)
+    with pytest.raises(RuntimeError, match="it broke") as caught:
+        envs.step(np.zeros((4, 8), np.float32))
+    assert caught.value.__notes__ == ["This was raised by env 2 of the vector env."]
+    moved = [env.unwrapped.data.time > time for env, time in zip(envs.envs, times, strict=True)]
+    assert moved == [True, True, False, True]
+    envs.close()

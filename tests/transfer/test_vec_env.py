@@ -1,0 +1,100 @@
+"""The envs of a learner: Stable-Baselines3's `DummyVecEnv` to the last bit, and faster."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.wrappers import TimeLimit
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.vec_env import ThreadVecEnv, learner_envs
+from tests.envs.drawing import draws, missing
+from tests.envs.vector.sameness import require_same
+
+_PENDULUM = "shapechanger/InvertedPendulum-v1"
+
+
+def _pair(env_id: str, threads: int, **more: Any) -> tuple[Any, Any]:
+    ours = ThreadVecEnv(env_id, 3, threads=threads, **more)
+    return ours, DummyVecEnv([lambda: gym.make(env_id, **more)] * 3)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("env_id", [_PENDULUM, "shapechanger/Ant-v1", "shapechanger/Hopper-v1"])
+def test_the_numbers_are_those_of_sb3(env_id: str, threads: int) -> None:
+    """Observations, rewards, ends and infos, with ends of both kinds, under the monitor too."""
+    ours, theirs = (VecMonitor(one) for one in _pair(env_id, threads, max_episode_steps=60))
+    for one in (ours, theirs):
+        one.seed(5)
+    require_same(ours.reset(), theirs.reset())
+    require_same(ours.reset_infos, theirs.reset_infos)
+    rng, ended = np.random.default_rng(0), 0
+    space = ours.action_space
+    for _ in range(150):
+        actions = rng.uniform(space.low, space.high, (3, *space.shape)).astype(np.float32)
+        (found, expected) = (one.step(actions) for one in (ours, theirs))
+        for one in (found, expected):
+            for info in one[3]:
+                info.get("episode", {}).pop("t", None)  # The time on the wall.
+        require_same(found, expected)
+        require_same(ours.reset_infos, theirs.reset_infos)
+        ended += int(found[2].sum())
+    assert ended >= 6
+    ours.close()
+    theirs.close()
+    ours.close()
+
+
+def test_options_are_each_envs_own() -> None:
+    """And are used once."""
+    ours, theirs = _pair("shapechanger/Ant-v1", 2)
+    for one in (ours, theirs):
+        one.seed(1)
+        one.set_options([{"body": "BigAnt"}, {}, {"body": "AmputatedAnt"}])
+    require_same(ours.reset(), theirs.reset())
+    require_same(ours.get_attr("body"), theirs.get_attr("body"))
+    require_same(ours.reset()[1].shape, theirs.reset()[1].shape)
+    ours.close()
+    theirs.close()
+
+
+def test_envs_are_reached_one_by_one() -> None:
+    """As through SB3's."""
+    ours, theirs = _pair(_PENDULUM, 1)
+    for one in (ours, theirs):
+        one.set_attr("mood", "good", indices=[0, 2])
+        assert one.get_attr("mood", indices=2) == ["good"]
+        assert one.env_is_wrapped(TimeLimit) == [True] * 3
+        assert [len(state) for state in one.env_method("state_vector", indices=[1])] == [4]
+        assert one.render_mode is None
+    assert ours.metadata == theirs.metadata
+    ours.close()
+    theirs.close()
+
+
+@pytest.mark.gl
+def test_pictures_are_tiled() -> None:
+    """As SB3 shows them."""
+    if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
+        missing("Neither EGL nor OSMesa nor a display works here")
+    envs = ThreadVecEnv(_PENDULUM, 4, render_mode="rgb_array", width=32, height=32)
+    envs.reset()
+    picture = envs.render()
+    assert picture is not None
+    assert picture.shape == (64, 64, 3)
+    envs.close()
+
+
+def test_envs_of_strangers_are_stepped_by_sb3() -> None:
+    """They may share what they change."""
+    for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
+        envs = learner_envs(EnvRef(env_id), 2, 1)
+        assert isinstance(envs, kind)
+        envs.close()
+    envs = learner_envs(EnvRef(f"shapechanger:{_PENDULUM}", {"max_episode_steps": 3}), 2, None)
+    assert isinstance(envs, ThreadVecEnv)
+    envs.close()
