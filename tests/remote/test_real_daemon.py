@@ -114,14 +114,18 @@ def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) 
     seen, info = env.reset(seed=0)
     assert env.observation_space.contains(seen)
     assert info["armed"]
+    ages: list[float] = []
     for _ in range(5):
         seen, reward, terminated, truncated, info = env.step(np.array([0.25, 0.5], np.float32))
+        # Left out in a step whose observation left before the guard had obeyed.
+        ages += filter(None, [info["latency"].get("observation_age_at_action")])
         assert not terminated
         assert not truncated, info["truncated_because"]
         assert info["refused"] == ""
     assert info["action_applied"].tolist() == [0.25, 0.5]
     assert 0.0 < reward < 0.5
-    assert info["latency"]["observation_age_at_action"] > 0.0
+    assert ages
+    assert min(ages) > 0.0
     assert info["reward_sources"]["speed"] == "wheel"
     robot.sense(collision=1.0)
     for _ in range(20):

@@ -167,7 +167,7 @@ def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
 
 def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
     """A command that the robot did not act on has no way to the pins."""
-    robot = run()
+    robot = run(clock="real")
     env = made(robot)
     env.reset(seed=0)
     *_, info = env.step(AHEAD)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 from shapechanger.link.messages import Observation
 from shapechanger.remote.inbox import Received
@@ -13,7 +13,11 @@ _NS_PER_S: Final = 1e9
 
 
 def latencies(
-    answered: Observation, seq: int, sent_at: float, received: Received
+    answered: Observation,
+    seq: int,
+    sent_at: float,
+    received: Received,
+    clock: Literal["real", "twin"] = "real",
 ) -> dict[str, float]:
     """What can be said about the delays of a step, s; what cannot be measured is left out.
 
@@ -22,6 +26,7 @@ def latencies(
         seq: Number of the command.
         sent_at: When it was sent, s of this machine's clock.
         received: The observation after it.
+        clock: The robot's clock; a twin's seconds are not ours, so nothing is said of both.
 
     Returns:
         `capture_to_send`: from the picture to its departure, by the robot's clock. If the robot
@@ -35,7 +40,8 @@ def latencies(
         return known
     if seen.command_ns is not None:
         on_robot = (seen.sent_ns - seen.command_ns) / _NS_PER_S
-        known["round_trip"] = received.received_at - sent_at - on_robot
+        if clock == "real":
+            known["round_trip"] = received.received_at - sent_at - on_robot
         known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
     if seen.command_ns is not None and seen.applied_ns is not None:
         known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S

@@ -109,17 +109,24 @@ class Preparation:
                     "it on its page or with `shapechanger robot drive`, or give `reset_timeout_s`."
                 )
 
-    def play(self, robot: RobotClient) -> None:
-        """Run the reset routine of the robot's profile.
+    def require_routine(self, robot: RobotClient) -> None:
+        """Refuse a robot without a reset routine before anything moves.
 
         Raises:
-            RobotRefused: If it has none, or is disarmed meanwhile.
+            RobotRefused: If its profile has none.
         """
         if not robot.welcome.reset:
             raise RobotRefused(
                 f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
                 "to it, or let its operator put it back with on_reset='operator'."
             )
+
+    def play(self, robot: RobotClient) -> None:
+        """Run the reset routine of the robot's profile.
+
+        Raises:
+            RobotRefused: If it is disarmed meanwhile.
+        """
         for values, seconds in robot.welcome.reset:
             seen = robot.ask()
             end_ns = seen.message.state_ns + seconds * _NS_PER_S

@@ -191,13 +191,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if not self._client.alive:
             self._client = ready.connect(self._connect)
         robot = self._client
+        if self._on_reset == "routine":
+            ready.require_routine(robot)
         ready.take(robot)
+        # A hand that puts it back must not hold an armed robot, nor the last command act on; and
+        # whoever arms it then says by that that it is at the start.
+        if self._on_reset != "routine" and self._has_stepped:
+            ready.disarm(robot)
         if callable(self._on_reset):
             self._on_reset(seed)
-        elif self._on_reset == "operator" and self._has_stepped:
-            may_arm = self._role == "person" or robot.welcome.arming == "anyone"
-            if not may_arm:  # Whoever arms it says by that that it is at the start.
-                ready.disarm(robot)
         ready.arm(robot, self._role)
         if self._on_reset == "routine":
             ready.play(robot)
@@ -242,7 +244,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         info["reward_terms"] = terms
         info["events"] = tuple(event.text for event in events)
         info["refused"] = robot.refusal(seq)
-        info["latency"] = latencies(last.message, seq, sent_at, received)
+        clock = robot.welcome.clock
+        info["latency"] = latencies(last.message, seq, sent_at, received, clock)
         info["truncated_because"] = _interruption(received.message)
         self._last, self._last_view = received, view
         terminated = self._reward.ends(collided)

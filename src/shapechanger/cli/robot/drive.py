@@ -26,6 +26,7 @@ _HELP: Final = (
     "Q leaves"
 )
 _CAP_STEP: Final = 0.1
+_BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,11 @@ class _Driving:
                 if not self._take_keys(1.0 / self._robot.welcome.control_hz):
                     return
                 now_s = time.monotonic()
-                values = [self._keys.value(name, now_s) for name in self._actions.names]
+                values = [
+                    # What no key moves stays where it is, which need not be 0.
+                    self._keys.value(name, now_s) if name in _BY_KEYS else held / self._cap
+                    for name, held in zip(self._actions.names, seen.action_applied, strict=True)
+                ]
                 if seen.mine and seen.armed:
                     self._robot.command(values, answers=seq, scale=self._cap)
                 else:

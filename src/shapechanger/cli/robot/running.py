@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import signal
 import subprocess
@@ -24,6 +25,7 @@ from shapechanger.twin.operator import Operator
 __all__ = ["RunningRobot", "run_robot"]
 
 _READY: Final = "ready.json"
+_PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
 _LOOK_S: Final = 0.02
@@ -185,5 +187,14 @@ def run_robot(
             stderr=said,
             # So that Ctrl-C reaches whoever drives first, who then ends the robot.
             process_group=0,
+            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
     return RunningRobot(folder, supervisor)
+
+
+def _end_with_parent() -> None:
+    """Let the kernel end this process when whoever started it is gone, however that came.
+
+    A robot must not run on because a terminal was closed. The request outlives `exec`.
+    """
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
