@@ -325,6 +325,28 @@ def test_reset_waits_for_the_operator(run: Run) -> None:
     env.close()
 
 
+def test_a_hand_that_puts_it_back_finds_it_disarmed(run: Run) -> None:
+    """Nor does the last command of the episode before act on."""
+    robot = run()
+    disarmed: list[int] = []
+    env = made(robot, on_reset=lambda _: disarmed.append(len(robot.told(m.Disarm))))
+    env.reset(seed=0)
+    env.step(AHEAD)
+    env.reset(seed=0)
+    assert disarmed == [0, 1]
+    env.close()
+
+
+def test_no_round_trip_is_claimed_across_two_clocks(run: Run) -> None:
+    """A second of a twin's clock is none of ours."""
+    env = made(run(clock="twin"))
+    env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert "round_trip" not in info["latency"]
+    assert "command_to_pin" in info["latency"]
+    env.close()
+
+
 def test_reset_does_not_wait_for_ever(run: Run) -> None:
     """The message says what to do."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
@@ -365,10 +387,12 @@ def test_the_routine_of_the_profile_brings_it_back(run: Run) -> None:
 
 
 def test_a_routine_that_is_not_there_is_asked_for_in_words(run: Run) -> None:
-    """The message says how to get one."""
-    env = made(run(), on_reset="routine")
+    """The message says how to get one, and nothing was armed for it."""
+    robot = run()
+    env = made(robot, on_reset="routine")
     with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
         env.reset(seed=0)
+    assert not robot.told(m.Arm)
     env.close()
 
 

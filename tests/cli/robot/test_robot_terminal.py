@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from shapechanger.cli.robot.running import run_robot
 from shapechanger.remote.known import KnownRobot, remember
 from tests.cli.robot.typing import Person
+from tests.remote.robot import eventually
 from tests.robots import CAR, changed, write_profile
 
 SERVO = """\
@@ -95,6 +97,85 @@ def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             person.read_until("EMERGENCY STOP", read)
             person.press("q")
             assert person.end() == 0
+
+
+PLOUGH = """\
+[robot]
+name = "plough"
+body = "truck"
+
+[action.throttle]
+propels = true
+
+[action.blade]
+one_sided = true
+rest = 1.0
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = 22
+backward = 27
+mix = { throttle = 1.0 }
+
+[output.blade]
+driver = "servo"
+over = "lgpio"
+pin = 18
+mix = { blade = 1.0 }
+"""
+"""A truck whose blade is up at rest, and which no key moves."""
+
+
+def test_what_no_key_moves_stays_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A blade that is up at rest does not come down because somebody drives, whatever the cap."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path, PLOUGH)) as robot, robot.operator() as operator:
+        known = robot.known
+        remember(KnownRobot("plough", known.address, known.key, known.fingerprint))
+        operator.place(0)
+        start = operator.where().travelled_m
+        with (
+            Person(
+                ("robot", "drive", "plough", "--cap", "0.5"),
+                tmp_path,
+                {"XDG_CONFIG_HOME": str(tmp_path)},
+            ) as person,
+            robot.client(frames=False) as watcher,
+        ):
+            person.read_until("not armed")
+            person.press("e")
+            person.read_until(" armed · cap 0.5")
+            person.press("w")
+            person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
+            assert watcher.ask().message.action_applied[1] == pytest.approx(1.0)
+            person.press("q")
+            assert person.end() == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="The kernel's word that a parent died.")
+def test_a_command_that_is_killed_takes_its_robot_along(tmp_path: Path) -> None:
+    """A closed terminal must not leave a robot behind that somebody has armed."""
+    profile = write_profile(tmp_path, MOTOR)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        person.read_until("begins to move")
+        # The supervisor, and below it guard and daemon.
+        person.wait_for(lambda: len(_below(person.process.pid)) >= 3)
+        robot = _below(person.process.pid)
+        person.process.kill()
+        person.process.wait(20.0)
+    eventually(lambda: not any(Path(f"/proc/{pid}").exists() for pid in robot))
+
+
+def _below(pid: int) -> list[int]:
+    """All processes that a process has started, and those that these have."""
+    try:
+        told = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except FileNotFoundError:
+        return []
+    return [one for child in map(int, told) for one in (child, *_below(child))]
 
 
 def test_calibrating_a_servo(tmp_path: Path) -> None:

@@ -139,8 +139,7 @@ def test_without_pictures_observations_come_once_a_period(
             first = await client.observe()
             for _ in range(10):
                 last = await client.observe()
-            # The first may have been a little late, which the next one makes up for.
-            assert last.sent_ns - first.sent_ns >= 0.95 * 9 * 20_000_000
+            assert last.sent_ns - first.sent_ns >= 0.95 * 10 * 20_000_000
 
     play(script, monkeypatch, car_plan(control_hz=50.0, camera=None))
 
