@@ -124,7 +124,7 @@ def test_help(run: Run, command: str) -> None:
         ("calibrate car", "`shapechanger robot init car` writes one of your own"),
         ("calibrate test-car.toml --cap 2", "The cap is above 0"),
         ("calibrate test-car.toml --twin", "needs a terminal"),
-        ("drive nobody", "needs a terminal"),
+        ("drive nobody", "No known robot matches 'nobody'"),
         ("drive nobody --cap 0", "The cap is above 0"),
         ("forget nobody", "No known robot matches 'nobody'"),
         ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),

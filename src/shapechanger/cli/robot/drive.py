@@ -47,9 +47,10 @@ class Drive:
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
+        known = recall(self.robot)
         with (
             Terminal() as terminal,
-            RobotClient.connect(recall(self.robot), role="person", frames=False) as robot,
+            RobotClient.connect(known, role="person", frames=False) as robot,
         ):
             actions = Layout.from_json(robot.welcome.action_layout)
             if "throttle" not in actions:
