@@ -10,6 +10,7 @@ ShapechangerError
 ├── SpaceMismatch (ValueError)      two spaces that differ where they must not
 ├── BadAction (ValueError)          an action that an env cannot take
 ├── VectorEnvError (ValueError)     a vector env that cannot be made as it was asked for
+├── WorldError (ValueError)         a world that cannot be laid out as it was asked for
 ├── MapError (ValueError)           a body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    a policy whose weights cannot be moved
 ├── StudyError (ValueError)         a study that cannot start
@@ -58,6 +59,7 @@ __all__ = [
     "TransplantError",
     "UnknownName",
     "VectorEnvError",
+    "WorldError",
 ]
 
 # A model of a humanoid has some forty names; a longer list hides the sentence it belongs to.
@@ -116,6 +118,10 @@ class BadAction(ShapechangerError, ValueError):
 
 class VectorEnvError(ShapechangerError, ValueError):
     """A vector env that cannot be made, or reset, as it was asked for."""
+
+
+class WorldError(ShapechangerError, ValueError):
+    """A world to drive in that cannot be laid out as it was asked for."""
 
 
 class MapError(ShapechangerError, ValueError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+import traceback
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -117,6 +118,42 @@ def test_nobody_there_is_said_at_once(run: Run, credentials: object) -> None:
         known = robot.known
     with pytest.raises(LinkError, match="shapechanger robot serve"):
         RobotClient.connect(known)
+
+
+def test_a_program_that_finds_nobody_sees_one_error(run: Run, credentials: object) -> None:
+    """In our words alone: no chain of the socket's errors, no calls of another thread."""
+    robot = Robot()
+    with robot.running(credentials):  # type: ignore[arg-type]
+        known = robot.known
+    with pytest.raises(LinkError, match="Connect call failed") as refused:
+        RobotClient.connect(known)
+    shown = "".join(traceback.format_exception(refused.value))
+    assert shown.count("Traceback") == 1
+    assert "aiohttp" not in shown
+    assert "asyncio" not in shown
+
+
+def test_a_question_that_fails_is_one_error(run: Run, connect: Connect) -> None:
+    """Also where the link is lost between question and answer."""
+    robot = run(delay_s=60.0)
+    client = connect(robot, timeout_s=30.0)
+    threading.Thread(
+        target=lambda: (eventually(lambda: bool(robot.told(m.Take))), robot.cut())
+    ).start()
+    with pytest.raises(LinkError, match="lost") as refused:
+        client.take()
+    assert "".join(traceback.format_exception(refused.value)).count("Traceback") == 1
+
+
+def test_a_client_that_is_abandoned_gives_the_robot_back(run: Run, connect: Connect) -> None:
+    """Without waiting for anything, and twice does nothing more."""
+    robot = run()
+    client = connect(robot)
+    client.take()
+    client.abandon()
+    eventually(lambda: bool(robot.told(m.Release)) and not client.alive)
+    client.abandon()
+    assert len(robot.told(m.Release)) == 1
 
 
 def test_without_tls_only_what_was_typed_connects(run: Run) -> None:

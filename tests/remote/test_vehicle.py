@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import logging
 import time
 from collections.abc import Callable
 from functools import partial
@@ -317,7 +319,9 @@ def test_reset_waits_for_the_operator(run: Run) -> None:
     env = made(robot, on_waiting=told, reset_timeout_s=20.0)
     _, info = env.reset(seed=0)
     assert info["armed"]
-    assert said == ["tin waits for its operator: put it at the start and arm it."]
+    assert len(said) == 1
+    assert said[0].startswith("tin waits for its operator: put it at the start and arm it: ")
+    assert "`shapechanger robot drive tin` in another terminal, and there P" in said[0]
     env.step(AHEAD)
     env.reset(seed=0)
     assert robot.told(m.Disarm)  # So that the operator can pick it up.
@@ -352,6 +356,52 @@ def test_reset_does_not_wait_for_ever(run: Run) -> None:
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused, match=r"was not armed within 0 s.*shapechanger robot drive"):
         env.reset(seed=0)
+    env.close()
+
+
+def test_a_reset_that_nobody_is_told_of_says_what_it_waits_for(
+    run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Once for each thing, in the log, with the command and the key that help."""
+    monkeypatch.setattr("shapechanger.remote.operator._TOLD_AFTER_S", 0.0)
+    robot = run(arming="person")
+    remember(robot.known)
+    env = gym.make(ID, robot="tin", pace="lockstep", reset_timeout_s=0.3)
+    with (
+        caplog.at_level(logging.WARNING, "shapechanger.remote"),
+        pytest.raises(RobotRefused, match="To arm it, `shapechanger robot drive tin`"),
+    ):
+        env.reset(seed=0)
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert "tin waits for its operator" in said
+    assert "Waiting for up to 0 s more" in said
+    env.close()
+
+
+def test_a_short_wait_is_not_worth_a_warning(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    """What is over within two seconds is said to nobody."""
+    env = made(run(arming="person"), reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused):
+        env.reset(seed=0)
+    assert not caplog.records
+    env.close()
+
+
+def test_a_robot_that_a_person_has_armed_for_themselves_is_waited_for(run: Run) -> None:
+    """Armed is not enough: it must be ours too."""
+    robot = run(arming="person")
+    said: list[str] = []
+
+    def told(sentence: str) -> None:
+        said.append(sentence)
+        # First a person takes it and arms it; then they give it back.
+        robot.held_by = "Grace" if len(said) == 1 else ""
+        robot.armed = True
+
+    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    env.reset(seed=0)
+    assert said[1:] == ["Grace commands."]
+    assert not env.step(AHEAD)[3]
     env.close()
 
 
@@ -420,6 +470,12 @@ def test_steps_last_a_control_period(run: Run) -> None:
     env.close()
 
 
+def test_a_twins_clock_is_driven_in_lockstep_only(run: Run) -> None:
+    """Its time moves with each observation, so that commands in real time are always too old."""
+    with pytest.raises(RobotRefused, match="pass pace='lockstep'"):
+        RemoteVehicleEnv(**run(clock="twin").arguments)
+
+
 def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
     """Tendons pull and do not push; without a camera the observation is the state."""
     robot = run(
@@ -479,6 +535,17 @@ def test_closing_gives_the_robot_back(run: Run) -> None:
     eventually(lambda: len(robot.told(m.Release)) == 1)
 
 
+def test_an_env_that_is_dropped_gives_the_robot_back(run: Run) -> None:
+    """A notebook that makes a second env must find the robot free."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    del env
+    gc.collect()
+    eventually(lambda: len(robot.told(m.Release)) == 1)
+    made(robot).close()
+
+
 def test_four_keys_drive_as_in_2017(run: Run) -> None:
     """The columns of labels.csv in their order; a key that steers does not drive."""
     env = FourWay(made(run()), throttle=0.6, steering=0.4)
@@ -500,4 +567,13 @@ def test_four_keys_drive_nothing_else(run: Run) -> None:
     env = made(run(actions=(THROTTLE,)))
     with pytest.raises(SpaceMismatch, match="steering, throttle"):
         FourWay(env)
+    env.close()
+
+
+@pytest.mark.parametrize("key", [4, -1, 1.5, "forward", [0.0, 1.0], None])
+def test_a_key_that_is_none_is_refused_in_words(run: Run, key: Any) -> None:
+    """The message says which keys there are."""
+    env = FourWay(made(run()))
+    with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
+        env.action(key)
     env.close()

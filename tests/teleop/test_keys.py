@@ -82,3 +82,35 @@ def test_keys_come_singly_and_the_terminal_is_put_back(monkeypatch: pytest.Monke
             assert terminal.keys(5.0) == ["w", "up"]
         assert termios.tcgetattr(theirs) == before
     os.close(ours)
+
+
+def test_a_held_key_goes_on_a_little_when_another_one_is_pressed() -> None:
+    """A terminal stops repeating W as soon as A goes down, though both are held."""
+    keys = HeldKeys()
+    for n in range(30):
+        keys.press("w", 0.03 * n)
+    last = 0.03 * 29
+    keys.press("a", last + 0.02)
+    assert keys.value("steering", last + 0.1) == -1.0
+    assert keys.value("throttle", last + FIRST_HOLD_S) == 1.0
+
+
+def test_no_key_outlives_its_last_press_because_another_one_is_held() -> None:
+    """Whoever lets W go and holds A stands after the time that one press of W holds."""
+    keys = HeldKeys()
+    for n in range(30):
+        keys.press("w", 0.03 * n)
+    last = 0.03 * 29
+    for n in range(60):
+        keys.press("a", last + 0.02 + 0.03 * n)
+    assert keys.value("throttle", last + FIRST_HOLD_S + 1e-6) == 0.0
+
+
+def test_a_key_that_has_ended_is_not_brought_back_by_another_one() -> None:
+    """Steering alone drives nowhere."""
+    keys = HeldKeys()
+    keys.press("w", 0.0)
+    keys.press("w", 0.5)
+    assert keys.value("throttle", 0.5 + 1.1 * REPEAT_HOLD_S) == 0.0
+    keys.press("a", 0.5 + 1.2 * REPEAT_HOLD_S)
+    assert keys.value("throttle", 0.5 + 1.2 * REPEAT_HOLD_S) == 0.0

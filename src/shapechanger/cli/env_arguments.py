@@ -9,8 +9,8 @@ from typing import Any, Final
 import gymnasium as gym
 
 from shapechanger.envs.catalogue import CATALOGUE, find
-from shapechanger.envs.headless import require_known_gl
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
+from shapechanger.headless import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["asked", "default_learner", "env_ref", "opened", "require_seed"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 import gymnasium as gym
@@ -9,12 +11,31 @@ import msgspec
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["CATALOGUE", "NAMESPACE", "REMOTE_VEHICLE", "Entry", "find", "register_all"]
+__all__ = [
+    "CATALOGUE",
+    "NAMESPACE",
+    "REMOTE_VEHICLE",
+    "VEHICLE_ENVS",
+    "Entry",
+    "find",
+    "register_all",
+]
 
 NAMESPACE: Final = "shapechanger"
 
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 """Id of the env of a robot on the network; its body is whatever answers, so it is no `Entry`."""
+
+
+VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        "shapechanger/Car-v1": ("car", "front wheels that steer, in a corridor"),
+        "shapechanger/Tank-v1": ("tank", "two tracks, in a corridor"),
+        "shapechanger/Truck-v1": ("truck", "front wheels that steer and a trailer, in a yard"),
+        "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
+    }
+)
+"""Vehicle and summary by id: one task, of which no body is a variant of another."""
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -145,6 +166,14 @@ def register_all() -> None:
                 order_enforce=entry.family not in _TUNED,
                 disable_env_checker=entry.family in _TUNED,
                 kwargs={"body": entry.body} if entry.body else {},
+            )
+    for env_id, (vehicle, _) in VEHICLE_ENVS.items():
+        if env_id not in gym.registry:
+            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+                env_id,
+                "shapechanger.envs.vehicle:VehicleEnv",
+                max_episode_steps=_EPISODE_STEPS,
+                kwargs={"vehicle": vehicle},
             )
     if REMOTE_VEHICLE not in gym.registry:
         gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.headless import choose_gl
 from shapechanger.envs.renderer import Renderer
 from shapechanger.errors import RenderError
+from shapechanger.headless import choose_gl
 
 __all__ = ["body_reach", "draw"]
 

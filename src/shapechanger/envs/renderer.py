@@ -11,8 +11,8 @@ from typing import Any, Final, cast
 import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
 
-from shapechanger.envs.headless import require_context
 from shapechanger.errors import RenderError
+from shapechanger.headless import require_context
 
 __all__ = ["Renderer"]
 

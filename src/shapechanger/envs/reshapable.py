@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.headless import choose_gl, require_screen
 from shapechanger.errors import MissingExtra, SpaceMismatch
+from shapechanger.headless import choose_gl, require_screen
 
 try:
     import mujoco

@@ -40,6 +40,6 @@ def parse_fingerprint(text: str) -> bytes:
     if not re.fullmatch(r"[0-9a-fA-F]{64}", digits):
         raise LinkError(
             f"A fingerprint has 64 hexadecimal digits; {text!r} is none. "
-            "`shapechanger robot serve` shows it on the robot."
+            "`shapechanger robot key NAME` shows it on the robot."
         )
     return bytes.fromhex(digits)

@@ -47,8 +47,8 @@ def parse_key(text: str) -> bytes:
         )
     try:
         key = base64.b32decode(plain + "=" * (-len(plain) % 8))
-    except ValueError as error:
-        raise LinkError("A key has only the letters A to Z and the numbers 2 to 7.") from error
+    except ValueError:
+        raise LinkError("A key has only the letters A to Z and the numbers 2 to 7.") from None
     if base64.b32encode(key).decode().rstrip("=") != plain:
         raise LinkError("This key has a wrong last letter.")
     return key

@@ -62,6 +62,11 @@ def _own_name() -> str:
     return f"{user}@{socket.gethostname()}"[:64]
 
 
+def _here(failure: LinkError) -> LinkError:
+    """The same failure without the calls of the thread that met it, which help nobody."""
+    return type(failure)(*failure.args)
+
+
 class RobotClient:
     """A connection to a robot, kept by one thread of its own.
 
@@ -98,6 +103,9 @@ class RobotClient:
         self._thread.start()
         try:
             self._welcome = self._ready.result()
+        except LinkError as failure:
+            self.close()
+            raise _here(failure) from None
         except BaseException:  # Ctrl-C too: no thread stays behind.
             self.close()
             raise
@@ -325,6 +333,19 @@ class RobotClient:
                 loop.call_soon_threadsafe(self._stop.set)
         self._thread.join()
 
+    def abandon(self) -> None:
+        """As `release` and `close`, but without waiting for anything or taking a lock.
+
+        For whoever is dropped without being closed: the garbage collector may call this in any
+        thread, in this connection's own too.
+        """
+        loop, made = self._loop, self._connection
+        if self._process != os.getpid() or loop is None or made is None:
+            return
+        with contextlib.suppress(RuntimeError):  # It has ended already.
+            loop.call_soon_threadsafe(made.post, messages.Release())
+            loop.call_soon_threadsafe(self._stop.set)
+
     def __enter__(self) -> Self:
         """The client itself."""
         return self
@@ -342,7 +363,7 @@ class RobotClient:
         if self._process != os.getpid():
             raise LinkError("This connection belongs to another process: make one in this one.")
         if self._failure is not None:
-            raise type(self._failure)(*self._failure.args)
+            raise _here(self._failure)
 
     def _post(self, message: ClientMessage) -> None:
         self._require_alive()
@@ -350,9 +371,9 @@ class RobotClient:
             raise LinkError("The connection is not made yet.")
         try:
             self._loop.call_soon_threadsafe(self._connection.post, message)
-        except RuntimeError as error:  # The loop ended since.
-            self._require_alive()
-            raise LinkError("The link to the robot is lost.") from error
+        except RuntimeError:  # The loop ended since.
+            failure = self._failure or LinkError("The link to the robot is lost.")
+            raise _here(failure) from None
 
     def _ask(
         self, message: ClientMessage, kind: type[RobotMessage], timeout_s: float | None = None
@@ -363,9 +384,11 @@ class RobotClient:
         try:
             self._post(message)
             return question.answer.result(self._limit(timeout_s))
-        except FutureTimeout as error:
+        except FutureTimeout:
             asked = type(message).__name__
-            raise LinkError(f"The robot did not answer to {asked!r} in time.") from error
+            raise LinkError(f"The robot did not answer to {asked!r} in time.") from None
+        except LinkError as failure:
+            raise _here(failure) from None
         finally:
             self._forget(question)
 

@@ -132,7 +132,7 @@ class Connection:
             try:
                 await self._line.send_bytes(messages.encode(message))
             except (ConnectionError, aiohttp.ClientError) as error:
-                raise _lost(str(error) or "the line broke") from error
+                raise _lost(str(error) or "the line broke") from None
 
     async def _watch(self) -> None:
         """End a link that is silent: a radio that dies says no goodbye."""
@@ -184,28 +184,30 @@ async def connection(access: Access) -> AsyncGenerator[Connection]:
             welcome = await _welcomed(line, access)
             limit.reschedule(None)
             yield Connection(line, welcome, access)
-    except TimeoutError as error:
+    # What went wrong below is in our words: a program sees one error, and no chain of them.
+    except TimeoutError:
         raise LinkError(
             f"The robot at {access.address} did not answer within {access.timeout_s:.1f} s: is it "
             "on, and in this network?"
-        ) from error
+        ) from None
     except aiohttp.ServerFingerprintMismatch as error:
         raise RobotRefused(
             f"{access.address} shows the fingerprint\n  {fingerprint_hex(error.got)}\nand not\n"
             f"  {fingerprint_hex(error.expected)}\nEither the robot was set up anew, or somebody "
-            "stands in between. Compare it with the one on the robot before you trust it."
-        ) from error
+            "stands in between. Compare it with the one that `shapechanger robot key NAME` shows "
+            "on the robot before you trust it."
+        ) from None
     except aiohttp.WSServerHandshakeError as error:
         raise LinkError(
             f"What answers at {access.address} is no robot of this kind: {error.message}."
-        ) from error
+        ) from None
     except (aiohttp.ClientError, OSError) as error:
         if isinstance(error, LinkError):
             raise
         raise LinkError(
             f"No robot answers at {access.address} ({error}): is it on, and does "
             "`shapechanger robot serve` run on it?"
-        ) from error
+        ) from None
     finally:
         # Without the farewell of TLS, which a dead line never answers.
         for each in sockets:

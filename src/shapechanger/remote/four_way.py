@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+from contextlib import suppress
 from typing import Any, Final
 
 import gymnasium as gym
@@ -57,5 +59,15 @@ class FourWay(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
         )
 
     def action(self, action: np.int64 | int) -> NDArray[np.float32]:
-        """[steering, throttle] of a key, see `FOUR_WAYS`."""
-        return self._actions[int(action)].copy()
+        """[steering, throttle] of a key, see `FOUR_WAYS`.
+
+        Raises:
+            SpaceMismatch: If it is the number of no key.
+        """
+        key = -1
+        with suppress(TypeError):  # Neither 1.5 nor a list nor text is a whole number.
+            key = operator.index(action)
+        if not 0 <= key < len(FOUR_WAYS):
+            keys = ", ".join(f"{number} ({way})" for number, way in enumerate(FOUR_WAYS))
+            raise SpaceMismatch(f"The four keys are {keys}; got {action!r}.")
+        return self._actions[key].copy()

@@ -116,7 +116,7 @@ def remember(robot: KnownRobot) -> Path:
     except OSError as error:
         if written is not None:
             written.unlink(missing_ok=True)
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from None
     return path
 
 
@@ -135,7 +135,7 @@ def recall(name: str) -> KnownRobot:
     try:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise LinkError(f"{path} cannot be read: {error}.") from error
+        raise LinkError(f"{path} cannot be read: {error}.") from None
     if set(told) != set(_FIELDS) or not all(isinstance(value, str) for value in told.values()):
         raise LinkError(f"{path} must hold {', '.join(_FIELDS)}, each a text.")
     return KnownRobot(name, **told)

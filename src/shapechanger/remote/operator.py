@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from typing import Final
@@ -14,7 +15,13 @@ __all__ = ["Preparation"]
 
 # s. How often to look whether a person has done something.
 _LOOK_EVERY_S: Final = 0.05
+# s. A wait that nobody is told of is said in the log when it is no short one any more.
+_TOLD_AFTER_S: Final = 2.0
 _NS_PER_S: Final = 1e9
+
+_HAND_OVER: Final = "P in `shapechanger robot drive` lets a waiting program drive."
+
+_log = logging.getLogger(__name__)
 
 
 class Preparation:
@@ -22,8 +29,10 @@ class Preparation:
 
     Args:
         timeout_s: How long, s.
-        on_waiting: Is told in a sentence what is waited for, once for each thing.
+        on_waiting: Is told in a sentence what is waited for, once for each thing; None for a
+            warning in the log of each thing that is waited for after 2 s.
         clock: The time, s; never runs backwards.
+        called: Name under which the robot is known here; empty for none.
     """
 
     def __init__(
@@ -31,11 +40,14 @@ class Preparation:
         timeout_s: float,
         on_waiting: Callable[[str], object] | None,
         clock: Callable[[], float],
+        called: str = "",
     ) -> None:
         self._timeout_s = timeout_s
         self._on_waiting = on_waiting
         self._clock = clock
-        self._until = clock() + timeout_s
+        self._called = called
+        self._since = clock()
+        self._until = self._since + timeout_s
         self._told: set[str] = set()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
@@ -54,7 +66,7 @@ class Preparation:
                 if not self._wait("The robot does not answer."):
                     raise LinkError(
                         f"{error} This was tried for {self._timeout_s:.0f} s."
-                    ) from error
+                    ) from None
 
     def take(self, robot: RobotClient) -> None:
         """Become the one who commands, when whoever does it now is done.
@@ -66,7 +78,7 @@ class Preparation:
             try:
                 robot.take()
             except RobotRefused as refusal:
-                if not self._wait(str(refusal)):
+                if not self._wait(str(refusal), _HAND_OVER):
                     raise
             else:
                 return
@@ -83,17 +95,22 @@ class Preparation:
                 raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
 
     def arm(self, robot: RobotClient, role: str) -> None:
-        """Arm the robot where we may, or wait until a person has.
+        """Arm the robot where we may, or wait until a person has; then it is still ours.
 
         Raises:
             RobotRefused: If nobody does in time.
         """
         name = robot.welcome.robot
         because = "It waits for a person"
-        waits_for = f"{name} waits for its operator: put it at the start and arm it."
+        how = self._how_to_arm(name)
+        waits_for = f"{name} waits for its operator: put it at the start and arm it: {how}."
         while True:
             seen = robot.ask().message
-            if seen.armed and not seen.emergency:
+            if not seen.mine and self._clock() <= self._until:
+                # A person has it, who gives it back to arm it for us.
+                self.take(robot)
+                continue
+            if seen.mine and seen.armed and not seen.emergency:
                 return
             if role == "person" or (robot.welcome.arming == "anyone" and not seen.emergency):
                 try:
@@ -105,9 +122,17 @@ class Preparation:
             if not self._wait(waits_for):
                 stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
                 raise RobotRefused(
-                    f"{name} was not armed within {self._timeout_s:.0f} s. {because}{stopped}: arm "
-                    "it on its page or with `shapechanger robot drive`, or give `reset_timeout_s`."
+                    f"{name} was not armed within {self._timeout_s:.0f} s. {because}{stopped}. "
+                    f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
                 )
+
+    def _how_to_arm(self, name: str) -> str:
+        """What a person does to arm the robot for a program."""
+        first = "" if self._called else f"`shapechanger robot remember {name} …` once, then "
+        return (
+            f"{first}`shapechanger robot drive {self._called or name}` in another terminal, and "
+            "there P, which arms it for the program"
+        )
 
     def require_routine(self, robot: RobotClient) -> None:
         """Refuse a robot without a reset routine before anything moves.
@@ -162,11 +187,22 @@ class Preparation:
             seen = robot.exchange(rest, seen) if robot.pace == "lockstep" else robot.ask()
         return seen
 
-    def _wait(self, sentence: str) -> bool:
-        """Wait a moment; whether there is still time."""
-        if self._on_waiting is not None and sentence not in self._told:
-            self._on_waiting(sentence)
-        self._told.add(sentence)
+    def _wait(self, sentence: str, hint: str = "") -> bool:
+        """Wait a moment; whether there is still time.
+
+        Args:
+            sentence: What is waited for.
+            hint: What a person may do about it, for the log.
+        """
+        now = self._clock()
+        if sentence not in self._told and (self._on_waiting or now - self._since > _TOLD_AFTER_S):
+            self._told.add(sentence)
+            if self._on_waiting is not None:
+                self._on_waiting(sentence)
+            else:
+                words = f"{sentence} {hint}".rstrip()
+                left_s = max(0.0, self._until - now)
+                _log.warning("%s (Waiting for up to %.0f s more.)", words, left_s)
         if self._clock() > self._until:
             return False
         time.sleep(_LOOK_EVERY_S)

@@ -32,7 +32,7 @@ def decoded(jpeg: bytes) -> NDArray[np.uint8]:
             raise LinkError(f"A picture of {width} x {height} pixels is too large.")
         return simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
     except ValueError as error:
-        raise LinkError(f"The robot sent bytes that are no JPEG: {error}.") from error
+        raise LinkError(f"The robot sent bytes that are no JPEG: {error}.") from None
 
 
 def resized(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

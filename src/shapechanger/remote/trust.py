@@ -38,7 +38,7 @@ def shown_fingerprint(address: Address, timeout_s: float) -> bytes:
     try:
         shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
     except OSError as error:
-        raise LinkError(f"Nobody shows a certificate at {address}: {error}.") from error
+        raise LinkError(f"Nobody shows a certificate at {address}: {error}.") from None
     return fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
 
 
@@ -53,6 +53,6 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
     return LinkError(
         f"Nothing says that the robot at {address} is yours. It shows the fingerprint\n"
         f"  {digits}  (in short {fingerprint_short(shown)})\n"
-        "Compare it with the one that `shapechanger robot serve` shows on the robot. If they are "
-        f"the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
+        "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
+        f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
     )

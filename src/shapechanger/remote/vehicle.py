@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
@@ -10,11 +11,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import LinkError, RenderError, UnknownName
+from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation, Pace, Role, Welcome
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
+from shapechanger.remote.judge import BUMP, Judge
 from shapechanger.remote.known import KnownRobot, known_names, recall
 from shapechanger.remote.latency import frame_age_s, latencies
 from shapechanger.remote.operator import Preparation
@@ -27,12 +29,8 @@ __all__ = ["OnReset", "RemoteVehicleEnv"]
 OnReset = Literal["operator", "routine"] | Callable[[int | None], object]
 """Who brings the robot to the start."""
 
-_NS_PER_S: Final = 1e9
 # s. How long a robot that waits for us, and so never hurries, may take for a step.
 _LOCKSTEP_S: Final = 10.0
-# Name of the event of a bump.
-_BUMP: Final = "bump"
-_QUANTITIES: Final = ("speed", "collision", "stall")
 
 
 class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
@@ -83,7 +81,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         reward: Weights that replace those of the robot's profile, by name.
         on_reset: "operator": a person puts the robot back and arms it; where anyone may, it is
             armed at once. "routine": the commands of the profile. Or what to call with the seed.
-        on_waiting: Is told in a sentence what a reset waits for.
+        on_waiting: Is told in a sentence what a reset waits for; None for a warning in the log of
+            `shapechanger.remote.operator` once it waits for 2 s.
         reset_timeout_s: How long a reset may wait, s.
         max_observation_age_s: How long a step may wait for an observation, s; None for as long as
             the robot takes an answer to one.
@@ -95,7 +94,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     Raises:
         UnknownName: If no robot of this name is known, or no weight or way to reset.
         LinkError: If the robot cannot be reached, or is not trusted.
-        RobotRefused: If it does not want us.
+        RobotRefused: If it does not want us, or its time moves in steps and the pace is "realtime".
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # Gymnasium's.
@@ -140,7 +139,13 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             welcome = self._client.welcome
             wide, high = size
             self._senses = Senses(welcome, (int(wide), int(high)), image, state)
-            self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {})})
+            weights = DriveReward.from_weights({**welcome.reward, **(reward or {})})
+            self._judge = Judge(self._senses, weights)
+            if pace == "realtime" and welcome.clock == "twin":
+                raise RobotRefused(
+                    f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "
+                    "its commands would be old before they act: pass pace='lockstep'."
+                )
         except BaseException:
             self._client.close()
             raise
@@ -154,7 +159,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._schedule = Schedule(1.0 / welcome.control_hz, self._clock)
         self._last: Received | None = None
         self._last_view: View | None = None
-        self._collided = False
         self._missed = 0
         self._has_stepped = False
 
@@ -187,7 +191,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             LinkError: If the robot cannot be reached in time.
         """
         super().reset(seed=seed)
-        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock)
+        called = self._robot.name if isinstance(self._robot, KnownRobot) else ""
+        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock, called)
         if not self._client.alive:
             self._client = ready.connect(self._connect)
         robot = self._client
@@ -206,7 +211,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         received = ready.first(robot, self._senses.rest, self._is_after)
         view = self._senses.view(received)
         self._last, self._last_view = received, view
-        self._collided = bool(self._collision(received.message)[0])
+        self._judge.start(received.message)
         self._missed, self._has_stepped = 0, False
         robot.events()  # What happened before is not of this episode.
         return view.observation, self._info(received, view)
@@ -237,8 +242,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         late = self._schedule.advance(received.received_at)
         self._missed += late and self._pace == "realtime"
         events = robot.events()
-        bumped = any(event.name == _BUMP for event in events)
-        collided, terms = self._judge(last.message, received.message, bumped)
+        bumped = any(event.name == BUMP for event in events)
+        terminated, terms = self._judge.judge(last.message, received.message, bumped)
         info = self._info(received, view)
         info |= terms
         info["reward_terms"] = terms
@@ -248,7 +253,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         info["latency"] = latencies(last.message, seq, sent_at, received, clock)
         info["truncated_because"] = _interruption(received.message)
         self._last, self._last_view = received, view
-        terminated = self._reward.ends(collided)
         truncated = not terminated and bool(info["truncated_because"])
         return view.observation, sum(terms.values()), terminated, truncated, info
 
@@ -284,7 +288,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self.spec = state["spec"]
 
     def _connect(self) -> RobotClient:
-        return RobotClient.connect(
+        client = RobotClient.connect(
             self._robot,
             key=self._key,
             fingerprint=self._fingerprint,
@@ -294,6 +298,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             frames=self._frames,
             timeout_s=self._timeout_s,
         )
+        # An env that is dropped without being closed must not keep the robot from others.
+        weakref.finalize(self, client.abandon)
+        return client
 
     def _is_after(self, received: Received, now_ns: int) -> bool:
         """Whether an observation was made, picture and all, after a time of the robot."""
@@ -318,39 +325,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             found = newer or found
         return found
 
-    def _judge(
-        self, before: Observation, seen: Observation, bumped: bool
-    ) -> tuple[bool | None, dict[str, float]]:
-        """Whether it newly collided, and the terms of the reward.
-
-        Args:
-            before: The observation before.
-            seen: The one after.
-            bumped: Whether there was a bump, which may be over by now.
-        """
-        touches = self._collision(seen)[0]
-        stall = self._senses.quantity(seen, "stall")
-        hits = bool(touches) or bumped
-        collided = None if touches is None else hits and not self._collided
-        self._collided = hits
-        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
-        speed = self._senses.quantity(seen, "speed")
-        stalled = None if stall is None else bool(stall)
-        return collided, self._reward.terms(speed, collided, stalled, dt_s)
-
-    def _collision(self, message: Observation) -> tuple[float | None, str]:
-        """Whether it touches something, 0 or 1, and which sensor says so."""
-        for quantity in ("collision", "bump"):
-            value = self._senses.quantity(message, quantity)
-            if value is not None:
-                return value, self._senses.source(message, quantity)
-        return None, "absent"
-
     def _cut(self, last: Received, because: str) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """The end of an episode of which nothing more is known."""
         view = self._senses.view(last)
         info = self._info(last, view)
-        terms = dict.fromkeys(self._judge(last.message, last.message, False)[1], 0.0)
+        terms = dict.fromkeys(self._judge.judge(last.message, last.message, False)[1], 0.0)
         info |= terms
         info |= {
             "reward_terms": terms,
@@ -365,14 +344,13 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
 
     def _info(self, received: Received, view: View) -> dict[str, Any]:
         message = received.message
-        sources = {name: self._senses.source(message, name) for name in _QUANTITIES}
         info: dict[str, Any] = {
             "action_applied": np.array(message.action_applied, np.float32),
             "stop_reason": message.stop_reason,
             "armed": message.armed,
             "emergency": message.emergency,
             "absent": view.absent,
-            "reward_sources": sources | {"collision": self._collision(message)[1]},
+            "reward_sources": self._judge.sources(message),
             "deadline_missed": self._missed,
         }
         if self._senses.has_image:

@@ -2,6 +2,12 @@
 
 A terminal says that a key went down, again and again while it is held, and never that it went up.
 So a direction holds for a moment after each press, and ends by itself: hold to run.
+
+Of two keys that are held together a terminal repeats only the one that went down last. So when
+another direction arrives, one that still holds goes on for as long as a first press does. It could
+also go on for as long as the other key repeats; but then nobody could end the throttle while they
+steer, since a terminal does not say that a key went up. As it is, no key acts for longer than
+`FIRST_HOLD_S` after it was last pressed; to drive through a long curve, press both in turn.
 """
 
 from __future__ import annotations
@@ -12,10 +18,12 @@ from typing import Final
 __all__ = ["DIRECTIONS", "FIRST_HOLD_S", "REPEAT_HOLD_S", "HeldKeys"]
 
 FIRST_HOLD_S: Final = 0.6
-"""How long a first press holds, s: terminals begin to repeat after up to 0.5 s."""
+"""How long a first press holds, s: terminals begin to repeat after up to 0.5 s. No press holds for
+longer."""
 
 REPEAT_HOLD_S: Final = 0.2
-"""How long a repeated press holds, s: terminals repeat some 30 times a second."""
+"""How long a repeated press holds, s: terminals repeat some 30 times a second. Where another
+direction arrives meanwhile, it holds as long as a first press."""
 
 DIRECTIONS: Final = {
     "w": ("throttle", 1.0),
@@ -33,6 +41,7 @@ DIRECTIONS: Final = {
 @dataclass(slots=True)
 class _Held:
     value: float
+    pressed_s: float
     until_s: float
 
 
@@ -64,7 +73,10 @@ class HeldKeys:
         # The first repeat may come long before the first hold is over: never shorten it.
         if repeats and held is not None:
             until_s = max(until_s, held.until_s)
-        self._held[action] = _Held(value, until_s)
+        for other in self._held.values():
+            if now_s <= other.until_s:  # Its own repeats may end here, because this key has begun.
+                other.until_s = max(other.until_s, other.pressed_s + FIRST_HOLD_S)
+        self._held[action] = _Held(value, now_s, until_s)
         return True
 
     def value(self, action: str, now_s: float) -> float:

@@ -10,7 +10,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Act", "Evaluation", "evaluate", "random_actions"]
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.settings import CloningSettings, Settings
+
+__all__ = ["Act", "Evaluation", "evaluate", "evaluation_envs", "random_actions"]
 
 # Observations of shape (n, ...) in, actions of shape (n, ...) out.
 Act = Callable[[NDArray[Any]], NDArray[Any]]
@@ -31,6 +34,22 @@ class Evaluation(msgspec.Struct, frozen=True):
     mean_return: float
     mean_length: float
     terms: dict[str, float] = {}
+
+
+def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
+    """The envs in which policies of one learner are judged, one for each episode.
+
+    An env that has surroundings to hold out, and says so by a method `hold_out`, is judged there.
+    """
+    more = {}
+    if isinstance(settings, CloningSettings):
+        more["max_episode_steps"] = settings.eval_steps
+    envs = [env.make(**more) for _ in range(settings.eval_episodes)]
+    for one in envs:
+        hold_out = getattr(one.unwrapped, "hold_out", None)
+        if hold_out is not None:
+            hold_out()
+    return envs
 
 
 def evaluate(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int, steps: int = 0) -> Evaluation:
@@ -57,7 +76,7 @@ def evaluate(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int, steps: int 
             returns[i] += float(reward)
             lengths[i] += 1
             for name, value in info.items():
-                if name.startswith("reward_"):
+                if name.startswith("reward_") and isinstance(value, float | int):
                     terms[name] = terms.get(name, 0.0) + float(value) / len(envs)
             if not (terminated or truncated):
                 still.append(i)

@@ -11,7 +11,7 @@ import numpy as np
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.settings import LearnerSettings
+from shapechanger.transfer.settings import Settings
 
 __all__ = ["ARMS", "Arm", "Plan", "Run", "RunKind", "TransferTask"]
 
@@ -62,7 +62,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     task: TransferTask
     body_map: BodyMap
     learner: str
-    settings: LearnerSettings
+    settings: Settings
     steps: int
     source_steps: int
     seeds: int

@@ -13,11 +13,18 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.transfer.body_map import MappedEnv
-from shapechanger.transfer.evaluation import Evaluation, evaluate, random_actions
+from shapechanger.transfer.cloning import Recording, clone_along, evaluate_clone, load_clone
+from shapechanger.transfer.evaluation import (
+    Evaluation,
+    evaluate,
+    evaluation_envs,
+    random_actions,
+)
 from shapechanger.transfer.executor import Report
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.plan import Plan, Run
 from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.settings import CloningSettings, LearnerSettings
 from shapechanger.transfer.training import EVALUATION_SEED, train, use_one_thread
 
 __all__ = ["RunResult", "finished", "perform"]
@@ -98,7 +105,9 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
         append_line(folder / _CURVE, evaluation)
 
     source_path = Path(source_policy or policy_path(Path(study), Run("source", run.index)))
-    if run.kind in ("source", "scratch", "fine-tune"):
+    if isinstance(plan.settings, CloningSettings) and run.kind != "random":
+        _clone(plan, plan.settings, run, Path(study), source_path, on_evaluation, report)
+    elif run.kind in ("source", "scratch", "fine-tune"):
         start = load_policy(source_path) if run.kind == "fine-tune" else None
         policy = _train(plan, run, start, on_evaluation, report)
         save_policy(policy, folder / _POLICY)
@@ -110,6 +119,39 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
     write_json(folder / _RESULT, result)
 
 
+def _clone(
+    plan: Plan,
+    settings: CloningSettings,
+    run: Run,
+    study: Path,
+    source_path: Path,
+    on_evaluation: Callable[[Evaluation], None],
+    report: Report,
+) -> None:
+    """Learn from demonstrations in the source or in the target, or see what a clone is worth."""
+    if run.kind == "zero-shot":
+        on_evaluation(evaluate_clone(plan.task.target, load_clone(source_path), settings))
+        return
+    of_source = run.kind == "source"
+    # The same demonstrations for each arm: the arms differ in what they begin with.
+    shown = Run("source" if of_source else "scratch", run.index)
+    policy = clone_along(
+        plan.task.source if of_source else plan.task.target,
+        settings,
+        plan.source_steps if of_source else plan.steps,
+        plan.seed_of(run),
+        demonstrations=Recording(
+            study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown)
+        ),
+        start=load_clone(source_path) if run.kind == "fine-tune" else None,
+        # Of a source policy only its beginning and its end are of interest.
+        only_last=of_source,
+        on_evaluation=on_evaluation,
+        on_steps=report,
+    )
+    policy.save(policy_path(study, run))
+
+
 def _train(
     plan: Plan,
     run: Run,
@@ -119,6 +161,8 @@ def _train(
 ) -> TrainedPolicy:
     """Learn in the source, or in the target: from nothing, or from a source policy."""
     of_source = run.kind == "source"
+    if not isinstance(plan.settings, LearnerSettings):
+        raise StudyError(f"{plan.learner} does not learn by trying.")
     return train(
         plan.task.source if of_source else plan.task.target,
         plan.learner,
@@ -134,7 +178,7 @@ def _train(
 
 def _evaluate_random(plan: Plan, run: Run) -> Evaluation:
     """What actions drawn at random are worth in the target."""
-    envs = [plan.task.target.make() for _ in range(plan.settings.eval_episodes)]
+    envs = evaluation_envs(plan.task.target, plan.settings)
     try:
         # Each run draws its own actions, from starts of its own.
         seed = plan.seed_of(run)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Final
 
 import msgspec
 
+from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
 
-__all__ = ["LEARNERS", "LearnerSettings", "learner_settings"]
+__all__ = ["LEARNERS", "CloningSettings", "LearnerSettings", "Settings", "learner_settings"]
 
 
-class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
+class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
     """Settings of Stable-Baselines3's PPO, under its names.
 
     Attributes:
@@ -68,12 +70,61 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
 
+class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
+    """Settings of cloning: a step is one of a demonstration, and what is scarce is their number.
+
+    Attributes:
+        budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
+        episode_steps: Steps of a demonstration, after which the next begins on another course.
+        eval_episodes: Episodes of an evaluation.
+        eval_steps: Steps of each of them.
+        clone: How a policy is trained on so many steps.
+    """
+
+    budgets: tuple[int, ...]
+    episode_steps: int
+    eval_episodes: int
+    eval_steps: int
+    clone: CloneSettings = CloneSettings()
+
+    def __post_init__(self) -> None:
+        if self.eval_episodes < 1 or min(self.episode_steps, self.eval_steps) < 1:
+            raise StudyError("A learner needs at least one episode, of at least one step.")
+        if (
+            not self.budgets
+            or self.budgets[0] < 1
+            or any(a >= b for a, b in pairwise(self.budgets))
+        ):
+            raise StudyError(f"Budgets are numbers of steps that grow, got {self.budgets}.")
+
+    @property
+    def steps(self) -> int:
+        """Demonstrated steps, where nobody asks for another number."""
+        return self.budgets[-1]
+
+    @property
+    def eval_every(self) -> int:
+        """The first budget; later ones are farther apart."""
+        return self.budgets[0]
+
+    def whole_updates(self, steps: int) -> int:
+        """The smallest budget that is `steps` or more; the largest, if none is."""
+        return next((budget for budget in self.budgets if budget >= steps), self.budgets[-1])
+
+    def within(self, steps: int) -> tuple[int, ...]:
+        """The budgets up to so many steps."""
+        return tuple(budget for budget in self.budgets if budget <= steps)
+
+
+Settings = LearnerSettings | CloningSettings
+"""The settings of any learner."""
+
 # `ppo-balance` was tuned on InvertedPendulum and BigInvertedPendulum: within 24,576 steps the
 # latter ends at 1,000 on 5 of 5 seeds (benchmarks/results/demo.json). SmallInvertedPendulum is
 # harder: both of two seeds tried reach 1,000, and one of them has fallen to 744 at the end.
 # `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
 # return of 2,215, after 1,048,576 steps (benchmarks/results/train-ant.txt).
-LEARNERS: Final[dict[str, LearnerSettings]] = {
+LEARNERS: Final[dict[str, Settings]] = {
     "ppo-balance": LearnerSettings(
         n_envs=16,
         n_steps=64,
@@ -96,10 +147,17 @@ LEARNERS: Final[dict[str, LearnerSettings]] = {
         eval_every=65_536,
         eval_episodes=5,
     ),
+    # Half a minute, and 1, 2, 5 and 10 minutes, at 20 steps a second.
+    "cloning": CloningSettings(
+        budgets=(600, 1200, 2400, 6000, 12_000),
+        episode_steps=600,
+        eval_episodes=4,
+        eval_steps=400,
+    ),
 }
 
 
-def learner_settings(name: str) -> LearnerSettings:
+def learner_settings(name: str) -> Settings:
     """The settings of this name.
 
     Raises:

@@ -22,7 +22,7 @@ from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, su
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
 from shapechanger.transfer.policy_file import load_policy
 from shapechanger.transfer.runs import RunResult, finished, perform
-from shapechanger.transfer.settings import LearnerSettings
+from shapechanger.transfer.settings import Settings
 from shapechanger.transfer.training import require_budget
 
 __all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "holds", "make_plan", "run_study", "unfinished"]
@@ -68,7 +68,7 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 def make_plan(
     task: TransferTask,
     learner: str,
-    settings: LearnerSettings,
+    settings: Settings,
     *,
     seeds: int = 5,
     steps: int | None = None,

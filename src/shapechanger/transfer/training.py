@@ -14,7 +14,7 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.evaluation import Evaluation, evaluate
 from shapechanger.transfer.policy_file import Card, Normalisation, TrainedPolicy, actor
-from shapechanger.transfer.settings import LearnerSettings
+from shapechanger.transfer.settings import LearnerSettings, Settings
 from shapechanger.transfer.transplant import transplant
 from shapechanger.transfer.vec_env import learner_envs
 
@@ -178,7 +178,7 @@ def use_one_thread() -> None:
     torch.set_num_threads(1)
 
 
-def require_budget(steps: int, settings: LearnerSettings) -> None:
+def require_budget(steps: int, settings: Settings) -> None:
     """Refuse a budget that ends before the first evaluation.
 
     Raises:

@@ -22,11 +22,12 @@ from shapechanger.twin.connection import Connection
 from shapechanger.twin.ledger import LedgerWriter
 from shapechanger.twin.operating import Operating
 from shapechanger.twin.pin_board import PinBoard, chips_of
+from shapechanger.twin.place import Place, open_world
 from shapechanger.twin.surroundings import Surroundings
 from shapechanger.twin.switchboard import OwnerGone, Switchboard
 from shapechanger.twin.timekeeper import MachineTime, TwinTime
 from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.worlds.world import World
 
 __all__ = ["Board", "main"]
 
@@ -50,7 +51,7 @@ class Board:
     def __init__(
         self,
         wiring: Wiring,
-        world: DrivingWorld,
+        world: World,
         time: MachineTime | TwinTime,
         ledger: LedgerWriter,
         camera: FrontCameraPipe | None,
@@ -120,6 +121,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--fps", type=float, default=20.0)
     parser.add_argument("--quality", type=int, default=80)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--world", default="", help="kind of place; none for the plain room")
+    parser.add_argument("--vehicle", default="", help="what drives there, such as car")
+    parser.add_argument("--lens", action="append", default=[], help="what is wrong with the camera")
     parser.add_argument("--one-shot-ms", type=float, help="of the enable line; none without it")
     given = parser.parse_args(arguments)
 
@@ -129,8 +133,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with os.fdopen(given.plan_fd, encoding="utf-8") as file:
         plan = GuardPlan.from_json(file.read())
 
-    time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
     width, height = (int(number) for number in given.size.split("x"))
+    parts = {output.part for output in plan.outputs if output.part}
+    size = (width, height) if given.fifo is not None else None
+    place = Place(given.world, given.vehicle, tuple(given.lens))
+    world = open_world(place, parts, size, given.seed)
+    time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
     camera = None
     if given.fifo is not None:
         camera = FrontCameraPipe(
@@ -140,12 +148,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             latest_only=given.clock == "real",
             start_ns=time.now_ns(),
             seed=given.seed,
+            barcode=not given.world,
         )
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     listening.bind(given.socket)
     board = Board(
         Wiring(plan, given.one_shot_ms),
-        DrivingWorld({output.part for output in plan.outputs}, (width, height), given.seed),
+        world,
         time,
         LedgerWriter(given.ledger),
         camera,

@@ -12,7 +12,7 @@ import numpy as np
 import simplejpeg
 
 from shapechanger.robot.cameras.barcode import draw_barcode
-from shapechanger.twin.world.world import World
+from shapechanger.worlds.world import World
 
 __all__ = ["CAMERA_FAULTS", "CameraFault", "FrontCameraPipe", "with_capture_time"]
 
@@ -43,6 +43,7 @@ class FrontCameraPipe:
         quality: Of the JPEG, 1 to 100.
         latest_only: Whether a picture is dropped while the one before has not been read. Otherwise
             pictures are only dropped when the pipe is full or has no reader.
+        barcode: Whether its first rows show when a picture was taken.
         seed: Of the noise of a broken camera.
 
     Attributes:
@@ -52,11 +53,20 @@ class FrontCameraPipe:
     """
 
     def __init__(
-        self, path: str, fps: float, quality: int, *, latest_only: bool, start_ns: int, seed: int
+        self,
+        path: str,
+        fps: float,
+        quality: int,
+        *,
+        latest_only: bool,
+        start_ns: int,
+        seed: int,
+        barcode: bool = True,
     ) -> None:
         self._path = path
         self._quality = quality
         self._latest_only = latest_only
+        self._barcode = barcode
         self._start_ns = start_ns
         self._period_ns = 1e9 / fps
         self._taken = 0
@@ -90,9 +100,10 @@ class FrontCameraPipe:
             self._write(jpeg, now_ns)
 
     def draw(self, world: World, now_ns: int) -> bytes:
-        """The picture of now as JPEG, with its time in a comment and in a barcode."""
+        """The picture of now as JPEG, with its time in a comment and, if wanted, in a barcode."""
         picture = np.ascontiguousarray(world.picture())
-        draw_barcode(picture, now_ns)
+        if self._barcode:
+            draw_barcode(picture, now_ns)
         jpeg = simplejpeg.encode_jpeg(picture, self._quality, "RGB", "444")
         return with_capture_time(jpeg, now_ns)
 

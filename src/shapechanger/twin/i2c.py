@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shapechanger.robot.hardware import Clock
-from shapechanger.twin.link import Link
+from shapechanger.twin.wired import BoardLink
 
 __all__ = ["TwinBus"]
 
@@ -19,7 +19,7 @@ class TwinBus:
         bus: Number of the bus.
     """
 
-    def __init__(self, link: Link, clock: Clock, bus: int) -> None:
+    def __init__(self, link: BoardLink, clock: Clock, bus: int) -> None:
         self._link = link
         self._clock = clock
         self._bus = bus

@@ -11,6 +11,7 @@ i2c     bus, address, register, data, pid      what was written to a chip
 gone    pid                      a process died; lines with the levels that its pins keep follow
 input   pin, level               an edge of a sensor
 place   seed                     the operator put the vehicle at a start
+course  seed                     the operator put other surroundings around it
 fault   what                     the operator broke or pressed something
 ```
 
@@ -23,11 +24,11 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from shapechanger.errors import RobotError
 
-__all__ = ["LedgerWriter", "Transition", "read_ledger"]
+__all__ = ["Ledger", "LedgerWriter", "NoLedger", "Transition", "read_ledger"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,28 @@ class Transition:
 
 
 _FIELDS: Final = frozenset(Transition.__slots__)
+
+
+class Ledger(Protocol):
+    """Where changes are written down."""
+
+    def write(self, t: int, kind: str, **fields: Any) -> None:
+        """Write down a change."""
+        ...
+
+    def close(self) -> None:
+        """Write nothing any more."""
+        ...
+
+
+class NoLedger:
+    """Forgets everything, for a board whose pins nobody judges."""
+
+    def write(self, t: int, kind: str, **fields: Any) -> None:
+        """Forget a change."""
+
+    def close(self) -> None:
+        """Do nothing."""
 
 
 class LedgerWriter:

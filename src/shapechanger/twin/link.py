@@ -6,16 +6,13 @@ import os
 import select
 import socket
 from collections import deque
-from collections.abc import Callable
 from typing import Any, Literal
 
 from shapechanger.errors import RobotError
 from shapechanger.twin import wire
+from shapechanger.twin.wired import EdgeListener
 
-__all__ = ["Edge", "Link"]
-
-Edge = Callable[[int, int, int], None]
-"""Called with a pin, its new level and the time."""
+__all__ = ["Link"]
 
 
 class Link:
@@ -41,7 +38,7 @@ class Link:
         self._grants: deque[int] = deque()
         self._replies: dict[int, wire.Message] = {}
         self.levels: dict[int, int] = {}
-        self.on_edge: Edge | None = None
+        self.on_edge: EdgeListener | None = None
         answer = self.ask(op="hello", role=role, pid=os.getpid())
         self.clock: Literal["real", "twin"] = answer["clock"]
         self.now_ns: int = answer["t"]

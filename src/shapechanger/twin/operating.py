@@ -11,7 +11,7 @@ from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
 from shapechanger.twin.ledger import LedgerWriter
 from shapechanger.twin.pin_board import PinBoard
 from shapechanger.twin.sensors import PinSensors
-from shapechanger.twin.world.driving import RESTING_V, DrivingWorld
+from shapechanger.worlds.world import RESTING_V, World
 
 __all__ = ["Operating"]
 
@@ -32,7 +32,7 @@ class Operating:
 
     def __init__(
         self,
-        world: DrivingWorld,
+        world: World,
         sensors: PinSensors,
         pins: PinBoard,
         camera: FrontCameraPipe | None,
@@ -56,6 +56,10 @@ class Operating:
             case "place":
                 self._world.place(message["seed"])
                 self._ledger.write(self._now_ns(), "place", seed=message["seed"])
+                return {}
+            case "course":
+                self._world.lay_out(message["seed"])
+                self._ledger.write(self._now_ns(), "course", seed=message["seed"])
                 return {}
             case "camera":
                 return self._break_camera(message["how"])
@@ -90,6 +94,7 @@ class Operating:
                     "travelled_m": seen.travelled_m,
                     "bumped": seen.bumped,
                     "distance_m": self._world.distance_m(),
+                    "truth": self._world.truth(),
                     "t": self._now_ns(),
                 }
             case op:

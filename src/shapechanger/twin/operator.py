@@ -22,6 +22,7 @@ class Whereabouts(NamedTuple):
         travelled_m: Metres that the wheels rolled, backward counts down.
         bumped: Whether something presses its bumper.
         distance_m: Free distance ahead of its nose.
+        truth: What nobody on board knows, such as how far it came along the course, by name.
         t: When, in nanoseconds.
     """
 
@@ -32,6 +33,7 @@ class Whereabouts(NamedTuple):
     travelled_m: float
     bumped: bool
     distance_m: float
+    truth: dict[str, float]
     t: int
 
 
@@ -54,6 +56,10 @@ class Operator:
     def place(self, seed: int) -> None:
         """Put the vehicle at the start that follows from this seed."""
         self._link.ask(op="place", seed=seed)
+
+    def lay_out(self, seed: int) -> None:
+        """Put other surroundings around the vehicle, and the vehicle at a start in them."""
+        self._link.ask(op="course", seed=seed)
 
     def advance(self, seconds: float) -> int:
         """Let time go by on the twin's clock, and say what time it is then, in nanoseconds.

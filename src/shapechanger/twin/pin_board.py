@@ -15,10 +15,10 @@ from shapechanger.twin.chips.chip import Chip
 from shapechanger.twin.chips.ina219 import Ina219
 from shapechanger.twin.chips.mpu6050 import Mpu6050
 from shapechanger.twin.chips.pca9685 import Pca9685
-from shapechanger.twin.ledger import LedgerWriter
+from shapechanger.twin.ledger import Ledger
 from shapechanger.twin.levels import Channel, Levels, Pulse
 from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.world import Readings
+from shapechanger.worlds.world import Readings
 
 __all__ = ["Owner", "PinBoard", "chips_of"]
 
@@ -66,7 +66,7 @@ class PinBoard:
         self,
         wiring: Wiring,
         chips: Mapping[tuple[int, int], Chip],
-        ledger: LedgerWriter,
+        ledger: Ledger,
         seed: int,
     ) -> None:
         self._wiring = wiring

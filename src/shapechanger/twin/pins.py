@@ -23,7 +23,7 @@ from gpiozero.pins.pi import PiFactory, PiPin
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
-from shapechanger.twin.link import Link
+from shapechanger.twin.wired import BoardLink
 
 __all__ = ["TwinPin", "TwinPinFactory"]
 
@@ -171,7 +171,7 @@ class TwinPinFactory(PiFactory):
         clock: Where time comes from.
     """
 
-    def __init__(self, link: Link, clock: Clock) -> None:
+    def __init__(self, link: BoardLink, clock: Clock) -> None:
         super().__init__()
         self.link = link
         self.clock = clock

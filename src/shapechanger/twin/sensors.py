@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, Protocol
 
 from shapechanger.robot.drivers.settings import number, text, whole, wholes
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
-from shapechanger.twin.world.world import Readings, World
+from shapechanger.worlds.world import Readings, World
 
 __all__ = ["Edge", "PinSensors"]
 

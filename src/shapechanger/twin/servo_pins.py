@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shapechanger.robot.hardware import Clock
-from shapechanger.twin.link import Link
+from shapechanger.twin.wired import BoardLink
 
 __all__ = ["TwinServoPins"]
 
@@ -19,7 +19,7 @@ class TwinServoPins:
         clock: Where the time of a change comes from.
     """
 
-    def __init__(self, link: Link, clock: Clock) -> None:
+    def __init__(self, link: BoardLink, clock: Clock) -> None:
         self._link = link
         self._clock = clock
         self._pulses: dict[int, tuple[int, int]] = {}

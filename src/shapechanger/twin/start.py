@@ -15,6 +15,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.link import Link
+from shapechanger.twin.place import Place
 from shapechanger.twin.wiring import ONE_SHOT_MS, Wiring
 
 __all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
@@ -119,6 +120,7 @@ def start_board(
     camera: CameraPlan | None = None,
     seed: int = 0,
     one_shot_ms: float | None = ONE_SHOT_MS,
+    place: Place | None = None,
 ) -> RunningBoard:
     """Start a board and wait until it listens.
 
@@ -129,6 +131,7 @@ def start_board(
         camera: What the front camera is like; None for no camera.
         seed: Of the room, the first start and everything random.
         one_shot_ms: How long the one-shot of the enable line holds; None where none is fitted.
+        place: Where the vehicle is; None for the plain room.
 
     Raises:
         RobotError: If it does not start, or the folder is not as it must be.
@@ -153,6 +156,9 @@ def start_board(
         command += ["--clock", clock, "--seed", str(seed)]
         if one_shot_ms is not None:
             command += ["--one-shot-ms", str(one_shot_ms)]
+        if place is not None and place.world:
+            command += ["--world", place.world, "--vehicle", place.vehicle]
+            command += [part for lens in place.lenses for part in ("--lens", lens)]
         fifo_path = None
         if camera is not None:
             fifo_path = folder / _FIFO

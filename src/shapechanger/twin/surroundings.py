@@ -6,7 +6,7 @@ from shapechanger.twin.esc import SpeedController
 from shapechanger.twin.levels import Levels
 from shapechanger.twin.sensors import Edge, PinSensors
 from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.world import World
+from shapechanger.worlds.world import World
 
 __all__ = ["Surroundings"]
 

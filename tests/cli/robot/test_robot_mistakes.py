@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -81,10 +82,12 @@ def fits(home: Path, text: str = CAR) -> str:
         "doctor",
         "calibrate",
         "serve",
+        "key",
         "find",
         "remember",
         "forget",
         "drive",
+        "stop",
         "safe-pins",
         "selftest",
     ],
@@ -126,6 +129,10 @@ def test_help(run: Run, command: str) -> None:
         ("calibrate test-car.toml --twin", "needs a terminal"),
         ("drive nobody", "No known robot matches 'nobody'"),
         ("drive nobody --cap 0", "The cap is above 0"),
+        ("key nobody", "No robot of this machine matches 'nobody'. There are: test-car."),
+        ("key test-cat", "Did you mean 'test-car'?"),
+        ("key test-car --credentials nowhere", "There is no nowhere/key"),
+        ("stop nobody", "No known robot matches 'nobody'"),
         ("forget nobody", "No known robot matches 'nobody'"),
         ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
         ("remember one 127.0.0.1:99999 --fingerprint insecure", "is no port"),
@@ -212,6 +219,39 @@ def test_init_never_overwrites(run: Run, home: Path) -> None:
     profile.unlink()
     profile.with_name("other.toml").rename(profile)
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
+    """In the words of `init`, with the whole fingerprint."""
+    _, made, _ = run("init", "car", "--name", "rover")
+    code, said, _ = run("key", "rover")
+    assert code == 0
+    assert all(part in made for part in said.strip().split("\n\n"))
+    known = tomllib.loads((home / "config" / "shapechanger" / "known" / "rover.toml").read_text())
+    assert f"key          {known['key']}\n" in said
+    assert f"fingerprint  {known['fingerprint']}\n" in said
+    assert "shapechanger robot remember rover " in said
+
+
+def test_a_profile_in_this_folder_is_found_by_its_name(run: Run, home: Path) -> None:
+    """A newcomer types what `init` was told; a shipped profile of that name comes first."""
+    fits(home)
+    _, said, _ = run("doctor", "test-car", "--port", "0")
+    assert "good     profile: test-car.toml holds together" in said
+    (home / "work" / "car.toml").write_text("broken")
+    _, said, _ = run("doctor", "car", "--port", "0")
+    assert "shipped" in said
+
+
+def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit code 1 and words: whoever pressed stop must know that nothing was stopped."""
+    with socket.create_server(("127.0.0.1", 0)) as nobody:
+        address = f"127.0.0.1:{nobody.getsockname()[1]}"
+    monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
+    assert run("remember", "off", address, "--fingerprint", "ab" * 32)[0] == 0
+    code, said, wrong = run("stop", "off")
+    assert (code, said) == (1, "")
+    assert "The stop was not confirmed" in wrong
 
 
 def test_doctor(run: Run, home: Path) -> None:

@@ -6,10 +6,12 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shapechanger.cli.robot.running import run_robot
 from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.remote.vehicle import RemoteVehicleEnv
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import CAR, changed, write_profile
@@ -299,3 +301,87 @@ def test_selftest_on_a_twin(tmp_path: Path) -> None:
     assert "NEVER" not in said
     assert "it never drove" not in said
     assert code == (1 if "BAD" in said else 0)
+
+
+def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
+    """The motor is written, the servo is not, and the robot does not count as calibrated."""
+    second = SERVO.partition("[action.steering]")
+    profile = write_profile(tmp_path, MOTOR + "\n" + second[1] + second[2])
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
+        read = person.read_until("begins to move")
+        person.press("dddd")
+        read = person.read_until("duty 0.16", read)
+        person.press("\r")
+        read = person.read_until("Y or N", read)
+        person.press("y")
+        for place in ("full left", "straight", "full right"):
+            read = person.read_until(place, read)
+            read = person.read_until("1500 µs", read)
+            person.press("\r")
+        assert person.end() == 2
+        assert "must lie between" in person.text
+        assert "What was found before" in person.text
+    told = tomllib.loads(profile.path.read_text())
+    assert told["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
+    assert told["output"]["steer"]["left_us"] == 1150
+    assert "calibrated" not in told["robot"]
+
+
+def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A steering of three levels does nothing below its threshold; a person hears why."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path)) as robot:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        with Person(
+            ("robot", "drive", "car", "--cap", "0.2"), tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}
+        ) as person:
+            person.read_until("not armed")
+            person.press("e")
+            person.read_until(" armed · cap 0.2")
+
+            def holds_d() -> bool:
+                person.press("d")
+                return "a steering of 0.2 moves nothing here" in person.text
+
+            person.wait_for(holds_d)
+            person.press("q")
+            assert person.end() == 0
+
+
+def test_a_person_lets_a_waiting_program_drive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """P gives the robot to the program, armed, and the person stays to stop it."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path)) as robot, robot.operator() as operator:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        operator.place(0)
+        with Person(
+            ("robot", "drive", "car"), tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}
+        ) as person:
+            read = person.read_until("not armed")
+            person.press("p")
+            read = person.read_until("no program waits", read)
+            person.press("e")
+            read = person.read_until(" armed · cap 0.5", read)
+            waits: list[str] = []
+
+            def told(sentence: str) -> None:
+                waits.append(sentence)
+                person.press("p")
+
+            env = RemoteVehicleEnv("car", on_waiting=told, name="ada")
+            env.reset()
+            person.read_until("armed, commanded by ada", read)
+            *_, truncated, info = env.step(np.array([0.0, 0.3], np.float32))
+            assert not truncated, info["truncated_because"]
+            person.press(" ")
+            while not truncated:
+                *_, truncated, info = env.step(np.array([0.0, 0.3], np.float32))
+            assert info["truncated_because"].startswith("Emergency stop")
+            assert "commands" in waits[0]
+            env.close()
+            person.press("q")
+            assert person.end() == 0

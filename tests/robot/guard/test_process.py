@@ -56,10 +56,8 @@ class _Bench:
         self.daemon.setblocking(False)
         self.supervisor, heart = socket.socketpair()
         self._channel = DaemonChannel(guards_end.detach())
-        self._heartbeat = Heartbeat(heart.detach(), 0.0)
-        self.guard = Guard(
-            plan, self, self._channel, self._heartbeat, logging.getLogger("test"), **options
-        )
+        self.heartbeat = Heartbeat(heart.detach(), 0.0)
+        self.guard = Guard(plan, self, self._channel, logging.getLogger("test"), **options)
         self.states: list[GuardState] = []
 
     def pin_factory(self) -> MockFactory:
@@ -84,13 +82,13 @@ class _Bench:
     def run(self, end_ms: int) -> GuardState:
         """Run until a time, and give the last state."""
         self.clock.at(end_ms, lambda: setattr(self.guard, "ended", "the test is over"))
-        self.guard.run()
+        self.guard.run(self.heartbeat)
         return self.read()[-1]
 
     def close(self) -> None:
         self.guard.close()
         self._channel.close()
-        os.close(self._heartbeat.leave())
+        os.close(self.heartbeat.leave())
         self.daemon.close()
         self.supervisor.close()
 
@@ -212,7 +210,7 @@ def test_a_lost_daemon_disarms(make: _Make) -> None:
     bench.clock.at(15, lambda: (bench.read(), bench.daemon.close()))
     bench.clock.at(16, lambda: duties.append(bench.duty(22)))
     bench.clock.at(50, lambda: setattr(bench.guard, "ended", "the test is over"))
-    bench.guard.run()
+    bench.guard.run(bench.heartbeat)
     assert duties == [0.5, 0.0]
 
 
@@ -222,7 +220,7 @@ def test_a_daemon_that_left_with_states_unread_is_lost_too(make: _Make) -> None:
     _drives(bench)
     bench.clock.at(15, bench.daemon.close)
     bench.clock.at(50, lambda: setattr(bench.guard, "ended", "the test is over"))
-    bench.guard.run()
+    bench.guard.run(bench.heartbeat)
     assert bench.duty(22) == 0.0
 
 
@@ -230,7 +228,7 @@ def test_a_lost_supervisor_ends_it(make: _Make) -> None:
     """Nobody would notice its death any more."""
     bench = make(_plan())
     bench.clock.at(15, bench.supervisor.close)
-    bench.guard.run()
+    bench.guard.run(bench.heartbeat)
     assert bench.guard.ended == "the supervisor is gone"
 
 
@@ -507,7 +505,7 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
                 return factory
 
         with pytest.raises(RobotError, match="No answer"):
-            Guard(_plan(sensors=plans), _Hardware(), None, None, logging.getLogger("test"))
+            Guard(_plan(sensors=plans), _Hardware(), None, logging.getLogger("test"))
     assert opened[0].says == {}
     OutputDevice(22, pin_factory=factory).close()  # Nobody has the pin any more.
 

@@ -21,6 +21,20 @@ def test_names_and_paths() -> None:
         find_profile("tnak")
 
 
+def test_a_profile_of_this_folder_has_a_name_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But a shipped one of that name comes first, and a folder is no profile."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rover.toml").write_text(EVERYTHING)
+    (tmp_path / "car.toml").write_text(EVERYTHING)
+    (tmp_path / "folder.toml").mkdir()
+    assert find_profile("rover") == Path("rover.toml")
+    assert find_profile("car") == shipped_profiles()["car"]
+    with pytest.raises(UnknownName, match="No profile matches 'folder'"):
+        find_profile("folder")
+
+
 def test_a_mark_and_windows_lines_are_read(tmp_path: Path) -> None:
     """What an editor of Windows adds is no part of a profile."""
     path = tmp_path / "car.toml"

@@ -15,7 +15,10 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import HOVERCRAFT, changed, read
 
-NAMES = ("boat", "boat-twin", "car", "car-esc", "cat", "finger", "tank", "truck")
+NAMES = (
+    *("boat", "boat-twin", "car", "car-esc", "cat", "finger"),
+    *("lab-boat", "lab-car", "lab-tank", "lab-truck", "tank", "truck"),
+)
 PLANS = {name: load_profile(path).guard_plan() for name, path in shipped_profiles().items()}
 SIDE = st.floats(-1.0, 1.0)
 

@@ -9,6 +9,7 @@ from shapechanger.robot.setup.calibration import (
     Jogging,
     motor_changes,
     pulse_changes,
+    reading,
     wheel_changes,
     widened,
 )
@@ -74,3 +75,9 @@ def test_a_wheel_that_counts_nothing_or_backward_is_a_matter_of_wires(measured_m
     """A scale would hide it."""
     with pytest.raises(RobotError, match="look at its wires"):
         wheel_changes("wheel", 0.21, 1.0, measured_m)
+
+
+def test_where_an_output_is_can_be_read() -> None:
+    """In the units of its settings."""
+    assert reading(_SERVO, 0.5) == "1700 µs"
+    assert reading(OutputPlan("drive", "hbridge", settings={"full": 0.8}), -0.25) == "duty 0.20"

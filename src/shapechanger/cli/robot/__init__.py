@@ -12,9 +12,11 @@ from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.find import Find, Forget, Remember
 from shapechanger.cli.robot.init import Init
+from shapechanger.cli.robot.key import Key
 from shapechanger.cli.robot.safe_pins import SafePins
 from shapechanger.cli.robot.selftest import Selftest
 from shapechanger.cli.robot.serve import Serve
+from shapechanger.cli.robot.stop import Stop
 
 __all__ = ["Robot"]
 
@@ -28,10 +30,12 @@ class Robot:
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
         | Annotated[Serve, tyro.conf.subcommand("serve")]
+        | Annotated[Key, tyro.conf.subcommand("key")]
         | Annotated[Find, tyro.conf.subcommand("find")]
         | Annotated[Remember, tyro.conf.subcommand("remember")]
         | Annotated[Forget, tyro.conf.subcommand("forget")]
         | Annotated[Drive, tyro.conf.subcommand("drive")]
+        | Annotated[Stop, tyro.conf.subcommand("stop")]
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
         | Annotated[Selftest, tyro.conf.subcommand("selftest")]
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import tyro
 
 from shapechanger.cli.console import plain_console
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, ShapechangerError
 
 __all__ = ["Calibrate"]
 
@@ -29,10 +30,9 @@ class Calibrate:
     """Without --twin: the wheels are off the ground, so do not ask."""
 
     def run(self) -> None:
-        """Jog, ask, and write what was found, all at once."""
+        """Jog, ask, and write what was found; after an error, what was found before it."""
         from shapechanger.cli.robot.jogging import Calibration
         from shapechanger.cli.robot.wheels import ask_for_wheels_up
-        from shapechanger.robot.profile.edit import rewrite
         from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
         from shapechanger.teleop.terminal import Terminal
 
@@ -49,12 +49,28 @@ class Calibrate:
             ask_for_wheels_up()
         console = plain_console()
         with Terminal() as terminal:
-            changes = Calibration(profile, terminal, console, self.cap, twin=self.twin).run()
+            calibration = Calibration(profile, terminal, console, self.cap, twin=self.twin)
+            try:
+                changes = calibration.run()
+            except ShapechangerError:
+                # An hour's work is not thrown away because the last wire was loose. The date is
+                # left out: it is not calibrated.
+                if calibration.found:
+                    console.print("\nIt did not come to its end. What was found before:")
+                    _write(path, calibration.found)
+                raise
         if not changes:
             console.print("Nothing was found, and nothing was written.")
             return
-        changes["robot.calibrated"] = datetime.date.today()
-        rewrite(path, changes)
-        for name, value in changes.items():
-            console.print(f"{name} = {value}")
-        console.print(f"wrote {path}")
+        _write(path, {**changes, "robot.calibrated": datetime.date.today()})
+
+
+def _write(path: Path, changes: dict[str, Any]) -> None:
+    """Write what was found into the profile, and show it."""
+    from shapechanger.robot.profile.edit import rewrite
+
+    rewrite(path, changes)
+    console = plain_console()
+    for name, value in changes.items():
+        console.print(f"{name} = {value}")
+    console.print(f"wrote {path}")

@@ -23,9 +23,13 @@ __all__ = ["Drive"]
 
 _HELP: Final = (
     "W A S D or arrows drive · E arms · Space stops everything · X disarms · + and - set the cap · "
-    "Q leaves"
+    "P lets a waiting program drive · Q leaves"
 )
 _CAP_STEP: Final = 0.1
+# s. A program that waits in its `reset` takes a robot that is free within a moment.
+_TAKEN_WITHIN_S: Final = 2.0
+# Observations in a row in which a key moves nothing, and the robot names no reason.
+_UNMOVED_LOOKS: Final = 10
 _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
@@ -81,6 +85,7 @@ class _Driving:
         self._keys = HeldKeys()
         self._cap = cap
         self._note = ""
+        self._unmoved = dict.fromkeys(_BY_KEYS, 0)
 
     def run(self) -> None:
         console = plain_console()
@@ -103,7 +108,7 @@ class _Driving:
                     self._robot.command(values, answers=seq, scale=self._cap)
                 else:
                     self._robot.acknowledge()
-                live.update(self._line(seen))
+                live.update(self._line(seen, self._unanswered(values, seen)))
 
     def _take_keys(self, wait_s: float) -> bool:
         """Do what the keys say; whether to go on."""
@@ -136,13 +141,46 @@ class _Driving:
                 self._robot.arm()
             except RobotRefused as error:
                 self._note = str(error)
+        elif key == "p":
+            self._keys.let_go()
+            try:
+                self._note = self._hand_over()
+            except RobotRefused as error:
+                self._note = str(error)
 
-    def _line(self, seen: Observation) -> Text:
-        """The state of the robot in a line."""
+    def _hand_over(self) -> str:
+        """Give the robot to a program that waits for it, and arm it for that; what came of it.
+
+        Raises:
+            RobotRefused: If the robot does not arm.
+        """
+        self._robot.release()
+        until_s = time.monotonic() + _TAKEN_WITHIN_S
+        while time.monotonic() < until_s:
+            seen = self._robot.ask().message
+            if seen.holder and not seen.mine:
+                self._robot.arm()
+                return f"armed for {seen.holder}: Space still stops it, E takes it back"
+        return "no program waits: start one, and press P while its reset waits"
+
+    def _unanswered(self, values: list[float], seen: Observation) -> str:
+        """Which key moves nothing though nothing is said against it, as below a threshold."""
+        quiet = seen.mine and seen.armed and not seen.stop_reason
+        for name, asked, does in zip(self._actions.names, values, seen.action_applied, strict=True):
+            if name in _BY_KEYS:
+                is_unmoved = quiet and asked != 0.0 and does == 0.0
+                self._unmoved[name] = self._unmoved[name] + 1 if is_unmoved else 0
+                if self._unmoved[name] >= _UNMOVED_LOOKS:
+                    return f"a {name} of {self._cap:.1f} moves nothing here: raise the cap with +"
+        return ""
+
+    def _line(self, seen: Observation, remark: str) -> Text:
+        """The state of the robot in a line, with a remark on it."""
         if seen.emergency:
             state = "EMERGENCY STOP"
         elif not seen.mine:
-            state = f"commanded by {seen.holder or 'nobody'}"
+            armed = "armed, " if seen.armed else ""
+            state = f"{armed}commanded by {seen.holder or 'nobody'}"
         else:
             state = "armed" if seen.armed else "not armed"
         does = " ".join(
@@ -154,5 +192,11 @@ class _Driving:
             for feature, value in zip(self._state, seen.state, strict=True)
             if not feature.name.endswith("/applied")
         )
-        parts = [state, f"cap {self._cap:.1f}", does, senses, self._note or seen.stop_reason]
+        parts = [
+            state,
+            f"cap {self._cap:.1f}",
+            does,
+            senses,
+            self._note or seen.stop_reason or remark,
+        ]
         return Text(" · ".join(part for part in parts if part))

@@ -106,6 +106,6 @@ def _asked_key(name: str) -> str:
     if not key.strip():
         raise LinkError(
             f"The robot's key is needed: type it, or set {_KEY_VARIABLE}. "
-            "`shapechanger robot init` showed it on the robot."
+            "`shapechanger robot key NAME` shows it on the robot."
         )
     return key

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -30,8 +29,9 @@ class Init:
 
     def run(self) -> None:
         """Write it all, and say how to go on."""
+        from shapechanger.cli.robot.key import how_to_remember, shown_credentials
         from shapechanger.cli.robot.serving import credentials_of
-        from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
+        from shapechanger.link.fingerprint import fingerprint_hex
         from shapechanger.remote.known import KnownRobot, check_name, remember
         from shapechanger.robot.profile.starter import starter_text, write_profile
         from shapechanger.robot.setup.unit import write_unit
@@ -56,12 +56,9 @@ class Init:
             f"wrote {profile}: look at its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: for systemd, see docs/hardware.md\n"
             f"key and certificate in {credentials.key_file.parent}\n\n"
-            f"key          {key}\n"
-            f"fingerprint  {fingerprint_short(credentials.fingerprint)}\n\n"
+            f"{shown_credentials(credentials)}\n\n"
             f"Next: shapechanger robot doctor {profile}\n"
             f"      shapechanger robot serve {profile}   (with --twin: without any hardware)\n"
-            "On the workstation, with the key from above:\n"
-            f"      shapechanger robot remember {name} {socket.gethostname()}.local "
-            f"--fingerprint {digits}",
+            f"{how_to_remember(name, credentials)}",
             soft_wrap=True,
         )

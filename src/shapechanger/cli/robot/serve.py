@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Serve"]
 
 _LAST_PORT: Final = 65535
+_HERE: Final = "127.0.0.1"
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class Serve:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """A profile, such as car.toml, or the name of one that comes with Shapechanger."""
     twin: bool = False
-    """Run on simulated pins and in a simulated world in place of this machine's pins."""
+    """Run on simulated pins and in a simulated world in place of this machine's pins. It is then
+    known here by its name, unless another robot is."""
     host: str = ""
     """Address to listen at; all of this machine's if not given, only 127.0.0.1 with --twin or
     --insecure."""
@@ -45,6 +47,11 @@ class Serve:
     """With --twin: the profile of what is really attached to the pins, if not the one served."""
     seed: int = 0
     """With --twin: seed of the world."""
+    world: str = ""
+    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; where
+    the vehicle is at home if not given."""
+    lens: tuple[str, ...] = ()
+    """With --twin: what is wrong with the camera, such as night or dirt."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
     given. A twin that runs there already is used as it is."""
@@ -91,9 +98,32 @@ class Serve:
             with contextlib.suppress(OSError):  # A full disk takes words away, and no robot.
                 if board is not None:
                     plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
+                    self._make_known(profile.name)
                 sys.stdout.flush()
             # In place of this process, which has loaded much that a supervisor has no use for.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
+
+    def _make_known(self, name: str) -> None:
+        """Let this machine drive the twin by its name, as `init` does, and say so.
+
+        Raises:
+            OutputError: If that cannot be written down.
+        """
+        from shapechanger.cli.robot.knowing import can_be_known, make_known
+        from shapechanger.cli.robot.serving import credentials_of
+        from shapechanger.link.address import Address
+        from shapechanger.link.fingerprint import fingerprint_hex
+        from shapechanger.remote.known import KnownRobot
+
+        # Who asks for any port, or no TLS, tells whoever drives how to reach it.
+        if not self.port or self.insecure or not can_be_known(name):
+            return
+        credentials = credentials_of(name, self.credentials, make=False)
+        host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
+        address = str(Address(host, self.port))
+        key = credentials.key_file.read_text().strip()
+        robot = KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
+        plain_console().print(make_known(robot), soft_wrap=True)
 
     def _refuse_contradictions(self) -> None:
         """Refuse what has a meaning on a twin only."""
@@ -102,6 +132,8 @@ class Serve:
             "--wired-as": bool(self.wired_as),
             "--twin-folder": self.twin_folder is not None,
             "--seed": self.seed != 0,
+            "--world": bool(self.world),
+            "--lens": bool(self.lens),
         }
         for option, given in asked.items():
             if given and not self.twin:
@@ -121,7 +153,7 @@ class Serve:
         Raises:
             RobotError: If it does not start, or runs on another clock.
         """
-        from shapechanger.cli.robot.serving import TwinOptions, start_twin
+        from shapechanger.cli.robot.serving import TwinOptions, place_of, start_twin
         from shapechanger.twin.start import find_board
 
         folder = self.twin_folder
@@ -130,7 +162,8 @@ class Serve:
             undo.callback(shutil.rmtree, folder, ignore_errors=True)
         found = find_board(folder)
         if found is None:
-            options = TwinOptions(folder, self.clock, self.wired_as, self.seed)
+            place = place_of(profile, self.world, self.lens)
+            options = TwinOptions(folder, self.clock, self.wired_as, self.seed, place=place)
             started = undo.enter_context(start_twin(profile, options))
             started.outlive_exec()
             return started

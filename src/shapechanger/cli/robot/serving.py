@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, Literal
 
 import msgspec
 
+from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName
 from shapechanger.robot.daemon.credentials import (
     Credentials,
     credentials_folder,
@@ -19,12 +22,15 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.place import Place
 from shapechanger.twin.start import BoardAt, RunningBoard, start_board
+from shapechanger.worlds.home import HOME
 
-__all__ = ["ServeOptions", "TwinOptions", "credentials_of", "serve_plan", "start_twin"]
+__all__ = ["ServeOptions", "TwinOptions", "credentials_of", "place_of", "serve_plan", "start_twin"]
 
 _EVERYWHERE: Final = "0.0.0.0"
 _HERE: Final = "127.0.0.1"
+_ROOM: Final = "room"
 # While the twin draws a picture its time stands still, and a guard that waits for it is not dead.
 _TWIN_PATIENCE_MS: Final = 10_000
 
@@ -39,6 +45,7 @@ class TwinOptions:
         wired_as: Profile of what is really attached; "" for the one that is served.
         seed: Seed of the world.
         one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
+        place: Where its vehicle is.
     """
 
     folder: Path
@@ -46,6 +53,7 @@ class TwinOptions:
     wired_as: str = ""
     seed: int = 0
     one_shot: bool = True
+    place: Place = Place()
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,51 @@ def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials
     return make_credentials(folder, name) if make else load_credentials(folder)
 
 
+def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
+    """Where the vehicle of a twin is.
+
+    Args:
+        profile: The robot.
+        world: Kind of place; "room" for the plain room, "" for where such a vehicle is at home, or
+            the room where there is no such vehicle, or no MuJoCo.
+        lenses: What is wrong with the camera.
+
+    Raises:
+        UnknownName: If there is no such place or lens.
+        ProfileError: If there is no vehicle in MuJoCo with the parts of the profile.
+        MissingExtra: If MuJoCo is needed and not installed.
+    """
+    if world == _ROOM or (not world and find_spec("mujoco") is None):
+        if lenses:
+            raise RobotError("The plain room has a plain camera: choose a --world for a --lens.")
+        return Place()
+    try:
+        from shapechanger.embodiments.vehicles import VEHICLES, require_fit
+        from shapechanger.worlds.layout import WORLDS
+        from shapechanger.worlds.lens import lens as find_lens
+    except ModuleNotFoundError as error:
+        raise MissingExtra(error.name or "mujoco", "sim") from error
+
+    for lens in lenses:
+        find_lens(lens)
+    if world and world not in WORLDS:
+        raise UnknownName("world", world, (_ROOM, *WORLDS))
+    parts = {output.part for output in profile.outputs if output.part}
+    if not world:
+        try:
+            require_fit(profile.body, parts)
+        except (ProfileError, UnknownName):
+            return Place()
+        return Place(HOME[profile.body], profile.body, tuple(lenses))
+    if profile.body not in VEHICLES:
+        raise ProfileError(
+            f"{profile.path}: there is no {profile.body} in MuJoCo, only {', '.join(VEHICLES)}; "
+            "--world room takes any robot."
+        )
+    require_fit(profile.body, parts)
+    return Place(world, profile.body, tuple(lenses))
+
+
 def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
     """Start the twin of a robot's pins, in a process of its own.
 
@@ -100,6 +153,7 @@ def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
         camera=profile.camera,
         seed=options.seed,
         one_shot_ms=float(wiring.enable_hold_ms) if options.one_shot else None,
+        place=options.place,
     )
 
 

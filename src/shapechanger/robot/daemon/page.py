@@ -29,7 +29,7 @@ def status_page(cockpit: Cockpit, host: str) -> str:
 <h1>{name}</h1>
 <p>A {body} with {camera}, served by Shapechanger.</p>
 <p>Make it known on another computer with <code>shapechanger robot remember {name} {where}
---fingerprint</code> and what <code>shapechanger robot init</code> showed on the robot. Then
+--fingerprint</code> and what <code>shapechanger robot key {name}</code> shows on the robot. Then
 <code>shapechanger robot drive {name}</code> drives it, and so does the Gymnasium environment
 <code>shapechanger/RemoteVehicle-v1</code> with <code>robot="{name}"</code>.</p>
 """

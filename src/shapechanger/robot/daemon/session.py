@@ -143,7 +143,9 @@ class Session:
                 "install the same version of shapechanger on both."
             )
         if not self._door.lets_in(hello, self._nonce):
-            raise WrongKey("Wrong key. `shapechanger robot init` shows the right one on the robot.")
+            raise WrongKey(
+                "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
+            )
         name = _printable(hello.name) or f"{hello.role} {self._number}"
         self._who = Holder(self._number, name, hello.role)
         self._cockpit.join(self)

@@ -6,21 +6,40 @@ import contextlib
 import select
 import socket
 import time
+from typing import Protocol
 
 from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 
-__all__ = ["DaemonChannel", "Heartbeat"]
+__all__ = ["Channel", "DaemonChannel", "Heartbeat"]
 
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
 _MOST_ORDERS_A_ROUND = 1024
 
 
-class DaemonChannel:
-    """Orders in, states out.
+class Channel(Protocol):
+    """Orders in, states out."""
 
-    Attributes:
-        lost: Whether the daemon is gone.
+    @property
+    def lost(self) -> bool:
+        """Whether whoever gives the orders is gone."""
+        ...
+
+    def fileno(self) -> int:
+        """The descriptor, to wait for."""
+        ...
+
+    def orders(self) -> tuple[list[Order], list[str]]:
+        """All orders that have arrived, and why others were none, in words."""
+        ...
+
+    def send(self, state: GuardState) -> bool:
+        """Hand over a state; whether it was taken."""
+        ...
+
+
+class DaemonChannel:
+    """Orders from the daemon's socket, and states into it.
 
     Args:
         fd: Descriptor of the socket; this object owns it.
@@ -30,7 +49,12 @@ class DaemonChannel:
         self._socket = socket.socket(fileno=fd)
         self._socket.setblocking(False)
         self._socket.set_inheritable(False)
-        self.lost = False
+        self._lost = False
+
+    @property
+    def lost(self) -> bool:
+        """Whether the daemon is gone."""
+        return self._lost
 
     def fileno(self) -> int:
         """The descriptor, to wait for."""
@@ -48,7 +72,7 @@ class DaemonChannel:
             except ConnectionResetError:
                 data, flags = b"", 0
             if not data:  # The end, or an empty datagram, which nobody sends.
-                self.lost = True
+                self._lost = True
                 break
             try:
                 if flags & socket.MSG_TRUNC:
@@ -69,7 +93,7 @@ class DaemonChannel:
         except BlockingIOError:
             return False
         except (BrokenPipeError, ConnectionResetError):
-            self.lost = True
+            self._lost = True
             return False
         return True
 

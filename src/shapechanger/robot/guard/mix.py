@@ -19,6 +19,11 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
     Raises:
         ValueError: If these are not as many numbers as the robot has actions.
     """
+    if len(actions) != len(plan.actions):
+        names = ", ".join(action.name for action in plan.actions)
+        raise ValueError(
+            f"{plan.name} has {len(plan.actions)} actions ({names}), got {len(actions)} numbers."
+        )
     named = {action.name: value for action, value in zip(plan.actions, actions, strict=True)}
     return tuple(
         max(-1.0, min(1.0, output.offset + sum(w * named[a] for a, w in output.mix.items())))

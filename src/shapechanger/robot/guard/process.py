@@ -19,7 +19,7 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.arguments import AFTER_FAILURE, descriptors
-from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
+from shapechanger.robot.guard.channel import Channel, DaemonChannel, Heartbeat
 from shapechanger.robot.guard.log import log_to_stderr
 from shapechanger.robot.guard.outputs import Outputs
 from shapechanger.robot.guard.plan import GuardPlan
@@ -50,7 +50,6 @@ class Guard:
         plan: The robot.
         hardware: Its pins, buses and time.
         daemon: Where orders come from.
-        heartbeat: How the supervisor knows that this lives.
         log: Where to say what happens.
         after_failure: Whether it follows processes of this robot that failed. Then it begins with
             an emergency stop, so that only a person lets it move again.
@@ -60,15 +59,13 @@ class Guard:
         self,
         plan: GuardPlan,
         hardware: Hardware,
-        daemon: DaemonChannel,
-        heartbeat: Heartbeat,
+        daemon: Channel,
         log: logging.Logger,
         *,
         after_failure: bool = False,
     ) -> None:
         self._clock = hardware.clock
         self._daemon = daemon
-        self._heartbeat = heartbeat
         self._log = log
         self._period_ns = round(1e9 / plan.tick_hz)
         now_ns = self._clock.now_ns()
@@ -100,19 +97,23 @@ class Guard:
         self.ended = ""
         """Why it ends, in words; empty while it does not."""
 
-    def run(self) -> None:
-        """Guard until told to end."""
+    def run(self, heartbeat: Heartbeat) -> None:
+        """Guard until told to end.
+
+        Args:
+            heartbeat: How the supervisor knows that this lives.
+        """
         until_ns = self._clock.now_ns()
         while not self.ended:
-            fds = [self._heartbeat.fileno()]
+            fds = [heartbeat.fileno()]
             if not self._daemon.lost:  # The end of a stream can be read for ever.
                 fds.append(self._daemon.fileno())
             has_something = self._clock.wait(fds, until_ns, _WAIT_S)
-            self._heartbeat.beat()
-            if self._heartbeat.lost:
+            heartbeat.beat()
+            if heartbeat.lost:
                 self.ended = "the supervisor is gone"
             elif has_something:
-                until_ns = self._round(self._clock.now_ns())
+                until_ns = self.round(self._clock.now_ns())
 
     def close(self) -> None:
         """Put all outputs to rest and let go of everything."""
@@ -127,7 +128,7 @@ class Guard:
             self.is_safe = False
             self._log.error("%s", failure)
 
-    def _round(self, now_ns: int) -> int:
+    def round(self, now_ns: int) -> int:
         """Do what there is to do, and say when there is something to do again."""
         self._obey()
         if is_tick := now_ns >= self._next_tick_ns:
@@ -283,13 +284,13 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         plan = read_plan_fd(fds["--plan-fd"])
         hardware = connect(*plan.hardware)
         opened.callback(hardware.close)
-        guard = Guard(plan.guard, hardware, daemon, heartbeat, log, after_failure=after_failure)
+        guard = Guard(plan.guard, hardware, daemon, log, after_failure=after_failure)
         opened.callback(guard.close)
         if told:  # While it was being set up.
             guard.ended = told[0]
         run_promptly()
         log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))
-        guard.run()
+        guard.run(heartbeat)
         log.info("ends: %s.", guard.ended)
     if not guard.is_safe:
         raise RobotError("not all outputs are at rest")

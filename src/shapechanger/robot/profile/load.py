@@ -23,10 +23,14 @@ def shipped_profiles() -> dict[str, Path]:
 
 
 def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a shipped profile by its name, such as "car", or a path as it is.
+    """The file of a profile.
+
+    Args:
+        name_or_path: Name of a shipped profile, such as "car"; or else of one in the current
+            folder, "my-car" for my-car.toml; or a path, which is returned as it is.
 
     Raises:
-        UnknownName: If it is neither the name of a shipped profile nor looks like a path.
+        UnknownName: If it is neither such a name nor looks like a path.
     """
     text = os.fspath(name_or_path)
     path = Path(text)
@@ -34,6 +38,9 @@ def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
         return path
     shipped = shipped_profiles()
     if text not in shipped:
+        here = Path(f"{text}{_SUFFIX}")
+        if here.is_file():
+            return here
         raise UnknownName("profile", text, shipped)
     return shipped[text]
 

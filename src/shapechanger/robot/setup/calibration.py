@@ -15,6 +15,7 @@ __all__ = [
     "Jogging",
     "motor_changes",
     "pulse_changes",
+    "reading",
     "wheel_changes",
     "widened",
 ]
@@ -57,6 +58,19 @@ def widened(output: OutputPlan) -> OutputPlan:
     ends = (_WIDEST_US, _NARROWEST_US) if turned else (_NARROWEST_US, _WIDEST_US)
     settings = {**output.settings, low: ends[0], high: ends[1]}
     return dataclasses.replace(output, settings=settings)
+
+
+def reading(output: OutputPlan, value: float) -> str:
+    """What an output does at a value, in the unit of its settings, for people to read.
+
+    Args:
+        output: A servo, a controller or a motor.
+        value: -1 to 1.
+    """
+    if output.driver in PULSES:
+        pulses = PulseRange(*(_number(output, key) for key in _keys(output)))
+        return f"{pulses.width_us(value):.0f} µs"
+    return f"duty {abs(value) * _number(output, 'full'):.2f}"
 
 
 def pulse_changes(output: OutputPlan, found: Jogging) -> dict[str, int]:

@@ -20,6 +20,7 @@ from shapechanger.transfer.report.markup import (
     text,
 )
 from shapechanger.transfer.report.numbers import count, number
+from shapechanger.transfer.settings import CloningSettings, Settings
 from shapechanger.transfer.study import Study
 
 __all__ = ["body_map", "learner", "provenance", "shift", "short_name"]
@@ -81,26 +82,37 @@ def learner(study: Study) -> Html:
     """The learner and what it was set to."""
     plan = study.plan
     settings: dict[str, Any] = msgspec.structs.asdict(plan.settings)
-    normalised = (
-        "Observations and rewards are normalised for the learner by running estimates of their "
-        "standard deviation. Returns in this report never are."
-        if plan.settings.normalise
-        else "Observations and rewards reach the learner as they are."
+    budget = (
+        f"{plan.learner}, with the same settings in every arm: {count(plan.steps)} target "
+        f"steps a run, {count(plan.source_steps)} source steps a source policy, an evaluation of "
+        f"{plan.settings.eval_episodes} episodes"
     )
     return joined(
         (
-            paragraph(
-                f"{plan.learner}, with the same settings in every arm: {count(plan.steps)} target "
-                f"steps a run, {count(plan.source_steps)} source steps a source policy, an "
-                f"evaluation of {plan.settings.eval_episodes} episodes every "
-                f"{count(plan.settings.eval_every)} steps. {normalised}"
-            ),
+            paragraph(f"{budget} {_rhythm(plan.settings)}"),
             details(
                 "All settings",
                 pairs((name, text(_setting(value))) for name, value in settings.items()),
             ),
         )
     )
+
+
+def _rhythm(settings: Settings) -> str:
+    """When policies are judged, and what they learn from."""
+    if isinstance(settings, CloningSettings):
+        budgets = ", ".join(count(budget) for budget in settings.budgets)
+        return (
+            f"after {budgets} steps. A step is one of a demonstration: a policy is cloned from so "
+            "many, each time from the same start, and the arms see the same demonstrations."
+        )
+    normalised = (
+        "Observations and rewards are normalised for the learner by running estimates of their "
+        "standard deviation. Returns in this report never are."
+        if settings.normalise
+        else "Observations and rewards reach the learner as they are."
+    )
+    return f"every {count(settings.eval_every)} steps. {normalised}"
 
 
 def provenance(study: Study) -> Html:

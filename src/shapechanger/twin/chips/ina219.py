@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from shapechanger.twin.world.world import Readings
+from shapechanger.worlds.world import Readings
 
 __all__ = ["Ina219"]
 

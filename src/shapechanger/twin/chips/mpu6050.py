@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from shapechanger.twin.world.world import Readings
+from shapechanger.worlds.world import Readings
 
 __all__ = ["Mpu6050"]
 

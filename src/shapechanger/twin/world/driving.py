@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapechanger.twin.world.picture import FrontCamera
 from shapechanger.twin.world.room import find_start, lay_out
 from shapechanger.twin.world.vehicle import vehicle_for
-from shapechanger.twin.world.world import Pose, Readings
+from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 __all__ = ["DrivingWorld"]
 
@@ -24,7 +24,6 @@ IMPACT_S: Final = 0.03  # How long the accelerometer shows the blow of a collisi
 SPEED_OF_IMPACT: Final = 0.15  # m/s: slower than this, a collision is no blow.
 IMPACT_STOP_S: Final = 0.01  # Time in which a collision takes all the speed.
 
-RESTING_V: Final = 8.0  # Of two lithium cells that are nearly full.
 INNER_OHM: Final = 0.12  # Of the battery and its leads.
 IDLE_A: Final = 0.6  # What the computer takes.
 MOTOR_A: Final = 3.0  # What a motor takes at a value of 1 when it runs freely, and
@@ -48,11 +47,19 @@ class DrivingWorld:
     def __init__(self, parts: Collection[str], size: tuple[int, int], seed: int) -> None:
         self._parts = frozenset(parts)
         self._vehicle = vehicle_for(self._parts)
-        self.room = lay_out(seed)
         self._camera = FrontCamera(size)
         self.resting_v = RESTING_V
         self._travelled = 0.0
+        self.lay_out(seed)
+
+    def lay_out(self, seed: int) -> None:
+        """Put other boxes into the room; see `World.lay_out`."""
+        self.room = lay_out(seed)
         self.place(seed)
+
+    def truth(self) -> dict[str, float]:
+        """Nothing: nobody counts here; see `World.truth`."""
+        return {}
 
     def place(self, seed: int) -> None:
         """Put the vehicle at a start, at rest; see `World.place`."""

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.twin.world.world import Pose
+from shapechanger.worlds.world import Pose
 
 __all__ = ["Box", "Room", "find_start", "lay_out"]
 

@@ -1,15 +1,18 @@
-"""What every world does."""
+"""What every world does, and what it shows to the sensors in it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Pose", "Readings", "World"]
+__all__ = ["RESTING_V", "Pose", "Readings", "World"]
+
+RESTING_V: Final = 8.0
+"""Voltage without load of two lithium cells that are nearly full."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,21 @@ class Readings:
 
 
 class World(Protocol):
-    """A vehicle and what is around it."""
+    """A vehicle and what is around it.
+
+    Attributes:
+        resting_v: Voltage of the battery without load.
+    """
+
+    resting_v: float
+
+    def lay_out(self, seed: int) -> None:
+        """Put other surroundings around the vehicle, and the vehicle at a start in them."""
+        ...
+
+    def truth(self) -> dict[str, float]:
+        """What no sensor on board tells, by name, for whoever judges; empty where nobody counts."""
+        ...
 
     def place(self, seed: int) -> None:
         """Put the vehicle at a start, at rest."""

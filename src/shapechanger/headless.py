@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from shapechanger.errors import RenderError
 
-__all__ = ["choose_gl", "has_screen", "require_context", "require_known_gl", "require_screen"]
+__all__ = ["choose_gl", "has_screen", "open_context", "require_context", "require_known_gl", "require_screen"]
 
 _LIBRARIES: Final = ("egl", "osmesa", "glfw")
 # What else MuJoCo takes for MUJOCO_GL, to draw with GLFW or not at all; else it does not load.
@@ -90,19 +90,38 @@ def require_context() -> None:
     Raises:
         RenderError: If none opens.
     """
-    library = os.environ.get("MUJOCO_GL") or "glfw"
-    if library == "glfw":
+    if _library() == "glfw":
         _require_glfw()
         return
+    open_context(_PROBE, _PROBE).free()
+
+
+def open_context(width: int, height: int) -> Any:
+    """A context of what draws without a window, which is current from now on.
+
+    `mujoco.GLContext` is what `MUJOCO_GL` said when MuJoCo was imported, and not what it says now.
+
+    Args:
+        width: In pixels.
+        height: In pixels.
+
+    Raises:
+        RenderError: If none opens.
+    """
+    library = _library()
     try:
-        context: Any = import_module(f"mujoco.{library}").GLContext(_PROBE, _PROBE)
+        context: Any = import_module(f"mujoco.{library}").GLContext(width, height)
         context.make_current()
-        context.free()
     except Exception as error:  # Of PyOpenGL, ctypes or MuJoCo, by what is missing.
         raise RenderError(
             f"MUJOCO_GL={library} does not draw here ({_first_line(error)}): set it to one of "
             f"{', '.join(_LIBRARIES)}, or not at all."
         ) from error
+    return context
+
+
+def _library() -> str:
+    return os.environ.get("MUJOCO_GL") or "glfw"
 
 
 def _no_library(chosen: str) -> RenderError:

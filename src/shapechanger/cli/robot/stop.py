@@ -1,0 +1,53 @@
+"""`shapechanger robot stop`: somebody presses the emergency stop of a robot, from afar."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+from shapechanger.errors import LinkError
+
+__all__ = ["Stop"]
+
+# s. A guard stops within a tick, and says so in the next observation.
+_CONFIRMED_WITHIN_S: Final = 2.0
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Stop a robot at once, whoever drives it; it stays stopped until a person arms it again."""
+
+    robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
+    """Name of a robot that is known here, see `remember`."""
+    reason: str = "a person typed `robot stop`"
+    """Why, for people to read."""
+
+    def run(self) -> None:
+        """Stop it and say what happened; exits with 1 where the robot did not confirm it."""
+        from shapechanger.remote.client import RobotClient
+        from shapechanger.remote.known import recall
+
+        known = recall(self.robot)
+        try:
+            with RobotClient.connect(known, role="person", frames=False) as robot:
+                robot.emergency_stop(self.reason)
+                until_s = time.monotonic() + _CONFIRMED_WITHIN_S
+                while not (seen := robot.ask().message).emergency:
+                    if time.monotonic() > until_s:
+                        raise LinkError("The robot answers, and does not say that it stopped.")
+        except LinkError as error:
+            plain_console(stderr=True).print(
+                f"error: {error}\nThe stop was not confirmed: go there, and cut its power.",
+                soft_wrap=True,
+            )
+            sys.exit(1)
+        plain_console().print(
+            f"{self.robot} is stopped. {seen.stop_reason}\n"
+            f"Only a person lets it drive again: shapechanger robot drive {self.robot}, and E.",
+            soft_wrap=True,
+        )

@@ -1,0 +1,91 @@
+"""Pictures of a camera on board, drawn without shadows, reflections and smoothed edges."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import RenderError
+from shapechanger.headless import choose_gl, open_context
+
+__all__ = ["OnboardCamera"]
+
+_COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
+_MOST_GEOMS: Final = 2000
+
+
+class OnboardCamera:
+    """Draws what a camera of a model sees. Others may draw in the same process.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        RenderError: If nothing can be drawn here.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._width, self._height = size
+        choose_gl()
+        self._gl: Any = open_context(*size)
+        self._rect = mujoco.MjrRect(0, 0, *size)
+        self._picture = np.empty((self._height, self._width, 3), np.uint8)
+        self._context: mujoco.MjrContext | None = None
+        self._scene: mujoco.MjvScene | None = None
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
+        self._option = mujoco.MjvOption()
+        self._finalizer = weakref.finalize(self, _free, self._gl)
+        self._finalizer.atexit = False
+
+    def look_through(self, model: mujoco.MjModel, camera: str) -> None:
+        """Draw this model from now on, by its camera of this name."""
+        self._gl.make_current()
+        if self._context is not None:
+            self._context.free()
+        model.vis.global_.offwidth, model.vis.global_.offheight = self._width, self._height
+        model.vis.quality.offsamples = model.vis.quality.shadowsize = 0
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
+        for flag in _COSTLY:
+            self._scene.flags[flag] = 0
+        self._camera.fixedcamid = model.camera(camera).id
+
+    def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """What it sees now, RGB, shape (height, width, 3), in an array of its own.
+
+        Raises:
+            RenderError: If no model was given to look at.
+        """
+        if self._scene is None or self._context is None:
+            raise RenderError("The camera looks at nothing yet.")
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            model,
+            data,
+            self._option,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            self._scene,
+        )
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
+        return self._picture[::-1].copy()
+
+    def close(self) -> None:
+        """Free the context."""
+        if self._context is not None:
+            self._gl.make_current()
+            self._context.free()
+            self._context = self._scene = None
+        self._finalizer()
+
+
+def _free(gl: Any) -> None:
+    gl.free()

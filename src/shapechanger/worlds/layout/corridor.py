@@ -1,0 +1,191 @@
+"""Corridors of an office building: straight legs and right-angled corners, once round."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.worlds.course import Course, Lamp
+from shapechanger.worlds.layout.chance import picked
+from shapechanger.worlds.layout.lines import arcs, resampled
+from shapechanger.worlds.layout.loops import grown, outline, spread
+from shapechanger.worlds.layout.panels import panelled
+from shapechanger.worlds.layout.things import Furniture, Lane, Size
+
+__all__ = ["CEILING_M", "corridor"]
+
+CEILING_M: Final = 2.5
+"""Height of the ceiling, and of every wall."""
+
+_PITCH_M = (4.0, 6.0)
+_WIDTH_M = (1.8, 2.4)
+_LENGTH_M = (40.0, 90.0)
+_GAP_M = 0.9
+_SPACING_M = 0.1
+
+# What stands along the walls; the second number of each is its depth. Sizes of common furniture.
+_FURNITURE = (
+    Size("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5)),
+    Size("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7)),
+    Size("bench", (1.2, 1.6), (0.38, 0.45), (0.42, 0.48)),
+    Size("plant", (0.3, 0.45), (0.3, 0.45), (0.8, 1.5)),
+    Size("cabinet", (0.8, 1.2), (0.4, 0.5), (1.0, 1.9)),
+    Size("crate", (0.4, 0.6), (0.3, 0.4), (0.25, 0.4)),
+)
+_HOW_OFTEN = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
+
+
+def corridor(rng: np.random.Generator, seed: int) -> Course | None:
+    """One attempt at a course; None where chance made none that fits."""
+    corners = _corners(rng)
+    if corners is None:
+        return None
+    widths = rng.uniform(*_WIDTH_M, size=len(corners))
+    route, starts = _route(corners, widths)
+    along = arcs(route)
+    if not _LENGTH_M[0] <= along[-1] <= _LENGTH_M[1]:
+        return None
+    normals = _normals(corners)
+    reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
+    turns = _turns(corners)
+    # Who walks along the right wall has the lane at the left hand; along the left wall, backwards.
+    right = panelled(rng, corners - reach, -turns, CEILING_M)
+    left = panelled(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
+    lane = Lane(route, left, right)
+    half_width = lane.half_width()
+    furniture = Furniture(lane, half_width, _GAP_M)
+    _furnish(rng, furniture, corners, widths, starts)
+    _plant(rng, furniture, corners, reach * turns[:, None], starts)
+    return Course(
+        world="corridor",
+        seed=seed,
+        route=route,
+        half_width=half_width,
+        walls=(*left, *right),
+        things=tuple(furniture.things),
+        lamps=_lamps(rng, corners, widths),
+        ceiling_m=CEILING_M,
+        gap_m=furniture.gap_m,
+    )
+
+
+def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
+    """Where the middle of the corridor turns, in driving direction, the longest leg first."""
+    loop = outline(grown(rng, int(rng.integers(3, 8))))
+    if loop is None:
+        return None
+    points = spread(rng, loop, *_PITCH_M)
+    if rng.random() < 0.5:
+        points = points[::-1]
+    points = points[_turns(points) != 0]
+    if len(points) < 6:  # A rectangle turns one way only.
+        return None
+    legs = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
+    return np.roll(points, -int(np.argmax(legs)), axis=0)
+
+
+def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """At each point 1 for a turn to the left, -1 to the right, 0 for none."""
+    back = points - np.roll(points, 1, axis=0)
+    ahead = np.roll(points, -1, axis=0) - points
+    return np.sign(np.round(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], 6)).astype(
+        np.int64
+    )
+
+
+def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors to the left of each leg, shape (n, 2)."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
+    return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+
+
+def _route(
+    corners: NDArray[np.float64], widths: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The middle with round corners, and how far along it each corner is, m, shape (n,).
+
+    It begins after a third of the first leg. A corner as round as half the width leaves the inner
+    edge at the same distance all the way.
+    """
+    back = corners - np.roll(corners, 1, axis=0)
+    back /= np.hypot(back[:, 0], back[:, 1])[:, None]
+    ahead = np.roll(back, -1, axis=0)
+    radii = np.minimum(widths, np.roll(widths, 1)) / 2.0
+    pieces = [corners[:1] + (corners[1:2] - corners[:1]) / 3.0]
+    angles = np.linspace(0.0, np.pi / 2.0, 25)[:, None]
+    for k in [*range(1, len(corners)), 0]:
+        arc = (1.0 - np.sin(angles)) * -back[k] + (1.0 - np.cos(angles)) * ahead[k]
+        pieces.append(corners[k] + radii[k] * arc)
+    line = np.concatenate(pieces)
+    # The corner's middle is the thirteenth point of its arc.
+    along = arcs(line)[np.arange(len(corners)) * 25 + 13]
+    return resampled(line, _SPACING_M), np.roll(along, 1)
+
+
+def _furnish(
+    rng: np.random.Generator,
+    furniture: Furniture,
+    corners: NDArray[np.float64],
+    widths: NDArray[np.float64],
+    along: NDArray[np.float64],
+) -> None:
+    """Stand furniture along the walls, and a few boxes where they are in the way."""
+    normals = _normals(corners)
+    density = rng.uniform(0.1, 0.35)  # Things per metre: some buildings are tidy.
+    for k in range(len(corners)):
+        after = (k + 1) % len(corners)
+        leg = corners[after] - corners[k]
+        length = float(np.hypot(*leg))
+        ahead, yaw = leg / length, float(np.arctan2(leg[1], leg[0]))
+        for _ in range(rng.poisson(density * length)):
+            size = _FURNITURE[picked(rng, _HOW_OFTEN)]
+            t = float(rng.uniform(1.2, length - 1.2))
+            side = 1.0 if rng.random() < 0.5 else -1.0
+            thing = size.draw(rng, 0.0, 0.0, yaw)
+            aside = widths[k] / 2.0 - thing.width / 2.0 - float(rng.uniform(0.005, 0.04))
+            if thing.kind in ("box", "crate") and rng.random() < 0.4:
+                aside *= float(rng.uniform(0.4, 0.9))
+                thing = replace(thing, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
+            x, y = corners[k] + ahead * t + normals[k] * side * aside
+            thing = replace(thing, x=float(x), y=float(y))
+            furniture.offer(thing, float(along[after]) - (length - t))
+
+
+def _plant(
+    rng: np.random.Generator,
+    furniture: Furniture,
+    corners: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    along: NDArray[np.float64],
+) -> None:
+    """Stand plants and bins into some nooks: `inward` points from there through the corner."""
+    for corner, way, s in zip(corners, inward, along, strict=True):
+        if rng.random() < 0.25:
+            size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
+            thing = size.draw(rng, 0.0, 0.0, 0.0)
+            # So far from both walls that it touches neither.
+            x, y = corner - way + np.sign(way) * (thing.length / 2.0 + 0.02)
+            furniture.offer(replace(thing, x=float(x), y=float(y)), float(s))
+
+
+def _lamps(
+    rng: np.random.Generator, corners: NDArray[np.float64], widths: NDArray[np.float64]
+) -> tuple[Lamp, ...]:
+    """A row of lamps along the middle of every leg, lengthwise or across."""
+    every = float(rng.uniform(2.0, 3.2))
+    long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))
+    across = rng.random() < 0.35
+    lamps: list[Lamp] = []
+    for k, corner in enumerate(corners):
+        leg = corners[(k + 1) % len(corners)] - corner
+        length = float(np.hypot(*leg))
+        count = max(1, round(length / every))
+        yaw = float(np.arctan2(leg[1], leg[0])) + (np.pi / 2.0 if across else 0.0)
+        for i in range(count):
+            x, y = corner + leg * (i + 0.5) / count
+            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(widths[k])), wide))
+    return tuple(lamps)

@@ -1,0 +1,117 @@
+"""Many small four-sided patches of one material, gathered into one mesh that is drawn at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Array", "Patches", "add_material", "add_patches"]
+
+Array = NDArray[np.float64]
+
+# The corners of a patch run counter-clockwise for who sees it.
+_TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
+# A mirrored patch runs the other way round.
+_MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
+_DOWN: Final = np.array([1.0, 1.0, -1.0])
+
+
+@dataclass(slots=True)
+class Patches:
+    """Patches with their place, their part of the texture and their light.
+
+    Each is four corners that run counter-clockwise for who looks at its front; nobody sees its
+    back. In a texture u runs to the right and v down from the top, both 1 at the far edge.
+    """
+
+    _corners: list[Array] = field(default_factory=list[Array])
+    _places: list[Array] = field(default_factory=list[Array])
+    _lights: list[Array] = field(default_factory=list[Array])
+
+    def add(self, corners: Array, places: Array, lights: Array | float = 1.0) -> None:
+        """Add n patches.
+
+        Args:
+            corners: Where their corners are, (n, 4, 3), m.
+            places: Where their corners are in the texture, (n, 4, 2).
+            lights: How bright each corner is, (n, 4), 0 to 1; or all of them.
+        """
+        self._corners.append(corners)
+        self._places.append(places)
+        self._lights.append(np.broadcast_to(np.asarray(lights, float), corners.shape[:2]))
+
+    def __bool__(self) -> bool:
+        return bool(self._corners)
+
+    def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """Points (m, 3), places in the texture (m, 2), lights (m,) and triangles (k, 3).
+
+        Mirrored, all is there once more below the ground, where a glossy ground lets it be seen.
+        """
+        points = np.concatenate(self._corners).reshape(-1, 3)
+        places = np.concatenate(self._places).reshape(-1, 2)
+        lights = np.concatenate(self._lights).reshape(-1)
+        first = np.arange(0, len(points), 4)[:, None, None]
+        triangles = (first + _TRIANGLES).reshape(-1, 3)
+        if mirrored:
+            below = (first + len(points) + _MIRRORED).reshape(-1, 3)
+            triangles = np.concatenate([triangles, below])
+            points = np.concatenate([points, points * _DOWN])
+            places, lights = np.tile(places, (2, 1)), np.tile(lights, 2)
+        return points, places, lights, triangles
+
+
+def add_material(
+    spec: mujoco.MjSpec, name: str, picture: NDArray[np.uint8], colour: tuple[float, float, float]
+) -> mujoco.MjsMaterial:
+    """A material that shows a texture in nothing but the light of `add_patches`."""
+    height, width, channels = picture.shape
+    texture = spec.add_texture(
+        name=name,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        height=height,
+        width=width,
+        nchannel=channels,
+    )
+    texture.data = picture.tobytes()
+    material = spec.add_material(
+        name=name, rgba=[*colour, 1.0], emission=0.0, specular=0.0, shininess=0.0, reflectance=0.0
+    )
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    return material
+
+
+def add_patches(
+    spec: mujoco.MjSpec, name: str, patches: Patches, material: str, mirrored: bool = False
+) -> None:
+    """Draw patches; they touch nothing and weigh nothing.
+
+    MuJoCo keeps no brightness for a point, but a normal, and a lamp that shines straight up lights
+    each point by how far its normal leans down. So the normal is chosen to give the light wanted,
+    whichever way the patch really looks.
+    """
+    points, places, lights, triangles = patches.arrays(mirrored)
+    lean = np.clip(lights, 0.0, 1.0)
+    normals = np.stack([np.sqrt(1.0 - lean * lean), np.zeros_like(lean), -lean], axis=1)
+    spec.add_mesh(
+        name=name,
+        uservert=points.ravel(),
+        usernormal=normals.ravel(),
+        usertexcoord=places.ravel(),
+        userface=triangles.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        material=material,
+        contype=0,
+        conaffinity=0,
+        group=0,
+        mass=0.0,
+    )

@@ -1,0 +1,56 @@
+"""A twin is served by a newcomer, known at once, and stopped by somebody who only watches."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.known import KnownRobot, recall, remember
+from tests.cli.robot.typing import Person
+from tests.robots import BLIND_CAR, write_profile
+from tests.served import driving
+
+
+def test_a_second_person_stops_a_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever drives it; it says so, and stays stopped."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path, BLIND_CAR)) as robot:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        with driving(robot, "real") as car:
+            car.drive_until(lambda seen: seen.action_applied[1] > 0.0, 0.0, 0.5)
+            main(["robot", "stop", "car", "--reason", "a dog"])
+            said = capsys.readouterr().out
+            assert said.startswith("car is stopped. ")
+            assert "a dog" in said
+            assert "shapechanger robot drive car" in said
+            seen = car.step(0.0, 0.5)
+            assert seen.emergency
+            assert seen.action_applied[1] == 0.0
+
+
+def test_a_robot_that_is_served_on_its_twin_is_known_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that somebody who copied a profile can drive it at once, by its name."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    profile = write_profile(tmp_path, BLIND_CAR)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", str(port))
+    with Person(serve, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
+        person.read_until("Known here as blind-car: `shapechanger robot drive blind-car`")
+        person.read_until(" listens at ")
+        assert recall("blind-car").address == f"127.0.0.1:{port}"
+        with RobotClient.connect(recall("blind-car"), role="person") as client:
+            client.take()
+            client.arm()
+        person.process.terminate()
+        assert person.end() == 0

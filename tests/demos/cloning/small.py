@@ -1,0 +1,36 @@
+"""Settings with which a policy learns the drawn corridor in seconds."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from shapechanger.demos.cloning import CameraPolicy, CloneSettings, Framing
+from tests.demos.cloning.corridor import Drive, drive
+
+__all__ = ["SIZE", "SMALL", "error", "shown"]
+
+SIZE: Final = (24, 40)
+"""Rows and columns."""
+
+SMALL: Final = CloneSettings(
+    framing=Framing(height=24, width=40, top=0.2),
+    channels=(8, 16, 24),
+    features=32,
+    batch=32,
+    fewest_steps=150,
+    most_steps=150,
+    warm_up=10,
+    checks=5,
+)
+
+
+def shown(n: int, seed: int, gain: float = 1.0) -> Drive:
+    """Demonstrations at the size of `SMALL`."""
+    return drive(n, seed, size=SIZE, gain=gain)
+
+
+def error(policy: CameraPolicy, test: Drive) -> float:
+    """Mean absolute error of steering and throttle on pictures that nothing was learned from."""
+    return float(np.abs(policy.predict_many(test.pictures) - test.actions).mean())

@@ -1,0 +1,71 @@
+"""What a policy sees of a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.demos.cloning import Framing, prepare
+from shapechanger.demos.cloning.errors import CloningError
+
+_FRAMING = Framing()
+
+
+def _pictures(n: int, height: int = 120, width: int = 160) -> np.ndarray:
+    return np.random.default_rng(0).integers(0, 256, (n, height, width, 3), np.uint8)
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+def test_each_pixel_is_the_mean_of_its_block(scale: int) -> None:
+    """Rounded half up, from below the cut."""
+    pictures = _pictures(3, 120 * scale, 160 * scale)
+    size = 2 * scale
+    blocks = pictures[:, 24 * scale :].reshape(3, 48, size, 80, size, 3).astype(np.float64)
+    expected = np.floor(blocks.mean(axis=(2, 4)) + 0.5)
+    np.testing.assert_array_equal(prepare(pictures, _FRAMING), expected)
+
+
+def test_many_pictures_are_prepared_as_one_is() -> None:
+    """In driving there is one at a time."""
+    pictures = _pictures(300)
+    small = prepare(pictures, _FRAMING)
+    assert small.dtype == np.uint8
+    for i in (0, 255, 256, 299):
+        np.testing.assert_array_equal(small[i], prepare(pictures[i : i + 1], _FRAMING)[0])
+
+
+def test_prepared_pictures_stay_as_they_are() -> None:
+    """So that a data set can be kept small."""
+    small = prepare(_pictures(2), _FRAMING)
+    assert prepare(small, _FRAMING) is small
+
+
+def test_no_pictures_are_no_pictures() -> None:
+    """An empty array has the shape of an answer."""
+    assert prepare(_pictures(0), _FRAMING).shape == (0, 48, 80, 3)
+
+
+@pytest.mark.parametrize(
+    ("pictures", "words"),
+    [
+        (_pictures(1, 100, 160), "160 x 100 do not divide"),
+        (_pictures(1, 120, 170), "170 x 120 do not divide"),
+        (_pictures(1, 20, 40), "40 x 20 do not divide"),
+        (_pictures(1)[0], r"shape \(120, 160, 3\)"),
+        (_pictures(1)[..., :1], r"shape \(1, 120, 160, 1\)"),
+        (_pictures(1).astype(np.float32), "float32"),
+    ],
+)
+def test_what_cannot_be_seen_is_refused(pictures: np.ndarray, words: str) -> None:
+    """The message says what the pictures are."""
+    with pytest.raises(CloningError, match=words):
+        prepare(pictures, _FRAMING)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"height": 0}, {"width": -1}, {"top": 1.0}, {"top": float("nan")}]
+)
+def test_a_framing_shows_something(wrong: dict[str, float]) -> None:
+    """Nothing is left to see, or nothing can be."""
+    with pytest.raises(CloningError, match="A policy cannot see"):
+        Framing(**wrong)  # pyright: ignore[reportArgumentType]

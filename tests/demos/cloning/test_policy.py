@@ -1,0 +1,214 @@
+"""The file of a policy: it comes back as it was, and nothing else passes for one."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.demos.cloning import CameraPolicy, CloneSettings
+from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.errors import OutputError
+from tests.demos.cloning.small import SMALL, shown
+
+_PICTURES = shown(20, 0).pictures
+
+
+def _policy(settings: CloneSettings = SMALL) -> CameraPolicy:
+    return CameraPolicy.fresh(settings, 0)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file with a policy."""
+    file = tmp_path / "policies" / "corridor.zip"
+    _policy().save(file)
+    return file
+
+
+def test_a_policy_comes_back_as_it_was(path: Path) -> None:
+    """To the last bit, and with its card."""
+    policy = _policy().described(command="clone it", minutes=3, seeds=[1, 2])
+    policy.save(path)
+    again = CameraPolicy.load(path)
+    np.testing.assert_array_equal(again.predict_many(_PICTURES), policy.predict_many(_PICTURES))
+    assert again.card == policy.card
+    assert again.card.data == {"minutes": 3, "seeds": [1, 2]}
+    assert again.card.command == "clone it"
+
+
+def test_the_same_policy_is_the_same_file(path: Path, tmp_path: Path) -> None:
+    """No date, no order that changes."""
+    CameraPolicy.load(path).save(tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == path.read_bytes()
+
+
+def test_a_policy_of_the_default_settings_is_small(path: Path) -> None:
+    """It is to be sent to a robot."""
+    _policy(CloneSettings()).save(path)
+    assert path.stat().st_size < 1_000_000
+
+
+def test_one_picture_and_many_give_the_same() -> None:
+    """In driving there is one at a time."""
+    policy = _policy()
+    many = policy.predict_many(_PICTURES)
+    assert many.dtype == np.float32
+    assert np.abs(many).max() <= 1.0
+    for picture, action in zip(_PICTURES, many, strict=True):
+        np.testing.assert_allclose(policy.predict(picture), action, atol=1e-6)
+
+
+def test_light_hardly_matters() -> None:
+    """A picture is freed of its own brightness before the policy sees it."""
+    policy = _policy()
+    bright = (_PICTURES // 2) * 2
+    np.testing.assert_allclose(
+        policy.predict_many(bright // 2), policy.predict_many(bright), atol=0.02
+    )
+
+
+def test_a_picture_of_another_shape_is_refused() -> None:
+    """In a sentence, not with a page of Torch."""
+    with pytest.raises(CloningError, match="do not divide"):
+        _policy().predict(np.zeros((50, 50, 3), np.uint8))
+
+
+def _weights(state: Any) -> bytes:
+    buffer = io.BytesIO()
+    torch.save(state, buffer)
+    return buffer.getvalue()
+
+
+def _entries(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _card(path: Path, **changes: Any) -> bytes:
+    return json.dumps({**json.loads(_entries(path)["card.json"]), **changes}).encode()
+
+
+class _Trap:
+    """What runs code when a pickle is trusted."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (print, ("trapped",))
+
+
+def _changed(path: Path, **entries: bytes | None) -> None:
+    names = {"card": "card.json", "weights": "weights.pt"}
+    whole = _entries(path) | {names[key]: value for key, value in entries.items()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in whole.items():
+            if content is not None:
+                archive.writestr(name, content)
+
+
+@pytest.mark.parametrize("missing", ["card", "weights"])
+def test_half_a_policy_is_refused(path: Path, missing: str) -> None:
+    """A zip of something else is no policy."""
+    _changed(path, **{missing: None})
+    with pytest.raises(PolicyError, match="is no whole policy: "):
+        CameraPolicy.load(path)
+
+
+def test_weights_that_are_not_the_policys_are_refused(path: Path) -> None:
+    """Of another shape, with other names, without names, not finite, cut off or worse."""
+    state = _policy().network.state_dict()
+    bias = "hands.bias"
+    for weights in (
+        _weights({**state, bias: torch.zeros(3)}),
+        _weights({**state, "more": torch.zeros(3)}),
+        _weights({name: value.double() for name, value in state.items()}),
+        _weights({**state, bias: torch.tensor([0.0, float("nan")])}),
+        _weights({name: value for name, value in state.items() if name != bias}),
+        _weights({**state, bias: "text"}),
+        _weights([1, 2]),
+        _weights({**state, bias: _Trap()}),
+        pickle.dumps(_Trap()),
+        _weights(state)[:1000],
+        b"",
+    ):
+        _changed(path, weights=weights)
+        with pytest.raises(PolicyError, match="is no whole policy: "):
+            CameraPolicy.load(path)
+
+
+def test_nothing_in_the_file_is_run(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Weights are numbers; a policy may come from anywhere."""
+    _changed(path, weights=_weights({"hands.bias": _Trap()}))
+    with pytest.raises(PolicyError):
+        CameraPolicy.load(path)
+    assert "trapped" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"features": "many"},
+        {"features": 10**6},
+        {"features": 0},
+        {"channels": [8, 16]},
+        {"framing": {"height": 0}},
+        {"framing": {"height": 10**7, "width": 10**7}},
+        {"framing": {"height": 10**30}},
+        {"format": 2},
+    ],
+)
+def test_a_card_that_lies_is_refused(path: Path, changes: dict[str, Any]) -> None:
+    """Before it takes memory."""
+    _changed(path, card=_card(path, **changes))
+    with pytest.raises(PolicyError, match=r"corridor\.zip is n"):
+        CameraPolicy.load(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"not a policy at all"])
+def test_another_file_is_refused(path: Path, content: bytes) -> None:
+    """The message names it."""
+    path.write_bytes(content)
+    with pytest.raises(PolicyError, match=r"corridor\.zip is not a policy"):
+        CameraPolicy.load(path)
+
+
+def test_every_cut_is_noticed(path: Path) -> None:
+    """A copy that was broken off, wherever."""
+    whole = path.read_bytes()
+    for share in (0.1, 0.5, 0.9, 0.999):
+        path.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(PolicyError):
+            CameraPolicy.load(path)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    """So that a misspelt path is seen."""
+    with pytest.raises(PolicyError, match=r"There is no policy file .*nowhere\.zip"):
+        CameraPolicy.load(tmp_path / "nowhere.zip")
+    with pytest.raises(PolicyError, match="is not a policy"):
+        CameraPolicy.load(tmp_path)
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    """Neither a part nor a surprise."""
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(OutputError, match="Cannot write"):
+        _policy().save(tmp_path / "taken")
+    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
+
+
+def test_copies_share_nothing() -> None:
+    """A copy may be trained on."""
+    policy = _policy()
+    copy = policy.copy()
+    with torch.no_grad():
+        copy.network.hands.bias.add_(1.0)
+    assert not torch.equal(copy.network.hands.bias, policy.network.hands.bias)
+    assert msgspec.json.encode(copy.card) == msgspec.json.encode(policy.card)

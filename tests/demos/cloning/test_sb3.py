@@ -1,0 +1,130 @@
+"""A clone as the beginning of reinforcement learning: at first it drives as the clone does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from shapechanger.demos.cloning import CameraPolicy, prepare
+from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.sb3 import PreparedPictures, to_sb3
+from tests.demos.cloning.small import SIZE, SMALL
+
+_SMALL_BUFFER: dict[str, Any] = {"buffer_size": 32, "batch_size": 4, "learning_starts": 4}
+
+
+class _Road(gym.Env[np.ndarray, np.ndarray]):
+    """Pictures in which there is nothing to see."""
+
+    def __init__(self, size: tuple[int, int] = (60, 80), high: float = 1.0) -> None:
+        self.observation_space = gym.spaces.Box(0, 255, (*size, 3), np.uint8)
+        self.action_space = gym.spaces.Box(-high, high, (2,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        super().reset(seed=seed)
+        return self._picture(), {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        return self._picture(), float(action[1]), False, bool(self.np_random.uniform() < 0.1), {}
+
+    def _picture(self) -> np.ndarray:
+        shape = self.observation_space.shape
+        assert shape is not None
+        return self.np_random.integers(0, 256, shape, np.uint8)
+
+
+@pytest.fixture
+def policy() -> CameraPolicy:
+    """A policy whose actions are not all near 0."""
+    policy = CameraPolicy.fresh(SMALL, 1)
+    with torch.no_grad():
+        policy.network.hands.weight.mul_(20.0)
+    return policy
+
+
+def test_the_learner_begins_as_the_clone(policy: CameraPolicy) -> None:
+    """The same picture, the same action, through all of Stable-Baselines3."""
+    model = to_sb3(policy, _Road(), **_SMALL_BUFFER)
+    pictures = np.random.default_rng(0).integers(0, 256, (16, 60, 80, 3), np.uint8)
+    small = prepare(pictures, policy.card.framing)
+    expected = policy.predict_many(pictures)
+    assert np.abs(expected).max() > 0.2
+    np.testing.assert_allclose(model.predict(small, deterministic=True)[0], expected, atol=1e-5)
+    one = model.predict(small[0], deterministic=True)[0]
+    np.testing.assert_allclose(one, policy.predict(pictures[0]), atol=1e-5)
+
+
+def test_what_it_tries_is_close_to_that(policy: CameraPolicy) -> None:
+    """A clone that began by driving at random would have been cloned for nothing."""
+    model = to_sb3(policy, _Road(SIZE), **_SMALL_BUFFER)
+    pictures = np.random.default_rng(0).integers(0, 256, (64, *SIZE, 3), np.uint8)
+    tried = model.predict(pictures, deterministic=False)[0]
+    apart = np.abs(tried - policy.predict_many(pictures)).mean()
+    assert 0.01 < apart < 0.2
+
+
+def test_it_goes_on_learning_and_comes_back(policy: CameraPolicy, tmp_path: Path) -> None:
+    """Its file is one of Stable-Baselines3's own, and the clone stays as it was."""
+    before = policy.network.hands.weight.clone()
+    model = to_sb3(policy, DummyVecEnv([lambda: _Road(SIZE)]), **_SMALL_BUFFER)
+    picture = np.zeros((*SIZE, 3), np.uint8)
+    model.learn(12)
+    assert torch.equal(policy.network.hands.weight, before)
+    assert not torch.equal(model.actor.mu.weight, before)
+    model.save(tmp_path / "model.zip")
+    again = SAC.load(tmp_path / "model.zip")
+    np.testing.assert_array_equal(
+        again.predict(picture, deterministic=True)[0], model.predict(picture, deterministic=True)[0]
+    )
+
+
+def test_settings_reach_the_learner(policy: CameraPolicy) -> None:
+    """Except for the shape of the actor, which is the clone's."""
+    kwargs = {"net_arch": {"pi": [], "qf": [16]}}
+    model = to_sb3(policy, _Road(), gamma=0.9, policy_kwargs=kwargs, **_SMALL_BUFFER)
+    assert model.gamma == 0.9
+    assert model.critic.qf0[0].out_features == 16
+
+
+def test_the_wrapper_shows_what_the_policy_sees(policy: CameraPolicy) -> None:
+    """In the env's own order of colours."""
+    env = PreparedPictures(_Road(), policy.card.framing)
+    seen, _ = env.reset(seed=0)
+    raw, _ = _Road().reset(seed=0)
+    assert env.observation_space.contains(seen)
+    np.testing.assert_array_equal(seen, prepare(raw[None], policy.card.framing)[0])
+
+
+@pytest.mark.parametrize(
+    ("env", "error", "words"),
+    [
+        (_Road(high=2.0), PolicyError, r"lie in \[-1, 1\]"),
+        (_Road((50, 50)), CloningError, "50 x 50 do not divide"),
+    ],
+)
+def test_an_env_that_does_not_fit_is_refused(
+    policy: CameraPolicy, env: gym.Env[Any, Any], error: type[Exception], words: str
+) -> None:
+    """Before anything is learned."""
+    with pytest.raises(error, match=words):
+        to_sb3(policy, env)
+
+
+def test_an_env_without_pictures_is_refused(policy: CameraPolicy) -> None:
+    """Its numbers are no picture; and nothing steers a pole on a cart."""
+    env = _Road()
+    env.observation_space = gym.spaces.Box(0, 1, (4,), np.float32)
+    with pytest.raises(PolicyError, match="cannot see Box"):
+        to_sb3(policy, env)
+    env.action_space = gym.spaces.Discrete(2)  # pyright: ignore[reportAttributeAccessIssue]
+    with pytest.raises(PolicyError, match="cannot act in Discrete"):
+        to_sb3(policy, env)

@@ -1,0 +1,30 @@
+"""From the actions of a robot to the values of its outputs."""
+
+from __future__ import annotations
+
+import pytest
+
+from shapechanger.robot.guard.mix import output_values
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+
+_PLAN = GuardPlan(
+    "tank",
+    (ActionPlan("steering"), ActionPlan("throttle", propels=True)),
+    (
+        OutputPlan("left", "hbridge", mix={"throttle": 1.0, "steering": 1.0}),
+        OutputPlan("right", "hbridge", mix={"throttle": 1.0, "steering": -1.0}, offset=0.25),
+    ),
+)
+
+
+def test_an_output_is_its_offset_and_what_it_takes_of_each_action() -> None:
+    """And never beyond its range."""
+    assert output_values(_PLAN, [0.25, 0.5]) == (0.75, 0.5)
+    assert output_values(_PLAN, [1.0, 1.0]) == (1.0, 0.25)
+
+
+@pytest.mark.parametrize("actions", [[], [0.5], [0.0, 0.5, 0.0]])
+def test_too_many_or_too_few_numbers_are_refused_in_words(actions: list[float]) -> None:
+    """The message names the actions."""
+    with pytest.raises(ValueError, match=r"tank has 2 actions \(steering, throttle\), got "):
+        output_values(_PLAN, actions)

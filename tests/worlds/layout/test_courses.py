@@ -1,0 +1,262 @@
+"""Courses by world and seed: what holds for each of them, also for those nobody learned on."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.worlds.course import HELD_OUT, Course, Thing
+from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
+from shapechanger.worlds.layout.distances import (
+    between,
+    cross_each_other,
+    from_thing,
+    segments,
+    to_segments,
+)
+
+_SEEDS = [*range(20), *HELD_OUT[:20]]
+_WIDTHS = {"corridor": (1.8, 2.4), "yard": (3.0, 5.0), "harbour": (4.0, 7.0)}
+_GAPS = {"corridor": 0.9, "yard": 1.2, "harbour": 1.6}
+_RADII = {"corridor": 0.85, "yard": 1.8, "harbour": 2.5}
+
+each_world = pytest.mark.parametrize("world", WORLDS)
+
+
+@cache
+def _laid(world: str, seed: int) -> Course:
+    return lay_out(world, seed)
+
+
+def _courses(world: str) -> list[Course]:
+    return [_laid(world, seed) for seed in _SEEDS]
+
+
+def _bends(course: Course) -> np.ndarray:
+    """By how much the route turns left at each point, rad."""
+    steps = np.diff(course.route, axis=0, append=course.route[:1])
+    headings = np.arctan2(steps[:, 1], steps[:, 0])
+    return (np.diff(headings, prepend=headings[-1:]) + math.pi) % (2 * math.pi) - math.pi
+
+
+def _same(one: Course, other: Course) -> bool:
+    return (
+        np.array_equal(one.route, other.route)
+        and np.array_equal(one.half_width, other.half_width)
+        and (one.walls, one.things, one.lamps) == (other.walls, other.things, other.lamps)
+        and (one.gap_m, one.current_mps) == (other.gap_m, other.current_mps)
+    )
+
+
+@each_world
+def test_a_seed_is_a_course(world: str) -> None:
+    """A result can be repeated: equal seeds give equal courses, different seeds different ones."""
+    for seed in _SEEDS[:5] + _SEEDS[-5:]:
+        np.random.seed(seed % 7)  # noqa: NPY002 - What others do with chance must not matter.
+        assert _same(lay_out(world, seed), _laid(world, seed))
+    courses = _courses(world)
+    assert not any(_same(a, b) for i, a in enumerate(courses) for b in courses[:i])
+    assert {(c.world, c.seed) for c in courses} == {(world, seed) for seed in _SEEDS}
+
+
+@each_world
+def test_the_route_is_closed_even_and_of_the_promised_length(world: str) -> None:
+    """Whoever counts points counts metres, and the last point leads to the first."""
+    for course in _courses(world):
+        steps = np.diff(course.route, axis=0, append=course.route[:1])
+        chords = np.hypot(steps[:, 0], steps[:, 1])
+        assert chords == pytest.approx(course.spacing, rel=2e-3)
+        assert course.spacing == pytest.approx(0.1, rel=0.02)
+        assert 40.0 <= course.length <= 90.0
+        assert course.half_width.shape == (len(course.route),)
+
+
+@each_world
+def test_courses_turn_both_ways(world: str) -> None:
+    """Who learns to turn only left has learned nothing; loops run round both ways too."""
+    sums = set[int]()
+    for course in _courses(world):
+        bends = _bends(course)
+        assert bends[bends > 0].sum() > 0.3
+        assert bends[bends < 0].sum() < -0.3
+        sums.add(round(bends.sum() / (2 * math.pi)))
+    assert sums == {-1, 1}
+
+
+@each_world
+def test_no_bend_is_tighter_than_promised(world: str) -> None:
+    """A vehicle with the turning circle of its world gets round every bend."""
+    for course in _courses(world):
+        # Over half a metre: the route is drawn by points, so single angles are rough.
+        turned = np.abs(ndimage.uniform_filter1d(_bends(course), 5, mode="wrap"))
+        assert course.spacing / turned.max() >= 0.97 * _RADII[world]
+
+
+@each_world
+def test_the_walls_are_closed_lines(world: str) -> None:
+    """No vehicle slips out between two walls: each ends where exactly one other begins."""
+    for course in _courses(world):
+        starts = [wall.start for wall in course.walls]
+        ends = [wall.end for wall in course.walls]
+        assert len(set(starts)) == len(starts)
+        assert sorted(starts) == sorted(ends)
+        lengths = [math.dist(wall.start, wall.end) for wall in course.walls]
+        assert min(lengths) > 0.05
+        assert not cross_each_other(segments(course.walls))
+
+
+@each_world
+def test_no_view_escapes_and_walls_face_it(world: str) -> None:
+    """From wherever on the route, a look in any direction ends at the left side of a wall."""
+    angles = np.linspace(0.0, 2 * math.pi, 90, endpoint=False) + 0.0123
+    ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for course in _courses(world)[::3]:
+        feet = segments(course.walls)
+        along = feet[:, 2:] - feet[:, :2]
+        for eye in course.route[::40]:
+            to = feet[:, :2] - eye
+            across = ways[:, :1] * along[:, 1] - ways[:, 1:] * along[:, 0]
+            far = (to[:, 0] * along[:, 1] - to[:, 1] * along[:, 0]) / across
+            share = (to[:, 0] * ways[:, 1:] - to[:, 1] * ways[:, :1]) / across
+            hit = (far > 0.0) & (share >= 0.0) & (share <= 1.0)
+            assert hit.any(axis=1).all()
+            nearest = np.where(hit, far, np.inf).argmin(axis=1)
+            # The look comes from the left of the wall: it crosses towards its right.
+            assert (across[np.arange(len(ways)), nearest] > 0.0).all()
+
+
+@each_world
+def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
+    """The middle is the middle: no wall is nearer than `half_width`, and one is that near."""
+    low, high = _WIDTHS[world]
+    for course in _courses(world):
+        nearest = to_segments(course.route, segments(course.walls)).min(axis=1)
+        assert course.half_width == pytest.approx(nearest, abs=1e-6)
+        assert nearest.min() >= low / 2.0 - 1e-6
+        # A corner of a corridor is as wide as its diagonal.
+        assert nearest.max() <= high / 2.0 * (math.sqrt(2.0) if world == "corridor" else 1.0)
+
+
+@each_world
+def test_things_touch_at_most(world: str) -> None:
+    """Nothing stands in something else, neither in a wall nor outside."""
+    for course in _courses(world):
+        feet = segments(course.walls)
+        blocked, (x0, y0) = occupancy(_without(course), 0.05)
+        for i, thing in enumerate(course.things):
+            assert from_thing(thing, feet).min() > 0.0
+            assert not blocked[round((thing.y - y0) / 0.05), round((thing.x - x0) / 0.05)]
+            assert all(between(thing, other) > 0.0 for other in course.things[:i])
+
+
+@each_world
+def test_the_start_is_free(world: str) -> None:
+    """Nothing stands within 1.5 m of the start along the route, nor within 2 m before it."""
+    for course in _courses(world):
+        n = len(course.route)
+        behind, before = round(1.5 / course.spacing), round(2.0 / course.spacing)
+        near = course.route[np.arange(-behind, before + 1) % n]
+        pieces = np.concatenate([near[:-1], near[1:]], axis=1)
+        half = float(course.half_width.min())
+        for thing in course.things:
+            assert from_thing(thing, pieces).min() > min(0.5, half / 2.0)
+
+
+@each_world
+def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
+    """A disc as wide as `gap_m` rolls once round, past every thing: measured on a fine grid."""
+    cell = 0.04
+    for course in _courses(world)[::2]:
+        assert course.gap_m >= _GAPS[world]
+        blocked, (x0, y0) = occupancy(course, cell)
+        room = ndimage.distance_transform_edt(~blocked) * cell
+        free = room >= course.gap_m / 2.0 - 1.5 * cell
+        # A cut across the lane at the start: its two sides must be joined the other way round.
+        ahead = course.route[1] - course.route[-1]
+        ahead /= np.hypot(*ahead)
+        rows, columns = np.indices(blocked.shape)
+        x, y = x0 + columns * cell - course.route[0, 0], y0 + rows * cell - course.route[0, 1]
+        s, aside = x * ahead[0] + y * ahead[1], y * ahead[0] - x * ahead[1]
+        near = np.abs(aside) < 1.3 * float(course.half_width[0])
+        free &= ~(near & (np.abs(s) < 1.5 * cell))
+        labels, _ = ndimage.label(free)
+        after = set(labels[near & (s > 0.0) & (s < 0.5)].flat) - {0}
+        before = set(labels[near & (s < 0.0) & (s > -0.5)].flat) - {0}
+        assert after & before
+
+
+@each_world
+def test_lamps_hang_over_the_lane(world: str) -> None:
+    """Light falls where somebody drives, and only corridors have a ceiling to hang it from."""
+    for course in _courses(world):
+        assert course.lamps
+        assert course.ceiling_m == (2.5 if world == "corridor" else 0.0)
+        middles = np.array([(lamp.x, lamp.y) for lamp in course.lamps])
+        far = np.hypot(*(middles[:, None] - course.route[None]).transpose(2, 0, 1)).min(axis=1)
+        assert far.max() < course.half_width.max()
+
+
+def test_corridors_have_corners_and_doors() -> None:
+    """Six corners at least, and over all seeds every kind of wall and of furniture."""
+    surfaces, kinds = set[str](), set[str]()
+    for course in _courses("corridor"):
+        turned = np.abs(_bends(course)).sum() / (math.pi / 2.0)
+        assert turned == pytest.approx(round(turned), abs=0.01)
+        assert turned >= 5.99
+        assert {wall.height for wall in course.walls} == {2.5}
+        surfaces |= {wall.surface for wall in course.walls}
+        kinds |= {thing.kind for thing in course.things}
+    assert surfaces == {"plaster", "door", "window", "brick", "board", "glass"}
+    assert kinds == {"box", "bin", "bench", "plant", "cabinet", "crate"}
+
+
+def test_yards_and_harbours_have_all_that_belongs_there() -> None:
+    """Over all seeds every surface and every obstacle occurs; quays are as high as they should."""
+    yards, harbours = _courses("yard"), _courses("harbour")
+    assert {w.surface for c in yards for w in c.walls} == {"hedge", "fence", "brick", "shed"}
+    assert {t.kind for c in yards for t in c.things} == {"cone", "crate", "bin", "post", "tree"}
+    assert {w.surface for c in harbours for w in c.walls} == {"quay", "rock"}
+    assert {t.kind for c in harbours for t in c.things} == {"buoy", "dinghy", "crate"}
+    quays = {w.height for c in harbours for w in c.walls if w.surface == "quay"}
+    assert quays == {0.6}
+
+
+def test_only_water_flows() -> None:
+    """A harbour has a current of up to 0.15 m/s, not always the same; land has none."""
+    speeds = [math.hypot(*course.current_mps) for course in _courses("harbour")]
+    assert 0.1 < max(speeds) <= 0.15
+    assert min(speeds) < 0.05
+    assert all(c.current_mps == (0.0, 0.0) for w in ("corridor", "yard") for c in _courses(w))
+
+
+def test_unknown_worlds_and_seeds_are_refused() -> None:
+    """The message says what exists, or what is wrong with the seed."""
+    with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
+        lay_out("harbor", 0)
+    with pytest.raises(WorldError, match="-1 is less"):
+        lay_out("yard", -1)
+
+
+def test_a_world_that_never_fits_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chance that makes no course ends in a sentence instead of an endless search."""
+    from shapechanger.worlds.layout import courses
+
+    def never(rng: np.random.Generator, seed: int) -> Course | None:
+        return None
+
+    monkeypatch.setattr(courses, "_MAKERS", {"yard": never})
+    with pytest.raises(WorldError, match="No yard with seed 3"):
+        lay_out("yard", 3)
+
+
+def _without(course: Course) -> Course:
+    things: tuple[Thing, ...] = ()
+    return Course(
+        course.world, course.seed, course.route, course.half_width, course.walls, things,
+        course.lamps, course.ceiling_m, course.gap_m,
+    )  # fmt: skip

@@ -1,0 +1,54 @@
+"""Closed lines of points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.worlds.layout.lines import (
+    length,
+    normals,
+    resampled,
+    smoothed,
+    tangent_radii,
+    turns,
+)
+
+
+def _ellipse(a: float, b: float, n: int) -> np.ndarray:
+    angles = 2 * np.pi * np.arange(n) / n
+    return np.stack([a * np.cos(angles), b * np.sin(angles)], axis=1)
+
+
+def test_resampled_points_are_evenly_apart() -> None:
+    """Also where the line bends much, and from points that were crowded there."""
+    line = resampled(_ellipse(6.0, 2.0, 2000), 0.1)
+    chords = np.hypot(*np.diff(line, axis=0, append=line[:1]).T)
+    assert chords == pytest.approx(chords[0], rel=1e-3)
+    assert chords[0] == pytest.approx(0.1, rel=0.01)
+    assert length(line) == pytest.approx(length(_ellipse(6.0, 2.0, 2000)), rel=1e-3)
+
+
+def test_normals_point_left_and_turns_sum_to_once_round() -> None:
+    """Counter-clockwise round a circle, left is inwards, and a round is 2 pi."""
+    circle = _ellipse(3.0, 3.0, 100)
+    assert normals(circle) == pytest.approx(-circle / 3.0)
+    assert turns(circle).sum() == pytest.approx(2 * np.pi)
+    assert turns(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
+
+
+def test_tangent_radii_know_bends_and_necks() -> None:
+    """Round a circle they are its radius; between two long sides half the distance."""
+    assert tangent_radii(_ellipse(3.0, 3.0, 64)) == pytest.approx(3.0)
+    x = np.linspace(-10.0, 10.0, 201)
+    sides = np.concatenate([np.stack([x, 0 * x - 1], 1), np.stack([x[::-1], 0 * x + 1], 1)])
+    assert tangent_radii(sides)[100] == pytest.approx(1.0)
+
+
+def test_smoothing_keeps_the_middle_and_removes_wiggles() -> None:
+    """The mean stays, and a wiggle of two points is gone."""
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(100, 2))
+    assert smoothed(values, 4.0).mean(axis=0) == pytest.approx(values.mean(axis=0))
+    wiggle = np.where(np.arange(100) % 2, 1.0, -1.0)
+    assert smoothed(wiggle, 4.0) == pytest.approx(0.0, abs=1e-9)

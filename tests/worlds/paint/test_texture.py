@@ -1,0 +1,60 @@
+"""Textures as pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import UnknownName
+from shapechanger.worlds.paint import PAINTERS, texture
+from shapechanger.worlds.paint.noise import clouds
+
+_TILED = ("floor", "asphalt", "water", "grass", "hedge", "ceiling", "brick", "fence")
+
+
+@pytest.mark.parametrize("name", PAINTERS)
+def test_a_texture_is_a_picture_with_something_on_it(name: str) -> None:
+    """Small enough to be sent to the graphics card at once, and not of one colour."""
+    picture = texture(name, 0)
+    assert picture.dtype == np.uint8
+    assert picture.shape[2] == 3
+    assert max(picture.shape) <= 512
+    assert picture.std() > 1.0
+
+
+@pytest.mark.parametrize("name", PAINTERS)
+def test_it_follows_from_its_seed(name: str) -> None:
+    """A course that is drawn again looks as it did, in every process."""
+    first = texture(name, 1).copy()
+    texture.cache_clear()
+    np.testing.assert_array_equal(texture(name, 1), first)
+    assert not np.array_equal(texture(name, 2), first)
+
+
+@pytest.mark.parametrize("name", _TILED)
+def test_what_goes_on_and_on_has_no_seam(name: str) -> None:
+    """Across the seam, neighbours differ about as much as inside."""
+    picture = texture(name, 3).astype(float)
+    inside = np.abs(np.diff(picture, axis=1)).mean(axis=(0, 2))
+    seam = np.abs(picture[:, 0] - picture[:, -1]).mean()
+    assert seam <= inside.max() * 1.5
+
+
+def test_a_kept_texture_cannot_be_spoilt() -> None:
+    """All courses of a process share it."""
+    with pytest.raises(ValueError, match="read-only"):
+        texture("door", 0)[0, 0, 0] = 1
+
+
+def test_an_unknown_texture_names_the_nearest() -> None:
+    """A misspelt surface is found at once."""
+    with pytest.raises(UnknownName, match="Did you mean 'plaster'"):
+        texture("plastre", 0)
+
+
+def test_clouds_have_mean_0_and_deviation_1() -> None:
+    """So that a share of them is a share of the colour."""
+    field = clouds(np.random.default_rng(0), 64, 96, 4, 6)
+    assert field.shape == (64, 96)
+    assert field.mean() == pytest.approx(0.0, abs=1e-5)
+    assert field.std() == pytest.approx(1.0, abs=1e-4)

@@ -1,0 +1,99 @@
+"""What of a course a vehicle can touch."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.worlds.look import Look
+from shapechanger.worlds.scene import add_course
+from tests.worlds.scene.courses import square
+
+_WORLDS = ("corridor", "yard", "harbour")
+# What a vehicle's hull and wheels are to have.
+_HULL = {"contype": 2, "conaffinity": 1}
+_WHEEL = {"contype": 10, "conaffinity": 5}
+
+
+def _compiled(world: str, contype: int = 0, conaffinity: int = 0) -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    add_course(spec, square(world), Look.of(world))
+    if contype:
+        body = spec.worldbody.add_body(name="ball")
+        body.add_freejoint()
+        body.add_geom(name="ball", size=[0.1, 0.0, 0.0], contype=contype, conaffinity=conaffinity)
+    return spec.compile()
+
+
+def _touched(model: mujoco.MjModel, *place: float) -> set[str]:
+    data = mujoco.MjData(model)
+    data.qpos[:3] = place
+    mujoco.mj_forward(model, data)
+    names = {model.geom(number).name for contact in data.contact for number in contact.geom}
+    return names - {"ball"}
+
+
+@pytest.mark.parametrize("world", _WORLDS)
+def test_every_name_says_that_it_is_of_the_world(world: str) -> None:
+    """A vehicle in the same model has its own names."""
+    model = _compiled(world)
+    names = [
+        *(model.geom(i).name for i in range(model.ngeom)),
+        *(model.mat(i).name for i in range(model.nmat)),
+        *(model.tex(i).name for i in range(model.ntex)),
+        *(model.mesh(i).name for i in range(model.nmesh)),
+        *(model.light(i).name for i in range(model.nlight)),
+    ]
+    assert all(name.startswith("world/") for name in names)
+
+
+@pytest.mark.parametrize("world", _WORLDS)
+def test_what_is_touched_is_not_drawn_and_what_is_drawn_not_touched(world: str) -> None:
+    """Groups 0 to 2 are drawn; a mesh that is only seen must cost the physics nothing."""
+    model = _compiled(world)
+    touchable = (model.geom_contype | model.geom_conaffinity) > 0
+    assert (model.geom_group[touchable] == 3).all()
+    assert (model.geom_group[~touchable] == 0).all()
+    assert (model.geom_type[~touchable] == mujoco.mjtGeom.mjGEOM_MESH).all()
+
+
+def test_walls_and_things_are_named_by_their_number() -> None:
+    """Whoever counts collisions finds the wall in the course."""
+    model = _compiled("corridor")
+    course = square("corridor")
+    for number in range(len(course.walls)):
+        assert model.geom(f"world/wall/{number}").contype == 1
+    for number, thing in enumerate(course.things):
+        geom = model.geom(f"world/thing/{number}")
+        assert geom.pos == pytest.approx([thing.x, thing.y, 0.5 * thing.height])
+
+
+@pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])
+def test_a_wheel_touches_the_ground_and_a_hull_does_not(bits: dict[str, int], ground: bool) -> None:
+    """A hull that rubs on the floor would brake."""
+    touched = _touched(_compiled("corridor", **bits), 0.0, 3.0, 0.05)
+    assert touched == ({"world/ground"} if ground else set())
+
+
+@pytest.mark.parametrize("bits", [_HULL, _WHEEL])
+def test_both_touch_walls_and_things(bits: dict[str, int]) -> None:
+    """The first wall is at y = -1; the second thing is a round bin."""
+    model = _compiled("corridor", **bits)
+    assert _touched(model, 3.5, -0.95, 0.3) == {"world/wall/0"}
+    assert _touched(model, 6.6, 2.8, 0.3) == {"world/thing/1"}
+
+
+def test_the_seen_side_of_a_wall_is_where_it_starts_to_push() -> None:
+    """What is seen and what is touched must be at the same place."""
+    model = _compiled("corridor", **_HULL)
+    assert _touched(model, 3.5, -0.89, 0.3) == set()
+    assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}
+
+
+def test_the_world_weighs_nothing_and_can_stand_with_a_vehicle() -> None:
+    """Nothing of it may move, or change what a vehicle weighs."""
+    model = _compiled("yard", **_HULL)
+    assert model.body_mass[0] == 0.0
+    assert model.nv == 6
+    np.testing.assert_array_equal(model.body("ball").parentid, [0])

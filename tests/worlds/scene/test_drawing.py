@@ -1,0 +1,139 @@
+"""What a camera sees of a course."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.worlds import paint
+from shapechanger.worlds.camera import OnboardCamera
+from shapechanger.worlds.course import Course, Wall
+from shapechanger.worlds.look import Look
+from shapechanger.worlds.scene import add_course
+from tests.worlds.scene.courses import square, with_walls
+
+pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
+
+_WHITE = Look(light=1.0, warmth=0.0, contrast=0.0, gloss=0.0)
+_WIDTH, _HEIGHT = 160, 120
+
+
+def _draw(
+    course: Course, look: Look, place: tuple[float, float], angle: float
+) -> NDArray[np.uint8]:
+    """What a camera 0.5 m above the ground sees at `place`, looking along `angle`, rad."""
+    spec = mujoco.MjSpec()
+    add_course(spec, course, look)
+    cos, sin = float(np.cos(angle)), float(np.sin(angle))
+    spec.worldbody.add_camera(
+        name="eye", pos=[*place, 0.5], xyaxes=[sin, -cos, 0.0, 0.0, 0.0, 1.0], fovy=66.0
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = OnboardCamera((_WIDTH, _HEIGHT))
+    try:
+        camera.look_through(model, "eye")
+        return camera.picture(model, data)
+    finally:
+        camera.close()
+
+
+@pytest.fixture
+def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Windows that are green at the top left, red at the top right and blue below."""
+
+    def painted(rng: np.random.Generator) -> NDArray[np.float32]:
+        del rng
+        image = np.zeros((64, 64, 3), np.float32)
+        image[:32, :32, 1] = image[:32, 32:, 0] = image[32:, :, 2] = 1.0
+        return image
+
+    monkeypatch.setattr(paint, "PAINTERS", MappingProxyType({**paint.PAINTERS, "window": painted}))
+    paint.texture.cache_clear()
+    yield
+    paint.texture.cache_clear()
+
+
+@pytest.mark.usefixtures("quarters")
+@pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
+def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
+    """Whichever way the wall stands, who looks at it can read what is written there."""
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    right = np.array([ahead[1], -ahead[0]])
+    # A wall 1.8 m wide 1 m ahead; its free side is at the left of who looks along it.
+    start, end = ahead + 0.9 * right, ahead - 0.9 * right
+    wall = Wall((start[0], start[1]), (end[0], end[1]), 1.0, "window")
+    picture = _draw(with_walls(square("corridor"), wall), _WHITE, (0.0, 0.0), angle)
+    top, bottom = _HEIGHT // 2 - 20, _HEIGHT // 2 + 20
+    left, right_hand = _WIDTH // 2 - 30, _WIDTH // 2 + 30
+    assert picture[top, left].argmax() == 1
+    assert picture[top, right_hand].argmax() == 0
+    assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
+
+
+def test_nobody_sees_a_wall_from_behind() -> None:
+    """Its back belongs to a room that is not there."""
+    front = Wall((1.0, -1.0), (1.0, 1.0), 1.0, "brick")
+    back = replace(front, start=front.end, end=front.start)
+    course = with_walls(square("harbour"))
+    nothing, seen, unseen = (
+        _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0)
+        for walls in ((), (front,), (back,))
+    )
+    assert not np.array_equal(nothing, seen)
+    np.testing.assert_array_equal(nothing, unseen)
+
+
+@pytest.mark.parametrize("world", ["corridor", "yard", "harbour"])
+def test_every_world_can_be_seen(world: str) -> None:
+    """Neither black, nor white, nor all of one colour."""
+    picture = _draw(square(world), Look.of(world), (0.5, 0.0), 0.0)
+    assert 20 < picture.mean() < 200
+    assert picture.std() > 10
+
+
+def test_light_makes_it_bright_and_warmth_takes_the_blue() -> None:
+    """Both are what a learner is to see through."""
+    course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
+
+    def mean(look: Look) -> NDArray[np.float64]:
+        return _draw(course, look, (0.5, 0.0), 0.0).mean(axis=(0, 1))
+
+    assert (mean(replace(usual, light=0.9)) > mean(usual) + 5).all()
+    warm, cold = mean(replace(usual, warmth=0.9)), mean(usual)
+    assert warm[2] < 0.6 * cold[2]
+    assert warm[0] > 0.95 * cold[0]
+
+
+def test_a_glossy_floor_shows_the_lamp_above_it() -> None:
+    """As the floors of the halls do that cars are driven in."""
+    course = square("corridor")
+    dull, glossy = (
+        _draw(course, replace(Look.of("corridor"), gloss=gloss), (-0.5, 0.0), 0.0)
+        for gloss in (0.0, 0.6)
+    )
+    # Only the lamp is white in this yellow light.
+    below = slice(_HEIGHT // 2, None)
+    assert glossy[below, :, 2].max() > 1.5 * dull[below, :, 2].max()
+
+
+def test_the_same_course_looks_the_same_twice() -> None:
+    """Pictures follow from the course and the look alone."""
+    one, other = (_draw(square("harbour"), Look.of("harbour"), (0.5, 0.0), 0.2) for _ in "ab")
+    np.testing.assert_array_equal(one, other)
+
+
+def test_another_seed_has_other_textures() -> None:
+    """Else a policy learns stains by heart."""
+    usual = Look.of("yard")
+    one, other = (
+        _draw(square("yard"), replace(usual, texture_seed=seed), (0.5, 0.0), 0.0) for seed in (0, 1)
+    )
+    assert np.abs(one.astype(int) - other).mean() > 2

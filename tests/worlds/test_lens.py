@@ -1,0 +1,108 @@
+"""What lenses do to pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import UnknownName
+from shapechanger.worlds.lens import LENSES, Lens, Picture, blur, dirt, expose, glare, lens, night
+
+_ALL = pytest.mark.parametrize("change", LENSES.values(), ids=LENSES)
+
+
+def _picture(height: int = 120, width: int = 160) -> Picture:
+    """Something with edges and all levels."""
+    rng = np.random.default_rng(0)
+    rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
+    return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()
+
+
+@_ALL
+@pytest.mark.parametrize("size", [(120, 160), (64, 64), (33, 47)])
+def test_a_lens_gives_a_picture_of_the_same_size(change: Lens, size: tuple[int, int]) -> None:
+    """It can stand between any camera and any policy."""
+    before = _picture(*size)
+    kept = before.copy()
+    after = change(before, 3)
+    assert after.shape == before.shape
+    assert after.dtype == np.uint8
+    assert not np.may_share_memory(before, after)
+    np.testing.assert_array_equal(before, kept)
+    assert not np.array_equal(before, after)
+
+
+@_ALL
+def test_a_lens_is_a_function_of_picture_and_seed(change: Lens) -> None:
+    """A trial can be drawn again."""
+    np.testing.assert_array_equal(change(_picture(), 5), change(_picture(), 5))
+
+
+@pytest.mark.parametrize("change", [night, glare, dirt])
+def test_another_seed_gives_another_picture(change: Lens) -> None:
+    """Each episode has its own dirt and its own sun."""
+    assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
+
+
+def test_night_leaves_a_quarter_of_the_light_and_its_noise_moves() -> None:
+    """A white wall is a quarter as bright; the next picture has other noise."""
+    white = np.full((120, 160, 3), 255, np.uint8)
+    dark = night(white, 0)
+    assert dark.mean(axis=(0, 1)) == pytest.approx([61.2, 63.75, 86.7], abs=0.5)
+    assert dark.std(axis=(0, 1)) == pytest.approx(5.0, abs=0.3)
+    other = white.copy()
+    other[0, 0] = 254
+    assert not np.array_equal(night(other, 0)[1:], dark[1:])
+
+
+def test_glare_only_adds_light() -> None:
+    """At its middle it is nearly white, and it lifts all of the picture."""
+    black = np.zeros((120, 160, 3), np.uint8)
+    lit = glare(black, 1)
+    assert lit.max() > 225
+    assert lit.min() >= 20
+
+
+def test_blur_keeps_the_light_and_spreads_a_point() -> None:
+    """A point's light is as much as before, with a deviation of 1.25 % of the width."""
+    point = np.zeros((121, 161, 3), np.uint8)
+    point[56:65, 76:85] = 255
+    soft = blur(point, 0).astype(float)[..., 0]
+    assert soft.sum() == pytest.approx(255 * 81, rel=0.02)
+    columns = np.arange(161)
+    variance = (soft.sum(axis=0) * (columns - 80) ** 2).sum() / soft.sum()
+    assert variance == pytest.approx((81 - 1) / 12 + (0.0125 * 161) ** 2, rel=0.05)
+
+
+def test_dirt_stays_where_it_is() -> None:
+    """The same spots lie on each picture of an episode, and most of it stays clean."""
+    white = np.full((120, 160, 3), 255, np.uint8)
+    grey = np.full((120, 160, 3), 200, np.uint8)
+    spots = dirt(white, 2)[..., 0] < 230
+    assert 0.01 < spots.mean() < 0.4
+    darker = dirt(grey, 2)[..., 0]
+    assert darker[spots].max() < 200
+
+
+def test_expose_with_gain_1_and_no_noise_changes_nothing() -> None:
+    """And a large gain ends at white."""
+    rng = np.random.default_rng(0)
+    np.testing.assert_array_equal(expose(_picture(), 1.0, 0.0, rng), _picture())
+    assert expose(np.full((8, 8, 3), 200, np.uint8), 2.0, 0.0, rng).min() == 255
+
+
+def test_expose_adds_the_noise_that_was_asked_for() -> None:
+    """Each picture its own."""
+    rng = np.random.default_rng(0)
+    grey = np.full((120, 160, 3), 100, np.uint8)
+    one, other = expose(grey, 1.2, 6.0, rng), expose(grey, 1.2, 6.0, rng)
+    assert one.mean() == pytest.approx(120.0, abs=0.3)
+    assert one.std() == pytest.approx(6.0, abs=0.2)
+    assert not np.array_equal(one, other)
+
+
+def test_an_unknown_lens_names_the_nearest() -> None:
+    """Names come from the command line."""
+    assert lens("night") is night
+    with pytest.raises(UnknownName, match="Did you mean 'glare'"):
+        lens("glair")
