@@ -24,7 +24,7 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import robots, speed, speed_vector
+from benchmarks import robots, speed, speed_vector, vehicles, vehicles_twin
 from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
@@ -126,12 +126,17 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "robot-fuzz": robots.fuzz,
     "robot-hold": robots.hold,
     "robot-faults": robots.faults,
+    "vehicles-frames": vehicles.frames,
+    "vehicles-expert": vehicles.expert,
+    "vehicles-clone": vehicles.clone,
+    "vehicles-twin": vehicles_twin.twin,
 }
 
 
-def _trials() -> str:
+def _asked() -> str:
     """What was asked for besides, as a shell takes it."""
-    return f"TRIALS={os.environ['TRIALS']} " if "TRIALS" in os.environ else ""
+    names = ("TRIALS", "LAYOUTS", "LP_NUM_THREADS")
+    return "".join(f"{name}={os.environ[name]} " for name in names if name in os.environ)
 
 
 def main() -> None:
@@ -144,7 +149,7 @@ def main() -> None:
             table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
         RESULTS.mkdir(exist_ok=True)
         facts = {
-            "command": f"{_trials()}python -m benchmarks.run {name}",
+            "command": f"{_asked()}python -m benchmarks.run {name}",
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
             "python": platform.python_version(),
             "versions": {

@@ -43,32 +43,42 @@ def _names(text: str) -> frozenset[str]:
 _RULES = {
     # The words that both sides share, on a workstation and on a Pi.
     "errors": _Rule(_names("layout link"), _names("numpy msgspec")),
+    # Which OpenGL draws here.
+    "headless": _Rule(_names("errors")),
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
     # Bodies: no environment, no reward, no robot.
     "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
-    "embodiments": _Rule(_names("errors layout morphology"), never=_HARDWARE | {"torch"}),
+    # Of `worlds` they know how a pose is written down.
+    "embodiments": _Rule(_names("errors layout morphology worlds"), never=_HARDWARE | {"torch"}),
+    # Places to drive in, and a vehicle in one of them.
+    "worlds": _Rule(
+        _names("errors headless embodiments"), never=_HARDWARE | {"torch", "gymnasium"}
+    ),
     # Rewards and endings: no model file.
     "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
-    # Only the envs join bodies and tasks.
+    # Only the envs join bodies and tasks. A vehicle's env is its whole robot in one process.
     "envs": _Rule(
-        _names("errors layout morphology embodiments tasks"), never=_HARDWARE | {"torch"}
+        _names("errors layout headless morphology embodiments tasks")
+        | _names("link robot remote twin worlds"),
+        never=_HARDWARE | {"torch"},
     ),
-    # Transfer cannot tell a simulator from a car. It writes our version into what it leaves behind.
-    "transfer": _Rule(_names("errors layout shapechanger"), never=_HARDWARE | _SIMULATORS),
+    # Transfer cannot tell a simulator from a car. It writes our version into what it leaves behind,
+    # and cloning is one of its learners.
+    "transfer": _Rule(_names("errors layout demos shapechanger"), never=_HARDWARE | _SIMULATORS),
     # The exam for anybody's env, simulated or real.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
     # The robot's side: of `demos` it knows the writer of episodes, which needs nothing.
     "robot": _Rule(_names("errors layout link demos"), never=_HEAVY | {"gymnasium"}),
     "remote": _Rule(_names("errors layout link tasks"), never=_HEAVY),
-    "twin": _Rule(_names("errors layout link robot morphology embodiments tasks")),
+    "twin": _Rule(_names("errors layout link robot morphology embodiments tasks worlds")),
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
     "demos": _Rule(_names("errors layout"), never=_HARDWARE | _SIMULATORS | {"socket"}),
     # It composes what must not know each other, and nobody imports it.
     "cli": _Rule(
         _names("errors layout link morphology embodiments tasks envs transfer robot remote twin")
-        | _names("teleop demos testing shapechanger")
+        | _names("teleop demos testing shapechanger headless worlds")
     ),
     # The package itself registers the ids.
     "shapechanger": _Rule(_names("errors layout envs"), _names("gymnasium numpy msgspec")),

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
 import gymnasium as gym
 
-from shapechanger.envs.catalogue import CATALOGUE, find
+from shapechanger.envs.catalogue import CATALOGUE, VEHICLE_ENVS, find, find_vehicle
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.headless import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["asked", "default_learner", "env_ref", "opened", "require_seed"]
+__all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "require_seed"]
 
 # The largest that PyTorch and NumPy both take.
 _LARGEST_SEED: Final = 2**32 - 1
@@ -32,24 +32,47 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
         RenderError: If `MUJOCO_GL` keeps every env from being made.
     """
     require_known_gl()
+    vehicle = find_vehicle(env_id)
+    if vehicle and not body:
+        return EnvRef(vehicle)
     try:
-        full = find(env_id).id
+        full = vehicle or find(env_id).id
     except UnknownName:
         # Envs of others count too, as `module:id` or once registered; `make` looks again.
         if not _has_module(env_id) and env_id not in gym.registry:
             raise
         full = env_id
-        if body:
-            raise MorphologyError(
-                f"{env_id} takes no body; these do: {', '.join(CATALOGUE)}."
-            ) from None
+    if body and full not in CATALOGUE:
+        raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
     return EnvRef(full, {"body": body} if body else {})
 
 
 def default_learner(env: EnvRef) -> str:
-    """The learner whose settings were tuned on the env's family; that of the ant for any other."""
+    """The learner that was tuned on the env's family; that of the ant for any other."""
+    if env.id in VEHICLE_ENVS:
+        return "cloning"
     entry = CATALOGUE.get(env.id)
     return entry.learner if entry else "ppo-run"
+
+
+def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
+    """A vehicle's env as studies use it: who runs into something is put back and drives on.
+
+    Args:
+        env: Any env; what is no vehicle's stays as it is.
+        lenses: What is wrong with its camera.
+
+    Raises:
+        StudyError: If it has no camera that anything could be wrong with.
+    """
+    if env.id not in VEHICLE_ENVS:
+        if lenses:
+            raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+        return env
+    more: dict[str, Any] = {"put_back": True}
+    if lenses:
+        more["lenses"] = list(lenses)
+    return EnvRef(env.id, {**env.kwargs, **more})
 
 
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:

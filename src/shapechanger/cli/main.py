@@ -30,6 +30,7 @@ try:
     from shapechanger.cli.play import Play
     from shapechanger.cli.robot import Robot
     from shapechanger.cli.stopping import Interrupted
+    from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
     from shapechanger.cli.transfer import Transfer
 except KeyboardInterrupt:  # pragma: no cover  # Seen by a process of its own in the tests.
@@ -43,6 +44,7 @@ _Command = (
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Play, tyro.conf.subcommand("play")]
     | Annotated[Transfer, tyro.conf.subcommand("transfer")]
+    | Annotated[Suite, tyro.conf.subcommand("suite")]
     | Annotated[Robot, tyro.conf.subcommand("robot")]
 )
 

@@ -77,9 +77,12 @@ class Play:
         if self.policy is None:
             return env, random_actions(env.action_space, self.seed)
         from shapechanger.transfer.body_map import BodyMap, MappedEnv
+        from shapechanger.transfer.cloning import is_clone, load_clone
         from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.policy_file import load_policy
 
+        if is_clone(self.policy):
+            return env, load_clone(self.policy).predict_many
         policy = load_policy(self.policy)
         observation, action = layouts_of(env)
         if (observation, action) == (policy.card.observation, policy.card.action):

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import default_learner, env_ref, opened, require_seed
+from shapechanger.cli.env_arguments import default_learner, driven, env_ref, opened, require_seed
 from shapechanger.cli.progress import StudyProgress
 from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import MissingExtra, OutputError
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.env_ref import EnvRef
+    from shapechanger.transfer.evaluation import Evaluation
+    from shapechanger.transfer.settings import CloningSettings
 
 __all__ = ["Train"]
 
@@ -40,14 +48,13 @@ class Train:
     def run(self) -> None:
         """Train, showing the evaluations as they come."""
         from shapechanger.transfer.env_ref import layouts_of
-        from shapechanger.transfer.evaluation import Evaluation
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.policy_file import save_policy
-        from shapechanger.transfer.settings import learner_settings
+        from shapechanger.transfer.settings import CloningSettings, learner_settings
         from shapechanger.transfer.training import require_budget, train, use_one_thread
 
         require_seed(self.seed)
-        env = env_ref(self.env, self.body)
+        env = driven(env_ref(self.env, self.body))
         learner = self.learner or default_learner(env)
         settings = learner_settings(learner)
         steps = settings.steps if self.steps is None else self.steps
@@ -74,6 +81,10 @@ class Train:
 
         try:
             with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
+                if isinstance(settings, CloningSettings):
+                    _clone(env, settings, steps, self.seed, out, show, progress)
+                    console.print(f"wrote {out}")
+                    return
                 policy = train(
                     env,
                     learner,
@@ -89,6 +100,30 @@ class Train:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         save_policy(policy, out)
         console.print(f"wrote {out}")
+
+
+def _clone(
+    env: EnvRef,
+    settings: CloningSettings,
+    steps: int,
+    seed: int,
+    out: Path,
+    show: Callable[[Evaluation], None],
+    progress: StudyProgress,
+) -> None:
+    """Clone the demonstrator of an env, and write the clone and what it learned from."""
+    from shapechanger.transfer.cloning import Recording, clone_along
+
+    policy = clone_along(
+        env,
+        settings,
+        settings.whole_updates(steps),
+        seed,
+        demonstrations=Recording(out.with_suffix(".demonstrations.npz"), seed),
+        on_evaluation=show,
+        on_steps=lambda done: progress(env.id, done, False),
+    )
+    policy.described(command=shlex.join(["shapechanger", *sys.argv[1:]])).save(out)
 
 
 def _require_tensorboard() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +15,7 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import default_learner, env_ref, opened, require_seed
+from shapechanger.cli.env_arguments import default_learner, driven, env_ref, opened, require_seed
 from shapechanger.cli.progress import StudyProgress
 from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
@@ -23,10 +24,10 @@ from shapechanger.transfer.env_ref import EnvRef
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from shapechanger.transfer.plan import Plan
+    from shapechanger.transfer.plan import Plan, Run
     from shapechanger.transfer.study import Study
 
-__all__ = ["Transfer"]
+__all__ = ["Transfer", "run_steps", "write_study_report"]
 
 # What --quick divides the budget by, and the seeds it does with: enough to see that all works.
 _QUICK_DIVISOR: Final = 8
@@ -61,6 +62,8 @@ class Transfer:
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
     """Another body of the target's family: its name, or edits as JSON."""
+    target_lens: tuple[str, ...] = ()
+    """What is wrong with the target's camera, for a vehicle: night, glare, blur or dirt."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
     arms: tuple[Literal["scratch", "zero-shot", "fine-tune"], ...] = (
@@ -97,9 +100,8 @@ class Transfer:
         to_do = unfinished(plan, out) if holds(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
             console.print(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
-        steps = {run.name: _steps(plan, run.kind) for run in to_do}
         try:
-            with StudyProgress(steps) as progress:
+            with StudyProgress(run_steps(plan, to_do)) as progress:
                 study = run_study(
                     plan,
                     out,
@@ -113,7 +115,7 @@ class Transfer:
         except OutputError as error:
             raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
         _print(console, study)
-        report = self._report(study, out)
+        report = write_study_report(study, out)
         console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
 
     def _require_sense(self) -> None:
@@ -136,16 +138,25 @@ class Transfer:
     def _plan(self) -> Plan:
         """What to do."""
         from shapechanger.transfer.plan import TransferTask
-        from shapechanger.transfer.settings import learner_settings
+        from shapechanger.transfer.settings import (
+            CloningSettings,
+            LearnerSettings,
+            learner_settings,
+        )
         from shapechanger.transfer.study import make_plan
 
         task = TransferTask(
-            env_ref(self.source, self.source_body), env_ref(self.target, self.target_body)
+            driven(env_ref(self.source, self.source_body)),
+            driven(env_ref(self.target, self.target_body), self.target_lens),
         )
         learner = self.learner or default_learner(task.target)
         settings = learner_settings(learner)
         steps, seeds = self.steps, self.seeds
-        if self.quick:
+        if self.quick and isinstance(settings, CloningSettings):
+            shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
+            steps = shortest if steps is None else steps
+            seeds = _QUICK_SEEDS if seeds is None else seeds
+        elif self.quick and isinstance(settings, LearnerSettings):
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
             settings = msgspec.structs.replace(
                 settings, eval_every=min(settings.eval_every, settings.whole_updates(shortest // 4))
@@ -167,18 +178,25 @@ class Transfer:
             units=self.units,
         )
 
-    def _report(self, study: Study, out: Path) -> Path:
-        """Write the report; a machine that cannot draw bodies gets one without their pictures."""
-        from shapechanger.transfer.report import write_report
 
-        path = out / "report.html"
-        pictures, note = None, ""
-        try:
-            pictures = _pictures(study.plan.task.source, study.plan.task.target)
-        except RenderError as error:
-            note = str(error)
-        write_report(study, path, pictures=pictures, picture_note=note)
-        return path
+def write_study_report(study: Study, out: Path) -> Path:
+    """Write the report; a machine that cannot draw bodies gets one without their pictures."""
+    from shapechanger.transfer.report import write_report
+
+    path = out / "report.html"
+    pictures, note = None, ""
+    try:
+        pictures = _pictures(study.plan.task.source, study.plan.task.target)
+    except RenderError as error:
+        note = str(error)
+    write_report(study, path, pictures=pictures, picture_note=note)
+    return path
+
+
+def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
+    """The steps of each run, for the progress; an evaluation counts as one."""
+    steps = {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}
+    return {run.name: steps.get(run.kind, 1) for run in runs}
 
 
 def _split_rule(text: str) -> tuple[str, str]:
@@ -218,13 +236,6 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 def _name(env: EnvRef) -> str:
     """A short name for a folder."""
     return env.id.split("/")[-1].removesuffix("-v1")
-
-
-def _steps(plan: Plan, kind: str) -> int:
-    """The steps of a run, for the progress; an evaluation counts as one."""
-    return {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}.get(
-        kind, 1
-    )
 
 
 def _way_on(plan: Plan, out: Path) -> str:

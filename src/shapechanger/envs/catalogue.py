@@ -18,6 +18,7 @@ __all__ = [
     "VEHICLE_ENVS",
     "Entry",
     "find",
+    "find_vehicle",
     "register_all",
 ]
 
@@ -189,8 +190,19 @@ def find(env_id: str) -> Entry:
     Raises:
         UnknownName: If there is none.
     """
-    name = env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+    name = _name(env_id)
     entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
     if entry is None:
-        raise UnknownName("environment", name, [entry.name for entry in CATALOGUE.values()])
+        known = [entry.name for entry in CATALOGUE.values()]
+        raise UnknownName("environment", name, [*known, *map(_name, VEHICLE_ENVS)])
     return entry
+
+
+def find_vehicle(env_id: str) -> str | None:
+    """The id of a vehicle's env, of which the name alone, such as `Car`, will do; None for none."""
+    full = f"{NAMESPACE}/{_name(env_id)}-v1"
+    return full if full in VEHICLE_ENVS else None
+
+
+def _name(env_id: str) -> str:
+    return env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, cast
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.pictures import Framing, prepare
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.policy import WEIGHTS, CameraPolicy
 from shapechanger.demos.cloning.train import clone
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
@@ -27,6 +28,7 @@ __all__ = [
     "clone_along",
     "demonstrate",
     "evaluate_clone",
+    "is_clone",
     "load_clone",
 ]
 
@@ -183,6 +185,11 @@ def evaluate_clone(
     finally:
         for one in envs:
             one.close()
+
+
+def is_clone(path: Path) -> bool:
+    """Whether a file is one that a clone was saved to, and no other policy."""
+    return zipfile.is_zipfile(path) and WEIGHTS in zipfile.ZipFile(path).namelist()
 
 
 def load_clone(path: Path) -> CameraPolicy:

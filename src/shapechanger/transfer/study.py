@@ -22,13 +22,15 @@ from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, su
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
 from shapechanger.transfer.policy_file import load_policy
 from shapechanger.transfer.runs import RunResult, finished, perform
-from shapechanger.transfer.settings import Settings
+from shapechanger.transfer.settings import CloningSettings, Settings
 from shapechanger.transfer.training import require_budget
 
 __all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "holds", "make_plan", "run_study", "unfinished"]
 
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
+
+_LAST_K: Final = 3
 
 # What the numbers depend on besides the plan.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
@@ -130,6 +132,8 @@ def make_plan(
         arms=tuple(arms),
         seed=seed,
         source_policy=digest,
+        # Each evaluation of a clone is another clone, of another number of demonstrations.
+        last_k=1 if isinstance(settings, CloningSettings) else _LAST_K,
         versions={
             "shapechanger": shapechanger.__version__,
             "python": platform.python_version(),

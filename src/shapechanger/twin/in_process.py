@@ -128,7 +128,7 @@ class InProcessRobot:
         self._arm()
         if place is not None:
             place()
-            self._advance(self._tick_ns)
+            self._advance(self._period_ns)  # As a served robot, which says nothing sooner.
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
@@ -185,7 +185,6 @@ class InProcessRobot:
         self._observed = 0
         self._pictured = 0
         self._command_ns: int | None = None
-        self._next_ns = self._board.now_ns
         self._advance(self._period_ns)
 
     def _advance(self, ns: int) -> None:

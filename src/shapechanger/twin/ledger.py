@@ -11,6 +11,7 @@ i2c     bus, address, register, data, pid      what was written to a chip
 gone    pid                      a process died; lines with the levels that its pins keep follow
 input   pin, level               an edge of a sensor
 place   seed                     the operator put the vehicle at a start
+put_back                         the operator put the vehicle back after a collision
 course  seed                     the operator put other surroundings around it
 fault   what                     the operator broke or pressed something
 ```

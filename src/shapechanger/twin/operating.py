@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError, UnknownName, WorldError
 from shapechanger.twin import wire
 from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
 from shapechanger.twin.ledger import LedgerWriter
@@ -57,6 +57,8 @@ class Operating:
                 self._world.place(message["seed"])
                 self._ledger.write(self._now_ns(), "place", seed=message["seed"])
                 return {}
+            case "put_back":
+                return self._put_back()
             case "course":
                 self._world.lay_out(message["seed"])
                 self._ledger.write(self._now_ns(), "course", seed=message["seed"])
@@ -99,6 +101,14 @@ class Operating:
                 }
             case op:
                 raise RobotError(f"The twin's board does not know what {op!r} is.")
+
+    def _put_back(self) -> wire.Message:
+        try:
+            self._world.put_back()
+        except WorldError as error:
+            raise RobotError(f"The vehicle cannot be put back: {error}") from error
+        self._ledger.write(self._now_ns(), "put_back")
+        return {}
 
     def _break_camera(self, how: str) -> wire.Message:
         if self._camera is None:

@@ -57,6 +57,13 @@ class Operator:
         """Put the vehicle at the start that follows from this seed."""
         self._link.ask(op="place", seed=seed)
 
+    def put_back(self) -> None:
+        """Put a vehicle that ran into something back on the lane, at rest, from where it goes on.
+
+        In the plain room, which has no lane, it is put at its start. Its truth counts on.
+        """
+        self._link.ask(op="put_back")
+
     def lay_out(self, seed: int) -> None:
         """Put other surroundings around the vehicle, and the vehicle at a start in them."""
         self._link.ask(op="course", seed=seed)

@@ -153,7 +153,7 @@ class Switchboard:
             self._hear_all()
         try:
             answer = answer_to(connection, message)
-        except RobotError as error:
+        except ShapechangerError as error:  # Such as a course that there is not: the board lives.
             answer = {"error": str(error)}
         except OSError as error:
             answer = {"errno": error.errno}

@@ -25,11 +25,13 @@ class OnboardCamera:
         size: Width and height of the pictures in pixels.
 
     Raises:
-        RenderError: If nothing can be drawn here.
+        RenderError: If nothing can be drawn here, or not at this size.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._width, self._height = size
+        if min(size) < 1:
+            raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
         choose_gl()
         self._gl: Any = open_context(*size)
         self._rect = mujoco.MjrRect(0, 0, *size)

@@ -52,10 +52,13 @@ def move_camera(model: mujoco.MjModel, camera: str, jitter: Jitter) -> None:
     """Move a camera of a model from where it is now.
 
     Raises:
-        WorldError: If it is no longer on its vehicle, or in the floor.
+        WorldError: If it is no longer on its vehicle, or in the floor, or a number is none.
     """
     place = model.camera(camera)
     place.pos += (0.0, jitter.left_m, jitter.up_m)
+    turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
+    if not np.isfinite([*place.pos, *turns]).all():
+        raise WorldError(f"A camera is off its place by finite numbers, got {jitter}.")
     if place.pos[2] < _LOWEST_M or np.abs(place.pos).max() > _FARTHEST_M:
         where = ", ".join(f"{x:.3f}" for x in place.pos)
         raise WorldError(f"The camera is outside the world: it would be at ({where}) m.")

@@ -111,16 +111,24 @@ class MujocoWorld:
             seed: What the course follows from.
             look: How it looks from now on; None for as before.
             camera: How far its camera is off its place.
+
+        Raises:
+            WorldError: If no course belongs to the seed, or the camera is off its vehicle.
         """
-        self.look = self.look if look is None else look
-        self.course: Course = lay_out(self._world, seed)
+        look = self.look if look is None else look
+        course = lay_out(self._world, seed)
         if self.vehicle.floats != (self._world == "harbour"):
             what = "floats" if self.vehicle.floats else "does not float"
             raise WorldError(f"A {self.vehicle.name} {what}: it cannot drive in a {self._world}.")
         spec = mujoco.MjSpec()
-        add_course(spec, self.course, self.look)
+        add_course(spec, course, look)
         add_vehicle(spec, self.vehicle.name)
-        self.model = spec.compile()
+        model = spec.compile()
+        if camera is not None:
+            move_camera(model, _CAMERA, camera)
+        # Whatever is refused is refused above, and leaves the world as it was.
+        self.look, self.model = look, model
+        self.course: Course = course
         self.data = mujoco.MjData(self.model)
         self._bound = self.vehicle.bind(self.model, self.data)
         self._bound.set_current(*self.course.current_mps)
@@ -130,8 +138,6 @@ class MujocoWorld:
         self._chassis = self.model.body(_CHASSIS).id
         self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
         self._solid[_SOLID_GROUP] = 1
-        if camera is not None:
-            move_camera(self.model, _CAMERA, camera)
         if self._camera is not None:
             self._camera.look_through(self.model, _CAMERA)
         self.place(seed)

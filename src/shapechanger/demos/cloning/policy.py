@@ -33,10 +33,12 @@ try:
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["CameraPolicy", "Card"]
+__all__ = ["WEIGHTS", "CameraPolicy", "Card"]
 
 _CARD: Final = "card.json"
-_WEIGHTS: Final = "weights.pt"
+WEIGHTS: Final = "weights.pt"
+"""The entry of a policy's file that no other policy's has."""
+
 _FORMAT: Final = 1
 # A network of the default settings is half a megabyte; more than this is something else.
 _LARGEST_ENTRY: Final = 64 * 2**20
@@ -180,7 +182,7 @@ class CameraPolicy:
         with zipfile.ZipFile(whole, "w") as archive:
             card = msgspec.json.format(msgspec.json.encode(self.card), indent=1)
             archive.writestr(zipfile.ZipInfo(_CARD, _NO_DATE), card)
-            archive.writestr(zipfile.ZipInfo(_WEIGHTS, _NO_DATE), weights.getvalue())
+            archive.writestr(zipfile.ZipInfo(WEIGHTS, _NO_DATE), weights.getvalue())
         _write_whole(path, whole.getvalue())
 
     @classmethod
@@ -193,7 +195,7 @@ class CameraPolicy:
         try:
             with zipfile.ZipFile(path) as archive:
                 card = msgspec.json.decode(_entry(archive, _CARD), type=Card)
-                weights = _entry(archive, _WEIGHTS)
+                weights = _entry(archive, WEIGHTS)
             _require_format(card)
             return cls(_network(card, weights), card)
         except FileNotFoundError as error:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
-from shapechanger.envs.vehicle.env import VehicleEnv
+from shapechanger.errors import MissingExtra
+
+try:
+    from shapechanger.envs.vehicle.env import VehicleEnv
+except ModuleNotFoundError as error:
+    raise MissingExtra(error.name or "mujoco", "sim,robot") from error
 
 __all__ = ["VehicleEnv"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
 
+from shapechanger.envs.vehicle.asked import seed_as_asked
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.look import Look
@@ -48,7 +49,7 @@ class CourseDraw:
 
     Raises:
         UnknownName: If there are no courses of this name.
-        WorldError: If there are none at all.
+        WorldError: If there are none at all, or a seed is none.
     """
 
     def __init__(self, courses: Courses, randomise: bool) -> None:
@@ -57,7 +58,8 @@ class CourseDraw:
                 raise UnknownName("kind of courses", courses, _KINDS)
             self._seeds: Sequence[int] = _KINDS[courses]
         else:
-            self._seeds = tuple(int(seed) for seed in courses)
+            seeds: Sequence[int] = courses if isinstance(courses, Iterable) else (courses,)
+            self._seeds = tuple(seed_as_asked("course", seed) for seed in seeds)
         if not self._seeds:
             raise WorldError("There are no courses to draw from: give at least one seed.")
         self._randomise = randomise
@@ -79,6 +81,10 @@ class CourseDraw:
                 does not depend on them.
             world: Kind of place.
             options: `course` and `start`, each a seed.
+
+        Raises:
+            UnknownName: If there is no such option.
+            WorldError: If a seed is none.
         """
         for name in options:
             if name not in _OPTIONS:
@@ -88,5 +94,8 @@ class CourseDraw:
         look = Look.random(world, rng) if self._randomise else None
         camera = Jitter.random(rng) if self._randomise else None
         return Drawn(
-            int(options.get("course", course)), int(options.get("start", start)), look, camera
+            seed_as_asked("course", options.get("course", course)),
+            seed_as_asked("start", options.get("start", start)),
+            look,
+            camera,
         )

@@ -2,45 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from importlib.util import find_spec
+from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, ProfileError, RenderError, WorldError
-
-try:
-    import gpiozero as _gpiozero
-    import mujoco as _mujoco
-except ModuleNotFoundError as error:
-    raise MissingExtra(error.name or "mujoco", "sim,robot") from error
-
-from shapechanger.embodiments.vehicles import require_fit
+from shapechanger.embodiments.vehicles import require_fit, vehicle_model
+from shapechanger.envs.vehicle.asked import Steering, profile_as_asked, size_as_asked
 from shapechanger.envs.vehicle.courses import CourseDraw, Courses
 from shapechanger.envs.vehicle.demonstrator import Demonstrator
+from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.inbox import Received
 from shapechanger.remote.judge import Judge
 from shapechanger.remote.senses import Senses
-from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.profile.profile import Profile
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["Steering", "VehicleEnv"]
+__all__ = ["VehicleEnv"]
 
-del _gpiozero, _mujoco  # Only looked for: without them nothing below would say what to install.
-
-Steering = Literal["proportional", "bang"]
-"""How the wheels turn: anywhere, or full left, straight and full right only, as in 2017."""
+_MODES: Final = ("rgb_array",)
 
 
 class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
@@ -94,12 +83,14 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         render_mode: "rgb_array" for `render` to give the newest picture.
 
     Raises:
-        UnknownName: If there is no such vehicle, world, profile, weight or lens.
-        ProfileError: If the profile moves other parts than the vehicle has.
+        UnknownName: If there is no such vehicle, world, profile, steering, weight, lens, render
+            mode or kind of courses.
+        ProfileError: If the profile moves other parts than the vehicle has, or has no camera.
+        SpaceMismatch: If no picture has this size.
         WorldError: If the vehicle cannot drive in the world.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [*_MODES], "render_fps": 20}  # noqa: RUF012
 
     def __init__(
         self,
@@ -120,16 +111,22 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
+        if find_spec("gpiozero") is None:  # The drivers load it when their pins are opened.
+            raise MissingExtra("gpiozero", "robot")
+        vehicle_model(vehicle)  # Before a profile of a vehicle that there is not is missed.
+        if render_mode is not None and render_mode not in _MODES:
+            raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
-        wide, high = size
-        profile = _profile(f"lab-{vehicle}" if robot is None else robot, steering, (wide, high))
+        wide, high = size_as_asked(size)
+        name = f"lab-{vehicle}" if robot is None else robot
+        profile = profile_as_asked(name, steering, (wide, high))
         self._draw = CourseDraw(courses, randomise)
         self._world = MujocoWorld(
             vehicle,
             world,
             self._draw.first,
             size=(wide, high) if image or render_mode else None,
-            lenses=tuple(lenses),
+            lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
         require_fit(vehicle, {output.part for output in profile.outputs})
         self._robot = InProcessRobot(profile, self._world, pictures=image)
@@ -171,7 +168,8 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
                 is left out is drawn.
 
         Raises:
-            WorldError: If the vehicle does not come to rest at the start.
+            UnknownName: If there is no such option.
+            WorldError: If a seed is none, or the vehicle touches something at the start.
         """
         super().reset(seed=seed)
         drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
@@ -253,26 +251,3 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             "pose": (pose.x, pose.y, pose.heading),
             "course": self._world.seed,
         }
-
-
-_LEVELS: Final = {"proportional": "any", "bang": "three"}
-
-
-def _profile(
-    robot: str | os.PathLike[str], steering: Steering | None, size: tuple[int, int]
-) -> Profile:
-    """The profile, with the steering and the size of pictures that are asked for."""
-    profile = load_profile(find_profile(robot))
-    if profile.camera is None:
-        raise ProfileError(f"{profile.path}: the robot has no camera, and this task needs one.")
-    actions = profile.actions
-    if [action.name for action in actions] != ["steering", "throttle"]:
-        names = ", ".join(action.name for action in actions)
-        raise ProfileError(
-            f"{profile.path}: a vehicle's actions are steering and throttle, not {names}."
-        )
-    if steering is not None:
-        levels = _LEVELS[steering]
-        actions = (dataclasses.replace(actions[0], levels=levels), *actions[1:])
-    camera = dataclasses.replace(profile.camera, size=size, flip=False)
-    return dataclasses.replace(profile, actions=actions, camera=camera)

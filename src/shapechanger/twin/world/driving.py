@@ -63,6 +63,7 @@ class DrivingWorld:
 
     def place(self, seed: int) -> None:
         """Put the vehicle at a start, at rest; see `World.place`."""
+        self._start = seed
         pose = find_start(self.room, seed)
         self._x, self._y, self._heading = pose.x, pose.y, pose.heading
         self._vehicle = vehicle_for(self._parts)
@@ -72,6 +73,10 @@ class DrivingWorld:
         self._current_a = IDLE_A
         self._blocked = False
         self._bumped = self._touches_ahead()
+
+    def put_back(self) -> None:
+        """Put the vehicle at its start again: a room has no lane; see `World.put_back`."""
+        self.place(self._start)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         """Let time go by; see `World.advance`."""

@@ -199,7 +199,8 @@ def _splined(knots: NDArray[np.float64], obstacles: Obstacles) -> Path:
     count = max(round(around / SPACING_M), 8)
     fine = np.linspace(0.0, around, 4 * count + 1)
     arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
-    where = np.interp(np.arange(count) * arcs[-1] / count, arcs, fine)
+    even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)
+    where = np.interp(even, arcs, fine)
     points, first, second = spline(where), spline(where, 1), spline(where, 2)
     speed = np.hypot(first[:, 0], first[:, 1])
     curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3

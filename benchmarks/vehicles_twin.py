@@ -1,0 +1,143 @@
+"""The same driver in one process and behind guard, daemon and link: it should drive alike."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.clones import find_clone, sighted
+from benchmarks.remote_drive import Bystander, drive_remote
+from benchmarks.row import Row
+from benchmarks.vehicles import layouts
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.envs.vehicle.drive import Act, DriveScore, drive
+from shapechanger.layout import Layout
+from shapechanger.remote.vehicle import RemoteVehicleEnv
+from shapechanger.robot.profile.load import find_profile
+
+__all__ = ["twin"]
+
+LAYOUTS: Final = 10
+_CLOCKS: Final[dict[Literal["twin", "real"], Literal["lockstep", "realtime"]]] = {
+    "twin": "lockstep",
+    "real": "realtime",
+}
+_NEAR_M: Final = 1.5
+_CLEAR_M: Final = 2.5
+
+
+class _Turner:
+    """Drives by the distance ahead alone: turns to one side until the way is free.
+
+    Args:
+        layout: Of the state.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self._distance = layout.slices["distance"].start
+        self._side = 0.0
+        self._last_side = -1.0
+
+    def __call__(self, state: NDArray[np.float32]) -> NDArray[np.float32]:
+        ahead_m = float(state[self._distance])
+        if self._side and ahead_m > _CLEAR_M:
+            self._last_side, self._side = self._side, 0.0
+        elif not self._side and ahead_m < _NEAR_M:
+            self._side = -self._last_side
+        return np.array([self._side, 0.4], np.float32)
+
+
+def twin(vehicle: str = "car") -> list[Row]:
+    """Mean speed and collisions in process, on the twin's clock and in real time."""
+    policy = find_clone(vehicle)
+    courses = layouts(LAYOUTS)
+
+    def driver(layout: Layout) -> Act:
+        return _Turner(layout) if policy is None else sighted(policy)
+
+    image = policy is not None
+    with VehicleEnv(vehicle, courses="held-out", image=image, put_back=True) as env:
+        here = DriveScore.of(
+            [drive(env, driver(env.observation_layout), course=course) for course in courses]
+        )
+    rows = [
+        Row(
+            f"{vehicle}, in process: mean speed, collisions per 100 m",
+            f"{here.speed:.3f} m/s, {here.per_100_m:.2f}",
+            f"drives from {here.slowest:.2f} to {here.fastest:.2f} m/s; {_counted(here)}; "
+            f"driven by {'the clone' if image else 'the distance ahead, as no clone is shipped'}",
+            "none",
+            True,
+        )
+    ]
+    for clock, pace in _CLOCKS.items():
+        with _served(vehicle, clock, pace, image) as (served, bystander):
+            there = DriveScore.of(
+                [
+                    drive_remote(
+                        served, bystander, driver(served.observation_layout), course=course
+                    )
+                    for course in courses
+                ]
+            )
+        rows += _compared(f"{vehicle}, served, {clock} clock, {pace}", here, there)
+    return rows
+
+
+def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:
+    ratio = there.speed / here.speed
+    alike = here.low <= there.per_100_m <= here.high or there.low <= here.per_100_m <= there.high
+    return [
+        Row(
+            f"{name}: mean speed over that in process",
+            f"{ratio:.3f}",
+            f"drives from {there.slowest:.2f} to {there.fastest:.2f} m/s, "
+            f"{there.drives} held-out layouts",
+            "0.9 to 1.1",
+            0.9 <= ratio <= 1.1,
+        ),
+        Row(
+            f"{name}: collisions per 100 m",
+            f"{there.per_100_m:.2f}",
+            _counted(there),
+            "one rate inside the other's interval",
+            alike,
+        ),
+    ]
+
+
+def _counted(score: DriveScore) -> str:
+    return (
+        f"{score.low:.2f} to {score.high:.2f}, 95 % (Garwood); "
+        f"{score.collisions} in {score.metres:.0f} m"
+    )
+
+
+@contextmanager
+def _served(
+    vehicle: str,
+    clock: Literal["twin", "real"],
+    pace: Literal["lockstep", "realtime"],
+    image: bool,
+) -> Generator[tuple[RemoteVehicleEnv, Bystander]]:
+    with (
+        run_robot(find_profile(f"lab-{vehicle}"), clock=clock) as robot,
+        robot.operator() as beside,
+    ):
+        bystander = Bystander(beside)
+        known = robot.known
+        with RemoteVehicleEnv(
+            known.address,
+            key=known.key,
+            fingerprint=known.fingerprint,
+            image=image,
+            pace=pace,
+            reward={"collision_ends_episode": 0.0},
+            on_reset=bystander,
+        ) as env:
+            yield env, bystander

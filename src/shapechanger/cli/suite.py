@@ -1,0 +1,122 @@
+"""`shapechanger suite`: studies that belong together, and what they say together."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+import tyro
+from rich.table import Table
+
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import driven, env_ref, require_seed
+from shapechanger.cli.progress import StudyProgress
+from shapechanger.cli.stopping import Interrupted
+from shapechanger.cli.transfer import run_steps, write_study_report
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.plan import TransferTask
+    from shapechanger.transfer.suite import Crossing
+
+__all__ = ["Suite"]
+
+_VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
+_LENSES: Final = ("night", "glare", "blur", "dirt")
+_SUMMARY: Final = "suite.json"
+_STEPS_A_MINUTE: Final = 1200.0
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Run studies that belong together: a study for each pair, one report each, and a table.
+
+    Stopped half-way, the same command goes on where it was.
+    """
+
+    name: Annotated[Literal["vehicles", "lenses"], tyro.conf.Positional]
+    """The twelve ordered pairs of car, tank, truck and boat; or the car with something wrong with
+    its camera."""
+    seeds: int = 5
+    """Runs of each arm."""
+    steps: int | None = None
+    """Demonstrated steps on the target, 1,200 a minute; ten minutes if not given."""
+    out: Path | None = None
+    """The suite's folder; results/NAME if not given."""
+    seed: int = 0
+    """Number that the seeds of all runs are drawn from."""
+    workers: int | None = None
+    """Runs at a time; one for each core if not given."""
+
+    def run(self) -> None:
+        """Do the studies, write their reports, and print what they say together."""
+        from shapechanger.transfer.executor import Processes
+        from shapechanger.transfer.files import write_json
+        from shapechanger.transfer.settings import learner_settings
+        from shapechanger.transfer.study import make_plan, unfinished
+        from shapechanger.transfer.suite import crossings, run_beside, study_folder
+
+        require_seed(self.seed)
+        out = self.out or Path("results", self.name)
+        command = shlex.join(["shapechanger", *sys.argv[1:]])
+        console = plain_console()
+        executor = Processes(self.workers)
+        settings = learner_settings("cloning")
+        found: list[Crossing] = []
+        for task in self._tasks():
+            plan = make_plan(
+                task,
+                "cloning",
+                settings,
+                seeds=self.seeds,
+                steps=self.steps,
+                source_steps=settings.steps if self.steps is None else self.steps,
+                seed=self.seed,
+            )
+            folder = study_folder(plan, out)
+            try:
+                with StudyProgress(run_steps(plan, unfinished(plan, folder))) as progress:
+                    study = run_beside(
+                        plan, out, executor=executor, on_progress=progress, command=command
+                    )
+            except KeyboardInterrupt:
+                raise Interrupted(f"Stopped. Go on with: {command}") from None
+            write_study_report(study, folder)
+            found += crossings([study])
+            write_json(out / _SUMMARY, found)
+            console.print(f"wrote {folder / 'report.html'}", soft_wrap=True)
+        console.print(_table(found))
+        halves = sum(crossing.halves for crossing in found)
+        console.print(
+            f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
+            "half of scratch's minutes."
+        )
+
+    def _tasks(self) -> list[TransferTask]:
+        from shapechanger.transfer.plan import TransferTask
+
+        if self.name == "vehicles":
+            pairs = permutations(_VEHICLES, 2)
+            return [TransferTask(driven(env_ref(a)), driven(env_ref(b))) for a, b in pairs]
+        car = env_ref("Car")
+        return [TransferTask(driven(car), driven(car, (lens,))) for lens in _LENSES]
+
+
+def _table(found: list[Crossing]) -> Table:
+    table = Table(
+        "study", "scratch", "zero-shot", "fine-tuned", "scratch, min", "fine-tune, min", box=None
+    )
+    for crossing in found:
+        tuned = crossing.fine_tune_steps
+        table.add_row(
+            crossing.name,
+            f"{crossing.final:.1f}",
+            "" if crossing.zero_shot is None else f"{crossing.zero_shot:.1f}",
+            f"{crossing.fine_tuned:.1f}",
+            f"{crossing.scratch_steps / _STEPS_A_MINUTE:.1f}",
+            "never" if tuned is None else f"{tuned / _STEPS_A_MINUTE:.1f}",
+        )
+    return table
