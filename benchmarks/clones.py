@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from importlib import import_module
-from importlib.util import find_spec
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning import CameraPolicy
+from shapechanger.envs.vehicle.clones import CLONES
 
 __all__ = ["blind", "find_clone", "sighted"]
 
-_SHIPPED: Final = "shapechanger.envs.vehicle.clones"
 _SIZE: Final = (120, 160, 3)
 
 
 def find_clone(vehicle: str) -> CameraPolicy | None:
     """The policy that drives a vehicle; None while there is none."""
-    if find_spec(_SHIPPED) is None:
-        return None
-    clones: Mapping[str, Path] = import_module(_SHIPPED).CLONES
-    if vehicle not in clones or not Path(clones[vehicle]).exists():
-        return None
-    return CameraPolicy.load(Path(clones[vehicle]))
+    path = CLONES.get(vehicle)
+    return None if path is None or not path.exists() else CameraPolicy.load(path)
 
 
 def sighted(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:

@@ -8,34 +8,12 @@ from shapechanger.envs.vehicle.drive import LIMIT_S, METRES, Act, Drive
 from shapechanger.remote.vehicle import RemoteVehicleEnv
 from shapechanger.twin.operator import Operator
 
-__all__ = ["Bystander", "drive_remote"]
-
-
-class Bystander:
-    """Brings the vehicle to the next start; what a remote env takes as `on_reset`.
-
-    Args:
-        operator: Who can do that.
-
-    Attributes:
-        operator: The same.
-        course: Seed of the next course.
-        start: Seed of the start on it.
-    """
-
-    def __init__(self, operator: Operator) -> None:
-        self.operator = operator
-        self.course = self.start = 0
-
-    def __call__(self, seed: int | None) -> None:
-        """Lay the course out; the env's seed says nothing here."""
-        self.operator.lay_out(self.course)
-        self.operator.place(self.start)
+__all__ = ["drive_remote"]
 
 
 def drive_remote(
     env: RemoteVehicleEnv,
-    bystander: Bystander,
+    operator: Operator,
     act: Act,
     *,
     course: int,
@@ -46,10 +24,10 @@ def drive_remote(
     """As `shapechanger.envs.vehicle.drive.drive`, on a twin that is served.
 
     Args:
-        env: The robot, made with the bystander as `on_reset`; a collision ends no episode.
-        bystander: Who puts it at the start, and back after a collision.
+        env: The robot, made with `on_reset=operator.place`; a collision ends no episode.
+        operator: Who puts it at the start, and back after a collision.
         act: Who drives.
-        course: Seed of the course.
+        course: Seed of the course, which is laid out already.
         start: Seed of the start on it; None for that of the course.
         metres: How far to drive, net along the course, m.
         limit_s: When to give up, s.
@@ -57,10 +35,10 @@ def drive_remote(
     Raises:
         RuntimeError: If the episode ends before.
     """
-    bystander.course, bystander.start = course, course if start is None else start
-    operator = bystander.operator
+    # The first time it takes a while, in which a guard in real time waits: better not in the drive.
+    operator.put_back()
     seen: Any
-    seen, _ = env.reset()
+    seen, _ = env.reset(seed=course if start is None else start)
     where = operator.where()
     began_ns, collisions = where.t, where.truth["collisions"]
     while where.truth["progress_m"] < metres and where.t - began_ns < 1e9 * limit_s:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import statistics
 import time
+from contextlib import closing
 from typing import Any, Final
 
 import gymnasium as gym
@@ -16,11 +17,11 @@ from benchmarks.clones import blind, find_clone, sighted
 from benchmarks.row import Row
 from shapechanger.embodiments.vehicles import VEHICLES
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import METRES, Act, DriveScore, drive
+from shapechanger.envs.vehicle.drive import LIMIT_S, METRES, Act, DriveScore, drive
 from shapechanger.envs.vehicle.pilot import Pilot
 from shapechanger.worlds.course import HELD_OUT
 
-__all__ = ["clone", "expert", "frames", "layouts"]
+__all__ = ["clone", "counted", "expert", "frames", "layouts"]
 
 EXPERT_LAYOUTS: Final = 50
 CLONE_LAYOUTS: Final = 20
@@ -107,9 +108,9 @@ def clone() -> list[Row]:
             continue
         courses = layouts(CLONE_LAYOUTS)
         knows = _expert_score(vehicle, courses)
-        with _env(vehicle, image=True) as env:
+        with closing(_env(vehicle, image=True)) as env:
             score = _score(env, sighted(policy), courses)
-        with _env(vehicle, image=False) as env:  # Black pictures need not be drawn.
+        with closing(_env(vehicle, image=False)) as env:  # Black pictures need not be drawn.
             dark = _score(env, blind(policy), courses, BLIND_S)
         share = score.speed / knows.speed
         rows += [
@@ -126,7 +127,7 @@ def clone() -> list[Row]:
             Row(
                 f"clone, {vehicle}, black pictures: collisions per 100 m",
                 f"{dark.per_100_m:.1f}",
-                f"{_counted(dark)}; {dark.speed:.2f} m/s",
+                f"{counted(dark)}; {dark.speed:.2f} m/s",
                 "5 times as many at least",
                 dark.collisions > 0 and dark.per_100_m >= 5.0 * score.per_100_m,
             ),
@@ -139,26 +140,26 @@ def _env(vehicle: str, *, image: bool) -> VehicleEnv:
 
 
 def _expert_score(vehicle: str, courses: range) -> DriveScore:
-    with _env(vehicle, image=False) as env:
+    with closing(_env(vehicle, image=False)) as env:
         return _score(env, Pilot(env.world), courses)
 
 
-def _score(env: VehicleEnv, act: Act, courses: range, limit_s: float | None = None) -> DriveScore:
-    limits = {} if limit_s is None else {"limit_s": limit_s}
-    return DriveScore.of([drive(env, act, course=course, **limits) for course in courses])
+def _score(env: VehicleEnv, act: Act, courses: range, limit_s: float = LIMIT_S) -> DriveScore:
+    return DriveScore.of([drive(env, act, course=course, limit_s=limit_s) for course in courses])
 
 
 def _collision_row(name: str, score: DriveScore, most: float | None) -> Row:
     return Row(
         f"{name}: collisions per 100 m",
         f"{score.per_100_m:.2f}",
-        _counted(score),
+        counted(score),
         "none" if most is None else f"< {most:g}",
         most is None or score.per_100_m < most,
     )
 
 
-def _counted(score: DriveScore) -> str:
+def counted(score: DriveScore) -> str:
+    """What a rate of collisions rests on."""
     return (
         f"{score.low:.2f} to {score.high:.2f}, 95 % (Garwood); "
         f"{score.collisions} in {score.metres:.0f} m"

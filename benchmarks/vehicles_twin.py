@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.clones import find_clone, sighted
-from benchmarks.remote_drive import Bystander, drive_remote
+from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
-from benchmarks.vehicles import layouts
+from benchmarks.vehicles import counted, layouts
 from shapechanger.cli.robot.running import run_robot
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import Act, DriveScore, drive
+from shapechanger.envs.vehicle.drive import Act, Drive, DriveScore, drive
 from shapechanger.layout import Layout
 from shapechanger.remote.vehicle import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
@@ -61,7 +61,7 @@ def twin(vehicle: str = "car") -> list[Row]:
         return _Turner(layout) if policy is None else sighted(policy)
 
     image = policy is not None
-    with VehicleEnv(vehicle, courses="held-out", image=image, put_back=True) as env:
+    with closing(VehicleEnv(vehicle, courses="held-out", image=image, put_back=True)) as env:
         here = DriveScore.of(
             [drive(env, driver(env.observation_layout), course=course) for course in courses]
         )
@@ -69,22 +69,16 @@ def twin(vehicle: str = "car") -> list[Row]:
         Row(
             f"{vehicle}, in process: mean speed, collisions per 100 m",
             f"{here.speed:.3f} m/s, {here.per_100_m:.2f}",
-            f"drives from {here.slowest:.2f} to {here.fastest:.2f} m/s; {_counted(here)}; "
+            f"drives from {here.slowest:.2f} to {here.fastest:.2f} m/s; {counted(here)}; "
             f"driven by {'the clone' if image else 'the distance ahead, as no clone is shipped'}",
             "none",
             True,
         )
     ]
     for clock, pace in _CLOCKS.items():
-        with _served(vehicle, clock, pace, image) as (served, bystander):
-            there = DriveScore.of(
-                [
-                    drive_remote(
-                        served, bystander, driver(served.observation_layout), course=course
-                    )
-                    for course in courses
-                ]
-            )
+        there = DriveScore.of(
+            [_served(vehicle, clock, course, image, driver) for course in courses]
+        )
         rows += _compared(f"{vehicle}, served, {clock} clock, {pace}", here, there)
     return rows
 
@@ -104,40 +98,35 @@ def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:
         Row(
             f"{name}: collisions per 100 m",
             f"{there.per_100_m:.2f}",
-            _counted(there),
+            counted(there),
             "one rate inside the other's interval",
             alike,
         ),
     ]
 
 
-def _counted(score: DriveScore) -> str:
-    return (
-        f"{score.low:.2f} to {score.high:.2f}, 95 % (Garwood); "
-        f"{score.collisions} in {score.metres:.0f} m"
-    )
-
-
-@contextmanager
 def _served(
     vehicle: str,
     clock: Literal["twin", "real"],
-    pace: Literal["lockstep", "realtime"],
+    course: int,
     image: bool,
-) -> Generator[tuple[RemoteVehicleEnv, Bystander]]:
-    with (
-        run_robot(find_profile(f"lab-{vehicle}"), clock=clock) as robot,
-        robot.operator() as beside,
-    ):
-        bystander = Bystander(beside)
+    driver: Callable[[Layout], Act],
+) -> Drive:
+    """A drive of a robot that was started on this course.
+
+    To lay another out takes a tenth of a second, for which no guard in real time should wait.
+    """
+    profile = find_profile(f"lab-{vehicle}")
+    with run_robot(profile, clock=clock, seed=course) as robot, robot.operator() as operator:
         known = robot.known
-        with RemoteVehicleEnv(
+        env = RemoteVehicleEnv(
             known.address,
             key=known.key,
             fingerprint=known.fingerprint,
             image=image,
-            pace=pace,
+            pace=_CLOCKS[clock],
             reward={"collision_ends_episode": 0.0},
-            on_reset=bystander,
-        ) as env:
-            yield env, bystander
+            on_reset=lambda seed: operator.place(course if seed is None else seed),
+        )
+        with closing(env):
+            return drive_remote(env, operator, driver(env.observation_layout), course=course)

@@ -10,11 +10,15 @@ from shapechanger.robot.profile.profile import Profile
 __all__ = [
     "BLIND_CAR",
     "CAR",
+    "IN_A_ROOM",
     "SWAPPED_ROLES",
     "SWAPPED_WAYS",
     "changed",
     "write_profile",
 ]
+
+IN_A_ROOM = ("--world", "room")
+"""For who serves a twin and does not care where it is: the room is there at once."""
 
 CAR = """\
 # The car of 2017, with everything that can protect it.

@@ -9,7 +9,7 @@ import gymnasium as gym
 import pytest
 
 from shapechanger.envs import CATALOGUE, register_all
-from shapechanger.envs.catalogue import REMOTE_VEHICLE
+from shapechanger.envs.catalogue import REMOTE_VEHICLE, VEHICLE_ENVS
 
 _IDS = (
     "shapechanger/InvertedPendulum-v1",
@@ -25,6 +25,12 @@ _IDS = (
     "shapechanger/Swimmer-v1",
     "shapechanger/Humanoid-v1",
     "shapechanger/InvertedDoublePendulum-v1",
+)
+_VEHICLES = (
+    "shapechanger/Car-v1",
+    "shapechanger/Tank-v1",
+    "shapechanger/Truck-v1",
+    "shapechanger/Boat-v1",
 )
 
 # Every import of a blocked package fails, as where it is not installed.
@@ -68,7 +74,8 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     )
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
-    assert tuple(ids.split()) == (*_IDS, REMOTE_VEHICLE)
+    assert tuple(ids.split()) == (*_IDS, *_VEHICLES, REMOTE_VEHICLE)
+    assert tuple(VEHICLE_ENVS) == _VEHICLES
 
 
 def test_without_the_simulator_the_message_says_what_to_install() -> None:
@@ -76,6 +83,14 @@ def test_without_the_simulator_the_message_says_what_to_install() -> None:
     said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_IDS)).splitlines()
     sentence = "This needs mujoco, which is not installed: run `pip install 'shapechanger[sim]'`."
     assert said == [sentence] * len(_IDS)
+
+
+def test_without_the_simulator_a_vehicle_says_what_to_install() -> None:
+    """It is a simulated world and a robot, and wants what both want."""
+    said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_VEHICLES)).splitlines()
+    sentence = "This needs mujoco, which is not installed: "
+    sentence += "run `pip install 'shapechanger[sim,robot]'`."
+    assert said == [sentence] * len(_VEHICLES)
 
 
 @pytest.mark.parametrize("blocked", ["glfw", "imageio"])

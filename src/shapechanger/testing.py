@@ -10,7 +10,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -69,7 +69,8 @@ def shares_no_memory(make: MakeEnv) -> None:
     """A learner may keep an observation: the next step does not change it."""
     observations = [observation for observation, _ in _rollout(make())]
     for before, after in pairwise(observations):
-        _require(not np.may_share_memory(before, after), "Two observations share memory.")
+        for x, y in product(_arrays(before), _arrays(after)):
+            _require(not np.may_share_memory(x, y), "Two observations share memory.")
 
 
 def names_every_number(make: MakeEnv) -> None:
@@ -80,8 +81,10 @@ def names_every_number(make: MakeEnv) -> None:
         ("observation", observation, env.observation_space),
         ("action", action, env.action_space),
     ):
+        # A picture is one block of a layout, and so is what is in a Dict.
+        kinds = (gym.spaces.Box, gym.spaces.Dict)[: 2 if side == "observation" else 1]
         _require(
-            isinstance(space, gym.spaces.Box) and space.shape == (layout.size,),
+            isinstance(space, kinds) and gym.spaces.flatdim(space) == layout.size,
             f"The {side} layout has {layout.size} numbers, its space {space}.",
         )
     box = cast("Any", env.action_space)
@@ -136,7 +139,8 @@ def starts_where_it_may(make: MakeEnv) -> None:
     """Starts differ from seed to seed and lie within the ranges that the layout states."""
     env = make()
     observation, _ = _layouts(env)
-    starts = [env.reset(seed=seed)[0] for seed in range(20)]
+    space = env.observation_space
+    starts = [np.asarray(gym.spaces.flatten(space, env.reset(seed=i)[0])) for i in range(20)]
     _require(
         not all(np.array_equal(starts[0], start) for start in starts[1:]),
         "Every start is the same.",
@@ -191,9 +195,17 @@ def _layouts(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
 def _same(first: _Rollout, second: _Rollout) -> bool:
     """Whether two rollouts are the same to the last bit, and equally long."""
     return len(first) == len(second) and all(
-        np.array_equal(x, y) and reward_x == reward_y
+        all(map(np.array_equal, _arrays(x), _arrays(y))) and reward_x == reward_y
         for (x, reward_x), (y, reward_y) in zip(first, second, strict=True)
     )
+
+
+def _arrays(observation: Any) -> list[Any]:
+    """The arrays of an observation, of which a Dict has several."""
+    if isinstance(observation, Mapping):
+        parts = cast("Mapping[str, Any]", observation)
+        return [array for name in sorted(parts) for array in _arrays(parts[name])]
+    return [observation]
 
 
 def _rollout(env: gym.Env[Any, Any]) -> _Rollout:

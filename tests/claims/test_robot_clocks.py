@@ -14,7 +14,7 @@ from shapechanger.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.wiring import Wiring
-from tests.robots import write_profile
+from tests.robots import IN_A_ROOM, write_profile
 from tests.served import Clock, Served, driving
 
 DEADLINE_MS = 250
@@ -42,7 +42,7 @@ def clock(request: pytest.FixtureRequest) -> Clock:
 @pytest.fixture(scope="module")
 def robot(profile: Profile, clock: Clock) -> Iterator[RunningRobot]:
     """One robot for each clock."""
-    with run_robot(profile, clock=clock) as running:
+    with run_robot(profile, clock=clock, arguments=IN_A_ROOM) as running:
         yield running
 
 
@@ -180,7 +180,7 @@ def recorded(profile: Profile, seed: int, folder: Path) -> tuple[list[str], list
     """Ledger and pictures of the forty commands."""
     pictures: list[bytes] = []
     with (
-        run_robot(profile, clock="twin", seed=seed, folder=folder) as robot,
+        run_robot(profile, clock="twin", seed=seed, folder=folder, arguments=IN_A_ROOM) as robot,
         driving(robot, "twin") as car,
     ):
         for values in DRIVE:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from shapechanger.cli.robot.running import run_robot
 from shapechanger.twin.wiring import Wiring
-from tests.robots import write_profile
+from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving
 
 
@@ -15,7 +15,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
     profile = write_profile(tmp_path)
     with (
         Path("/dev/full").open("wb") as full,
-        run_robot(profile, log=full) as robot,
+        run_robot(profile, log=full, arguments=IN_A_ROOM) as robot,
         driving(robot, "real") as car,
     ):
         car.drive_until(lambda seen: seen.action_applied[1] == 1.0, 0.0, 1.0)

@@ -18,7 +18,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.wiring import WiredOutput, Wiring
 from tests.robot.profile.texts import HOVERCRAFT
-from tests.robots import BLIND_CAR, write_profile
+from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.twin.robots import until
 
 Env = gym.Env[Any, Any]
@@ -37,7 +37,9 @@ def env_of(robot: RunningRobot, **options: Any) -> Env:
 @pytest.fixture(scope="module")
 def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
     """The car with everything, on the twin's clock."""
-    with run_robot(write_profile(tmp_path_factory.mktemp("car")), clock="twin") as robot:
+    with run_robot(
+        write_profile(tmp_path_factory.mktemp("car")), clock="twin", arguments=IN_A_ROOM
+    ) as robot:
         yield robot
 
 
@@ -45,7 +47,9 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
 def serve() -> Iterator[Callable[[Profile], RunningRobot]]:
     """Serve a robot on the twin's clock; it ends with the test."""
     with ExitStack() as stack:
-        yield lambda profile: stack.enter_context(run_robot(profile, clock="twin"))
+        yield lambda profile: stack.enter_context(
+            run_robot(profile, clock="twin", arguments=IN_A_ROOM)
+        )
 
 
 @pytest.fixture

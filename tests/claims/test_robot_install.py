@@ -78,6 +78,7 @@ def test_serving_a_twin(program: Path, variables: dict[str, str], tmp_path: Path
     """All the way until it listens, and to its end."""
     ready = tmp_path / "ready.json"
     command = [str(program), "robot", "serve", "car", "--twin", "--port", "0", "--no-announce"]
+    command += ["--world", "room"]
     with (tmp_path / "log.txt").open("wb") as log:
         served = subprocess.Popen(
             [*command, "--ready-file", str(ready)],

@@ -8,7 +8,7 @@ import pytest
 
 from shapechanger.cli.robot.running import run_robot
 from shapechanger.twin.operator import Whereabouts
-from tests.robots import CAR, SWAPPED_ROLES, SWAPPED_WAYS, write_profile
+from tests.robots import CAR, IN_A_ROOM, SWAPPED_ROLES, SWAPPED_WAYS, write_profile
 from tests.served import driving
 
 
@@ -22,7 +22,7 @@ def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
     (folder / "wired").mkdir()
     wired = write_profile(folder / "wired")
     served = write_profile(folder, text)
-    arguments = ("--wired-as", str(wired.path))
+    arguments = ("--wired-as", str(wired.path), *IN_A_ROOM)
     with (
         run_robot(served, clock="twin", arguments=arguments) as robot,
         driving(robot, "twin") as car,

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from stable_baselines3.common.env_checker import check_env
 
 from shapechanger.envs import CATALOGUE
+from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.testing import PROMISES, MakeEnv, examine
 
 # Bodies that no id names, and arguments that change a space, keep the same promises.
@@ -32,12 +34,36 @@ _VARIANTS: dict[str, MakeEnv] = {
     ),
 }
 _MAKERS: dict[str, MakeEnv] = {env_id: partial(gym.make, env_id) for env_id in CATALOGUE}
+# Vehicles that see nothing need nothing that draws. Where a truck is at home there is so much room
+# that its sensors say the same at each start.
+_BLIND: dict[str, MakeEnv] = {
+    env_id: partial(gym.make, env_id, image=False, world="corridor" if vehicle == "truck" else None)
+    for env_id, (vehicle, _) in VEHICLE_ENVS.items()
+}
+_ALL = _MAKERS | _VARIANTS | _BLIND
+_SMALL = (32, 24)
+_SEEING: dict[str, MakeEnv] = {
+    **{env_id: partial(gym.make, env_id, size=_SMALL) for env_id in VEHICLE_ENVS},
+    "picture and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
+    "random light": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, randomise=True),
+}
 
 
 @pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
-@pytest.mark.parametrize("make", (_MAKERS | _VARIANTS).values(), ids=(_MAKERS | _VARIANTS).keys())
+@pytest.mark.parametrize("make", _ALL.values(), ids=_ALL.keys())
 def test_an_env_keeps_its_promise(make: MakeEnv, promise: Callable[[MakeEnv], None]) -> None:
     """What learners and studies rely on holds for every body."""
+    promise(make)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
+@pytest.mark.parametrize("make", _SEEING.values(), ids=_SEEING.keys())
+def test_an_env_with_pictures_keeps_its_promise(
+    make: MakeEnv, promise: Callable[[MakeEnv], None]
+) -> None:
+    """Pictures are as good as numbers: the same again, and nobody else's memory."""
     promise(make)
 
 
@@ -65,6 +91,44 @@ def test_envs_come_in_vectors(env_id: str) -> None:
         observations, _ = envs.reset(seed=0)
         assert observations.shape == (2, *envs.single_observation_space.shape)
         assert not np.array_equal(*observations)
+        envs.action_space.seed(0)
+        observations, rewards, *_ = envs.step(envs.action_space.sample())
+        assert np.isfinite(observations).all()
+        assert rewards.shape == (2,)
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize("env_id", VEHICLE_ENVS)
+def test_vehicles_come_in_vectors(env_id: str, mode: str) -> None:
+    """In this process, and in others."""
+    _play(gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, image=False))
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize(
+    ("mode", "options"), [("sync", {}), ("async", {"context": "spawn"})], ids=["sync", "async"]
+)
+def test_vehicles_with_pictures_come_in_vectors(mode: str, options: dict[str, str]) -> None:
+    """Whoever has drawn already must spawn the others; a fork of it is told so."""
+    _play(
+        gym.make_vec(
+            "shapechanger/Car-v1",
+            num_envs=2,
+            vectorization_mode=mode,
+            vector_kwargs=options,
+            size=_SMALL,
+        )
+    )
+
+
+def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
+    try:
+        observations, infos = envs.reset(seed=0)
+        assert observations.shape == (2, *envs.single_observation_space.shape)
+        assert infos["course"][0] != infos["course"][1]
         envs.action_space.seed(0)
         observations, rewards, *_ = envs.step(envs.action_space.sample())
         assert np.isfinite(observations).all()

@@ -13,13 +13,6 @@ from tests.envs.drawing import draws, missing
 
 
 @pytest.fixture(scope="session")
-def gl() -> None:
-    """Something to draw with."""
-    if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
-        missing("Neither EGL nor OSMesa nor a display works here")
-
-
-@pytest.fixture(scope="session")
 def egl() -> None:
     """EGL, and a driver for it."""
     if not draws("egl"):

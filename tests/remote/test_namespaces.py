@@ -19,7 +19,7 @@ from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.oracle import propelled
 from shapechanger.twin.wiring import Wiring
 from tests.envs.drawing import missing
-from tests.robots import write_profile
+from tests.robots import IN_A_ROOM, write_profile
 from tests.twin.robots import until
 
 DEADLINE_MS: Final = 250.0
@@ -69,7 +69,7 @@ def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
     wiring = Wiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)
     with (
-        run_robot(profile, arguments=("--host", ROBOT)) as robot,
+        run_robot(profile, arguments=("--host", ROBOT, *IN_A_ROOM)) as robot,
         robot.operator() as operator,
     ):
 

@@ -111,6 +111,22 @@ def test_the_camera_fails(tmp_path: Path, how: CameraFault) -> None:
         assert _pictures(pipe.read(1 << 20))[-1][0] > newest[0]
 
 
+def test_a_picture_without_a_barcode_is_the_whole_picture(tmp_path: Path) -> None:
+    """Whoever learns from pictures must not learn to read the time; the comment still has it."""
+    world = DrivingWorld({"wheels"}, (160, 120), seed=1)
+    plain, striped = (
+        FrontCameraPipe(
+            str(tmp_path / "none"), 20.0, 95, latest_only=True, start_ns=0, seed=0, barcode=barcode
+        ).draw(world, 77)
+        for barcode in (False, True)
+    )
+    assert b"captured_ns=77" in plain
+    seen = simplejpeg.decode_jpeg(plain, "RGB")
+    assert read_barcode(seen) is None
+    assert np.abs(seen.astype(float) - world.picture()).mean() < 5.0
+    assert read_barcode(simplejpeg.decode_jpeg(striped, "RGB")) == 77
+
+
 def test_it_is_fast(tmp_path: Path) -> None:
     """At least 100 pictures a second of 160 by 120, with JPEG; measured: some 1500."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)

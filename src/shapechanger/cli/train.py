@@ -119,7 +119,9 @@ def _clone(
         settings,
         settings.whole_updates(steps),
         seed,
-        demonstrations=Recording(out.with_suffix(".demonstrations.npz"), seed),
+        demonstrations=Recording(
+            Path("results", "demonstrations", f"{env.id.split('/')[-1]}-{seed}.npz"), seed
+        ),
         on_evaluation=show,
         on_steps=lambda done: progress(env.id, done, False),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +31,7 @@ __all__ = [
     "evaluate_clone",
     "is_clone",
     "load_clone",
+    "recorded",
 ]
 
 CLONES_ARE_JUDGED_FROM = 10_000_000
@@ -54,11 +56,15 @@ class Demonstrated(NamedTuple):
     Attributes:
         pictures: (n, h, w, 3) as a policy sees them.
         actions: (n, 2) what the demonstrator meant to do on seeing each.
+        done: (n, 2) what was done instead.
+        rewards: (n,) what it was worth.
         episodes: How many of them each episode has, in order.
     """
 
     pictures: NDArray[np.uint8]
     actions: NDArray[np.float32]
+    done: NDArray[np.float32]
+    rewards: NDArray[np.float32]
     episodes: tuple[int, ...]
 
     def first(self, steps: int) -> Demonstrated:
@@ -69,7 +75,13 @@ class Demonstrated(NamedTuple):
             if left > 0:
                 episodes.append(min(length, left))
                 left -= length
-        return Demonstrated(self.pictures[:steps], self.actions[:steps], tuple(episodes))
+        return Demonstrated(
+            self.pictures[:steps],
+            self.actions[:steps],
+            self.done[:steps],
+            self.rewards[:steps],
+            tuple(episodes),
+        )
 
 
 class Recording(NamedTuple):
@@ -109,7 +121,8 @@ def demonstrate(
     try:
         driver = _demonstrator(made, env, seed)
         pictures: list[NDArray[np.uint8]] = []
-        actions = np.empty((steps, 2), np.float32)
+        actions, carried_out = np.empty((2, steps, 2), np.float32)
+        rewards = np.empty(steps, np.float32)
         episodes: list[int] = []
         while sum(episodes) < steps:
             seen = made.reset(seed=seed if not episodes else None)[0]
@@ -117,16 +130,16 @@ def demonstrate(
             episodes.append(0)
             over = False
             while not over and sum(episodes) < steps:
-                meant, done = driver.act()
+                step = sum(episodes)
+                actions[step], carried_out[step] = driver.act()
                 pictures.append(prepare(seen[np.newaxis], framing)[0])
-                actions[sum(episodes)] = meant
+                seen, rewards[step], terminated, truncated, _ = made.step(carried_out[step])
                 episodes[-1] += 1
-                seen, _, terminated, truncated, _ = made.step(done)
                 over = terminated or truncated
             on_steps(sum(episodes))
     finally:
         made.close()
-    return Demonstrated(np.stack(pictures), actions, tuple(episodes))
+    return Demonstrated(np.stack(pictures), actions, carried_out, rewards, tuple(episodes))
 
 
 def clone_along(
@@ -159,7 +172,7 @@ def clone_along(
     """
     policy = CameraPolicy.fresh(settings.clone, seed) if start is None else start
     on_evaluation(evaluate_clone(env, policy, settings))
-    shown = _recorded(demonstrations, env, steps, settings)
+    shown = recorded(demonstrations, env, steps, settings.episode_steps, settings.clone.framing)
     for budget in (steps,) if only_last else settings.within(steps):
         part = shown.first(budget)
         policy, _ = clone(
@@ -208,24 +221,21 @@ def _demonstrator(made: gym.Env[Any, Any], env: EnvRef, seed: int) -> Demonstrat
     return cast("Demonstrator", give(seed))
 
 
-def _recorded(
-    recording: Recording, env: EnvRef, steps: int, settings: CloningSettings
+def recorded(
+    recording: Recording, env: EnvRef, steps: int, episode_steps: int, framing: Framing
 ) -> Demonstrated:
-    """The demonstrations, from their file if it is there."""
+    """The demonstrations of an env, from their file if it is there; see `demonstrate`."""
     path = recording.path
-    framing = settings.clone.framing
     if path.exists():
         with np.load(path) as arrays:
-            found = Demonstrated(
-                arrays["pictures"], arrays["actions"], tuple(arrays["episodes"].tolist())
-            )
+            named = {name: arrays[name] for name in Demonstrated._fields[:-1]}
+            found = Demonstrated(**named, episodes=tuple(arrays["episodes"].tolist()))
         if len(found.actions) >= steps:
             return found.first(steps)
-    shown = demonstrate(env, steps, settings.episode_steps, recording.seed, framing)
+    shown = demonstrate(env, steps, episode_steps, recording.seed, framing)
     make_folder(path.parent)
-    part = path.with_name(f"{path.stem}.part.npz")
-    np.savez(
-        part, pictures=shown.pictures, actions=shown.actions, episodes=np.array(shown.episodes)
-    )
+    # Two arms may record the same ones at the same time, each in a process of its own.
+    part = path.with_name(f".{path.stem}.{os.getpid()}.npz")
+    np.savez(part, **shown._asdict())
     part.replace(path)
     return shown

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.settings import CloningSettings, Settings
+from shapechanger.transfer.settings import LearnerSettings, Settings
 
 __all__ = ["Act", "Evaluation", "evaluate", "evaluation_envs", "random_actions"]
 
@@ -42,7 +42,7 @@ def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
     An env that has surroundings to hold out, and says so by a method `hold_out`, is judged there.
     """
     more = {}
-    if isinstance(settings, CloningSettings):
+    if not isinstance(settings, LearnerSettings):
         more["max_episode_steps"] = settings.eval_steps
     envs = [env.make(**more) for _ in range(settings.eval_episodes)]
     for one in envs:

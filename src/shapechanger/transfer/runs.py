@@ -135,14 +135,14 @@ def _clone(
     of_source = run.kind == "source"
     # The same demonstrations for each arm: the arms differ in what they begin with.
     shown = Run("source" if of_source else "scratch", run.index)
+    env = plan.task.source if of_source else plan.task.target
+    recording = Recording(study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown))
     policy = clone_along(
-        plan.task.source if of_source else plan.task.target,
+        env,
         settings,
         plan.source_steps if of_source else plan.steps,
         plan.seed_of(run),
-        demonstrations=Recording(
-            study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown)
-        ),
+        demonstrations=recording,
         start=load_clone(source_path) if run.kind == "fine-tune" else None,
         # Of a source policy only its beginning and its end are of interest.
         only_last=of_source,

@@ -10,7 +10,13 @@ import msgspec
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
 
-__all__ = ["LEARNERS", "CloningSettings", "LearnerSettings", "Settings", "learner_settings"]
+__all__ = [
+    "LEARNERS",
+    "CloningSettings",
+    "LearnerSettings",
+    "Settings",
+    "learner_settings",
+]
 
 
 class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):

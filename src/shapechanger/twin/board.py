@@ -138,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     size = (width, height) if given.fifo is not None else None
     place = Place(given.world, given.vehicle, tuple(given.lens))
     world = open_world(place, parts, size, given.seed)
+    if size is not None:
+        world.picture()  # The first takes a while, in which a guard would wait for the board.
     time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
     camera = None
     if given.fifo is not None:

@@ -19,6 +19,7 @@ from shapechanger.link.messages import Observation, Welcome
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
 from shapechanger.robot.drivers.settings import number
+from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.guard.wire import GuardState, Order
 from shapechanger.robot.profile.profile import Profile
@@ -68,6 +69,7 @@ class InProcessRobot:
         world: Where it is.
         pictures: Whether observations have pictures.
         seed: Of the phase of software PWM.
+        wired_as: What is really attached to its pins; None for what the profile says.
 
     Attributes:
         welcome: What the robot is, as it would tell a client.
@@ -77,10 +79,17 @@ class InProcessRobot:
     """
 
     def __init__(
-        self, profile: Profile, world: World, *, pictures: bool = True, seed: int = 0
+        self,
+        profile: Profile,
+        world: World,
+        *,
+        pictures: bool = True,
+        seed: int = 0,
+        wired_as: GuardPlan | None = None,
     ) -> None:
         self._profile = profile
         self._plan = profile.guard_plan()
+        self._wiring = Wiring(self._plan if wired_as is None else wired_as)
         self._world = world
         self._seed = seed
         camera = profile.camera if pictures else None
@@ -105,6 +114,7 @@ class InProcessRobot:
             session=_SESSION,
         )
         self._guard: Guard | None = None
+        self._pictured = 0  # It counts through all starts: each picture is told from any before.
         self._start()
 
     @property
@@ -116,7 +126,7 @@ class InProcessRobot:
         """Switch the robot off and on again, arm it, and put it at a start.
 
         Args:
-            place: Puts the vehicle there, once it is armed; None to leave it where it is.
+            place: Puts the vehicle there, before and after it is armed; None to leave it.
 
         Returns:
             What it sees there.
@@ -124,6 +134,8 @@ class InProcessRobot:
         Raises:
             RobotError: If it does not arm, and why.
         """
+        if place is not None:
+            place()  # So that a vehicle which drove does not roll on while it is switched on.
         self._start()
         self._arm()
         if place is not None:
@@ -178,12 +190,11 @@ class InProcessRobot:
 
     def _start(self) -> None:
         self.close()
-        self._board = LocalBoard(Wiring(self._plan), self._world, self._seed)
+        self._board = LocalBoard(self._wiring, self._world, self._seed)
         self._orders = _Orders()
         self._guard = Guard(self._plan, self._board.hardware, self._orders, _log)
         self._seq = 0
         self._observed = 0
-        self._pictured = 0
         self._command_ns: int | None = None
         self._advance(self._period_ns)
 

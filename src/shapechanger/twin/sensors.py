@@ -42,13 +42,14 @@ class _Sensor(Protocol):
 class _Encoder:
     """A wheel encoder; forward, channel a leads."""
 
-    def __init__(self, plan: SensorPlan) -> None:
+    def __init__(self, plan: SensorPlan, travelled_m: float) -> None:
         self._pins = (whole(plan.settings, "a"), whole(plan.settings, "b"))
         self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
         count_m = number(plan.settings, "wheel_m") / number(plan.settings, "counts_per_turn")
         self._edge_m = count_m / len(self._states)
-        self._travelled = 0.0
-        self._position = 0
+        # What was rolled before somebody switched it on is no edge.
+        self._travelled = travelled_m
+        self._position = math.floor(travelled_m / self._edge_m)
 
     def levels(self) -> dict[int, int]:
         state = self._states[self._position % len(self._states)]
@@ -63,11 +64,12 @@ class _Encoder:
             boundary = max(self._position, self._position + step) * self._edge_m
             share = (boundary - before) / (seen.travelled_m - before or 1.0)
             t = start_ns + round(min(max(share, 0.0), 1.0) * (end_ns - start_ns))
-            old = self.levels()
+            old = self._states[self._position % len(self._states)]
             self._position += step
-            found.extend(
-                Edge(t, pin, level) for pin, level in self.levels().items() if old[pin] != level
-            )
+            new = self._states[self._position % len(self._states)]
+            for pin, was, level in zip(self._pins, old, new, strict=False):
+                if was != level:
+                    found.append(Edge(t, pin, level))
         return found
 
 
@@ -128,7 +130,9 @@ class PinSensors:
     """
 
     def __init__(self, plan: GuardPlan, world: World) -> None:
-        self._encoders = [_Encoder(one) for one in plan.sensors if one.driver == "encoder"]
+        rolled_m = world.inputs().travelled_m
+        encoders = (one for one in plan.sensors if one.driver == "encoder")
+        self._encoders = [_Encoder(one, rolled_m) for one in encoders]
         self._bumpers = [_Bumper(one) for one in plan.sensors if one.driver == "switch"]
         self._distances = [_Distance(one, world) for one in plan.sensors if one.driver == "hcsr04"]
         self._sensors: list[_Sensor] = [*self._encoders, *self._bumpers]

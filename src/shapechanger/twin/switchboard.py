@@ -8,7 +8,7 @@ import socket
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import ShapechangerError
 from shapechanger.twin import wire
 from shapechanger.twin.connection import Connection
 from shapechanger.twin.pin_board import Owner, PinBoard

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import weakref
 from typing import Any, Final
 
@@ -18,22 +19,29 @@ _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLEC
 _MOST_GEOMS: Final = 2000
 
 
+# The process that draws, once one does: its forks would wait for ever for threads they have not.
+_drawing: set[int] = set()
+
+
 class OnboardCamera:
     """Draws what a camera of a model sees. Others may draw in the same process.
+
+    Nothing is opened before the first picture, so that a process which only makes one, as that of
+    an `AsyncVectorEnv` does, can be forked.
 
     Args:
         size: Width and height of the pictures in pixels.
 
     Raises:
-        RenderError: If nothing can be drawn here, or not at this size.
+        RenderError: If there are no pictures of this size.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._width, self._height = size
         if min(size) < 1:
             raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
-        choose_gl()
-        self._gl: Any = open_context(*size)
+        self._gl: Any = None
+        self._wanted: tuple[mujoco.MjModel, str] | None = None
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._picture = np.empty((self._height, self._width, 3), np.uint8)
         self._context: mujoco.MjrContext | None = None
@@ -41,11 +49,24 @@ class OnboardCamera:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
         self._option = mujoco.MjvOption()
-        self._finalizer = weakref.finalize(self, _free, self._gl)
-        self._finalizer.atexit = False
 
     def look_through(self, model: mujoco.MjModel, camera: str) -> None:
         """Draw this model from now on, by its camera of this name."""
+        self._wanted = model, camera
+
+    def _open(self, model: mujoco.MjModel, camera: str) -> None:
+        """Get ready to draw a model."""
+        if self._gl is None:
+            if _drawing - {os.getpid()}:
+                raise RenderError(
+                    "This process was forked from one that draws, so it cannot: start it by "
+                    "spawning, such as with gym.make_vec(..., vector_kwargs={'context': 'spawn'})."
+                )
+            choose_gl()
+            self._gl = open_context(self._width, self._height)
+            _drawing.add(os.getpid())
+            self._finalizer = weakref.finalize(self, _free, self._gl)
+            self._finalizer.atexit = False
         self._gl.make_current()
         if self._context is not None:
             self._context.free()
@@ -62,8 +83,11 @@ class OnboardCamera:
         """What it sees now, RGB, shape (height, width, 3), in an array of its own.
 
         Raises:
-            RenderError: If no model was given to look at.
+            RenderError: If no model was given to look at, or nothing can be drawn here.
         """
+        if self._wanted is not None:
+            self._open(*self._wanted)
+            self._wanted = None
         if self._scene is None or self._context is None:
             raise RenderError("The camera looks at nothing yet.")
         self._gl.make_current()
@@ -81,12 +105,15 @@ class OnboardCamera:
         return self._picture[::-1].copy()
 
     def close(self) -> None:
-        """Free the context."""
+        """Free the context. It looks at nothing then."""
+        self._wanted = None
         if self._context is not None:
             self._gl.make_current()
             self._context.free()
             self._context = self._scene = None
-        self._finalizer()
+        if self._gl is not None:
+            self._finalizer()
+            self._gl = None
 
 
 def _free(gl: Any) -> None:

@@ -72,7 +72,7 @@ class MujocoWorld:
     ) -> None:
         self.vehicle = vehicle_model(vehicle)
         self._world = HOME[vehicle] if world is None else world
-        self.look = Look.of(self._world) if look is None else look
+        self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
         self._lenses = [lens(name) for name in lenses]
         self.resting_v = RESTING_V
@@ -171,6 +171,10 @@ class MujocoWorld:
         self._rest_at(Pose(float(x), float(y), float(self._path.heading[i])))
         self._touch.let_go()
         self._progress.update(float(x), float(y))
+
+    def zero_odometer(self) -> None:
+        """Count what the wheels roll from 0, for a robot that is switched on anew."""
+        self._travelled_m = 0.0
 
     def truth(self) -> dict[str, float]:
         """`progress_m` and `collisions`; see `World.truth`."""

@@ -61,6 +61,8 @@ class Touch:
         if data.ncon == 0:
             return
         pairs = data.contact.geom
+        if not self._solid[pairs].any():
+            return  # As nearly always: wheels are on the ground, and nothing else is touched.
         first, second = pairs[:, 0], pairs[:, 1]
         hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
         hits &= data.contact.dist <= 0.0

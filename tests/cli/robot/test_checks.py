@@ -6,18 +6,18 @@ from pathlib import Path
 
 from shapechanger.cli.robot.checks import Check, check_robot
 from shapechanger.cli.robot.running import run_robot
-from tests.robots import BLIND_CAR, CAR, changed, write_profile
+from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
 
 
 def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Check]:
     profile = write_profile(folder, text)
     files = folder / "robot"
     files.mkdir()
-    arguments: tuple[str, ...] = ()
+    arguments: tuple[str, ...] = IN_A_ROOM
     if wired:
         true = folder / "true"
         true.mkdir()
-        arguments = ("--wired-as", str(write_profile(true, wired).path))
+        arguments = ("--wired-as", str(write_profile(true, wired).path), *IN_A_ROOM)
     with run_robot(profile, folder=files, arguments=arguments) as robot:
         return {check.name: check for check in check_robot(robot, profile, 0.5)}
 

@@ -22,7 +22,7 @@ from shapechanger.cli import main
 from shapechanger.link.address import Address
 from shapechanger.remote.discover import FoundRobot
 from shapechanger.robot.daemon.credentials import make_credentials
-from tests.robots import CAR, changed, write_profile
+from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 from tests.twin.robots import until
 
 Run = Callable[..., tuple[int, str, str]]
@@ -122,6 +122,13 @@ def test_help(run: Run, command: str) -> None:
         ("selftest test-car.toml", "lift its wheels"),
         ("selftest test-car.toml --cap 0", "The cap is above 0"),
         ("selftest test-car.toml --twin --trials 0", "At least one trial"),
+        ("serve test-car.toml --world room", "--world means something with --twin only"),
+        ("serve test-car.toml --lens night", "--lens means something with --twin only"),
+        ("serve test-car.toml --twin --port 0 --world coridor", "Did you mean 'corridor'?"),
+        ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose a --world for"),
+        ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
+        ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
+        ("serve car --twin --port 0 --world harbour", "A car does not float"),
         ("serve test-car.toml --seed 4", "--seed means something with --twin only"),
         ("calibrate test-car.toml", "lift its wheels"),
         ("calibrate car", "`shapechanger robot init car` writes one of your own"),
@@ -171,7 +178,9 @@ def test_a_port_in_use(run: Run, home: Path) -> None:
     before = files(home / "work")
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        code, _, said = run("serve", path, "--twin", "--port", str(port), "--no-announce")
+        code, _, said = run(
+            "serve", path, "--twin", "--port", str(port), "--no-announce", *IN_A_ROOM
+        )
     assert code == 2
     assert "Does the robot run already?" in said
     assert files(home / "work") == before
@@ -184,7 +193,16 @@ def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
     folder.mkdir()
     ready = home / "ready.json"
     command = [sys.executable, "-c", "from shapechanger.cli import main; main()", "robot", "serve"]
-    command += [path, "--twin", "--port", "0", "--no-announce", "--twin-folder", str(folder)]
+    command += [
+        path,
+        "--twin",
+        "--port",
+        "0",
+        "--no-announce",
+        *IN_A_ROOM,
+        "--twin-folder",
+        str(folder),
+    ]
     with (home / "log.txt").open("wb") as log:
         served = subprocess.Popen(
             [*command, "--ready-file", str(ready)], stdin=subprocess.DEVNULL, stdout=log, stderr=log

@@ -12,7 +12,7 @@ from shapechanger.cli.robot.running import run_robot
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.known import KnownRobot, recall, remember
 from tests.cli.robot.typing import Person
-from tests.robots import BLIND_CAR, write_profile
+from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.served import driving
 
 
@@ -21,7 +21,7 @@ def test_a_second_person_stops_a_robot(
 ) -> None:
     """Whoever drives it; it says so, and stays stopped."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path, BLIND_CAR)) as robot:
+    with run_robot(write_profile(tmp_path, BLIND_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
         with driving(robot, "real") as car:
@@ -45,6 +45,7 @@ def test_a_robot_that_is_served_on_its_twin_is_known_here(
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", str(port))
+    serve += IN_A_ROOM
     with Person(serve, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
         person.read_until("Known here as blind-car: `shapechanger robot drive blind-car`")
         person.read_until(" listens at ")

@@ -14,7 +14,7 @@ from shapechanger.remote.known import KnownRobot, remember
 from shapechanger.remote.vehicle import RemoteVehicleEnv
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
-from tests.robots import CAR, changed, write_profile
+from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 
 SERVO = """\
 # A car with a servo that somebody must calibrate.
@@ -78,7 +78,10 @@ mix = { throttle = 1.0 }
 def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E arms, W drives, X disarms, Space stops, Q leaves; the wheels of the twin turn."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path)) as robot, robot.operator() as operator:
+    with (
+        run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot,
+        robot.operator() as operator,
+    ):
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
         operator.place(0)
@@ -134,7 +137,10 @@ def test_what_no_key_moves_stays_where_it_is(
 ) -> None:
     """A blade that is up at rest does not come down because somebody drives, whatever the cap."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path, PLOUGH)) as robot, robot.operator() as operator:
+    with (
+        run_robot(write_profile(tmp_path, PLOUGH), arguments=IN_A_ROOM) as robot,
+        robot.operator() as operator,
+    ):
         known = robot.known
         remember(KnownRobot("plough", known.address, known.key, known.fingerprint))
         operator.place(0)
@@ -330,7 +336,7 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
 def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A steering of three levels does nothing below its threshold; a person hears why."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path)) as robot:
+    with run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot:
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
         with Person(
@@ -354,7 +360,10 @@ def test_a_person_lets_a_waiting_program_drive(
 ) -> None:
     """P gives the robot to the program, armed, and the person stays to stop it."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path)) as robot, robot.operator() as operator:
+    with (
+        run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot,
+        robot.operator() as operator,
+    ):
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
         operator.place(0)

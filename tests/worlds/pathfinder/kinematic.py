@@ -52,7 +52,7 @@ class Kinematic:
             rate = -steering * 2 * TOP["tank"] / 0.32
             self.yaw_rate += (rate - self.yaw_rate) * dt_s / 0.15
         else:
-            rate = -1.3 * steering * abs(self.speed)
+            rate = -1.3 * steering * self.speed
             self.yaw_rate += (rate - self.yaw_rate) * dt_s / 0.5
             # A hull slides on to the outside of its turn.
             self._slide += (-self.yaw_rate * self.speed * 0.4 - self._slide) * dt_s / 0.4

@@ -160,6 +160,7 @@ def test_what_the_expert_knows_is_so(name: str) -> None:
     model, traits = VEHICLES[name], TRAITS[name]
     assert traits.half_width_m == pytest.approx(model.width_m / 2, abs=0.005)
     assert traits.top_speed == pytest.approx(model.top_speed_mps, rel=0.1)
+    assert traits.nose_m == pytest.approx(model.nose_m, abs=0.005)
     if traits.drive == "wheels":
         assert 1 / traits.turn == pytest.approx(model.turning_radius_m, rel=0.1)
 

@@ -162,7 +162,13 @@ class Calibration:
             files = Path(folder) / "robot"
             files.mkdir()
             with (
-                run_robot(profile, twin=self._twin, folder=files) as robot,
+                run_robot(
+                    profile,
+                    twin=self._twin,
+                    folder=files,
+                    # Nor does anybody need a place to drive in.
+                    arguments=("--world", "room") if self._twin else (),
+                ) as robot,
                 robot.client(role="person", frames=False, name="calibrate") as client,
             ):
                 client.take()

@@ -24,7 +24,7 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["CameraFeatures", "PreparedPictures", "to_sb3"]
+__all__ = ["CameraFeatures", "PreparedPictures", "from_sb3", "to_sb3"]
 
 
 class CameraFeatures(BaseFeaturesExtractor):
@@ -132,6 +132,21 @@ def to_sb3(
         spread.weight.zero_()
         spread.bias.fill_(-2.0)
     return model
+
+
+def from_sb3(model: SAC, policy: CameraPolicy) -> CameraPolicy:
+    """What a learner of `to_sb3` drives like now, without its noise.
+
+    Args:
+        model: The learner.
+        policy: What it began with, which stays as it is.
+    """
+    learned = policy.copy()
+    for module in model.actor.modules():
+        if isinstance(module, CameraFeatures):
+            learned.network.eyes.load_state_dict(module.eyes.state_dict())
+    learned.network.hands.load_state_dict(cast("nn.Linear", model.actor.mu).state_dict())
+    return learned
 
 
 def _bounds(space: Any) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -29,7 +29,9 @@ class Demonstrator:
         self._course = self._world.course
         self._expert = Expert(self._course, self._world.vehicle.name)
         self._expert.reset(self._world.pose)
-        self._disturbance = Disturbance(seed=int(self._seeds.integers(2**31)))
+        self._disturbance = Disturbance.of(
+            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
+        )
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """What it means to do now, and what it does: each (2,), steering and throttle.

@@ -175,6 +175,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
         if drawn.course != self._world.seed or drawn.look is not None:
             self._world.lay_out(drawn.course, drawn.look, drawn.camera)
+        self._world.zero_odometer()  # So that no episode depends on those before it.
         last = self._robot.start(lambda: self._world.place(drawn.start))
         if self._world.touches:
             raise WorldError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.pathfinder.angles import wrapped
+from shapechanger.worlds.pathfinder.clearance import Obstacles
 from shapechanger.worlds.pathfinder.pace import pace
 from shapechanger.worlds.pathfinder.path import Path, plan_path
 from shapechanger.worlds.pathfinder.pursuit import Pursuit
@@ -25,6 +26,12 @@ SPEED_GAIN: Final = 1.5
 
 REACTION_S: Final = 0.15
 """Time from an action to its effect: the expert looks at where the vehicle will be by then."""
+
+ASIDE: Final = 0.7
+"""Angle to its target, rad, from which on a vehicle has to turn before it can go on."""
+
+BLOCKED_M: Final = 0.15
+"""Room before its nose that is too little for that."""
 
 
 class Expert:
@@ -65,7 +72,7 @@ class Expert:
             comfort_m=self._traits.comfort_m,
         )
         self.speeds = pace(self.path, self._traits)
-        self._seed = seed
+        self._obstacles = Obstacles(course)
         self._pursuit = Pursuit(self._traits, period_s)
         self._recovery = Recovery(self._traits, period_s, np.random.default_rng(seed))
         self._three_way = ThreeWay() if levels == "three" else None
@@ -73,8 +80,8 @@ class Expert:
 
     @property
     def recovering(self) -> bool:
-        """Whether it is backing away from something."""
-        return self._recovery.backing
+        """Whether it is getting away from something."""
+        return self._recovery.active
 
     def reset(self, pose: Pose) -> None:
         """Begin at a pose."""
@@ -110,10 +117,20 @@ class Expert:
             action = self._driven(steering, spot.station, spot.lateral, angle, speed)
         else:
             action = back
-        self._recovery.watch(action, speed, yaw_rate)
+        blocked = abs(angle) > ASIDE and self._ahead(pose) < BLOCKED_M
+        self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
         if self._three_way:
             action = (self._three_way.step(action[0]), action[1])
         return np.array(action, np.float32)
+
+    def _ahead(self, pose: Pose) -> float:
+        """Room before the vehicle's nose, m."""
+        reach = self._traits.nose_m + BLOCKED_M
+        nose = (
+            pose.x + reach * math.cos(pose.heading),
+            pose.y + reach * math.sin(pose.heading),
+        )
+        return float(self._obstacles.distance(np.array([nose]))[0])
 
     def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
         """Where the vehicle will be when an action of now has its effect."""

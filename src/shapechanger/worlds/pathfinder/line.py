@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -41,6 +42,9 @@ class ClosedLine:
         self.stations: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
         self._window = int(np.ceil(WINDOW_M / (self.length / len(points))))
+        # Going on beyond both ends by a window, so that each window is a slice.
+        around = np.arange(-self._window, len(points) + self._window) % len(points)
+        self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()
 
     def index(self, station: float) -> int:
         """Number of the point that a station lies at or behind.
@@ -70,19 +74,21 @@ class ClosedLine:
             hint: Station near which to look, m; None looks everywhere.
         """
         if hint is None:
-            which = np.arange(len(self.points))
+            first, count = 0, len(self.points)
         else:
-            middle = self.index(hint)
-            which = np.arange(middle - self._window, middle + self._window + 1) % len(self.points)
-        start, step, squared = self.points[which], self._steps[which], self._squared[which]
-        away = np.array((x, y)) - start
-        share = np.clip(np.einsum("ij,ij->i", away, step) / squared, 0.0, 1.0)
-        off = away - share[:, None] * step
-        best = int(np.argmin(np.einsum("ij,ij->i", off, off)))
-        size = float(np.sqrt(squared[best]))
-        station = float(self.stations[which[best]] + share[best] * size) % self.length
-        cross = float(step[best, 0] * away[best, 1] - step[best, 1] * away[best, 0])
-        return Spot(station, float(np.copysign(np.hypot(off[best, 0], off[best, 1]), cross)))
+            first, count = self.index(hint) - self._window, 2 * self._window + 1
+        # This is asked at each step of each simulation, so it makes few and small arrays.
+        near = self._around[:, first + self._window : first + self._window + count]
+        start_x, start_y, step_x, step_y, squared = near
+        away_x, away_y = x - start_x, y - start_y
+        share = (away_x * step_x + away_y * step_y) / squared
+        np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)
+        off_x, off_y = away_x - share * step_x, away_y - share * step_y
+        best = int((off_x * off_x + off_y * off_y).argmin())
+        behind = self.stations[(first + best) % len(self.points)]
+        station = float(behind + share[best] * np.sqrt(squared[best])) % self.length
+        cross = float(step_x[best] * away_y[best] - step_y[best] * away_x[best])
+        return Spot(station, math.copysign(math.hypot(off_x[best], off_y[best]), cross))
 
     def ahead_by(self, start: float, end: float) -> float:
         """The shorter way along the line from one station to another, m; backward is negative.

@@ -25,6 +25,12 @@ STICKING: Final = 0.1
 """Rate of turn from which on a tank is given all of what its tracks stick by, rad/s; less below, or
 it would twitch where it goes straight on."""
 
+ABOUT: Final = 0.9
+"""Angle to its target, rad, from which on a tank turns on the spot."""
+
+ABOUT_RATE: Final = 2.5
+"""Rate of that turn over the angle, 1/s: friction holds a tank that turns about half-heartedly."""
+
 
 class Pursuit:
     """The steering of one vehicle.
@@ -79,6 +85,8 @@ class Pursuit:
                 return self._clipped(-self._curvature(angle, distance) / self._traits.turn)
             case "tracks":
                 rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
+                if abs(angle) > ABOUT:
+                    rate = ABOUT_RATE * angle
                 # Tracks slip by as much as the floor likes, so what is missing is added.
                 value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
                 value += self._traits.dead * max(-1.0, min(1.0, rate / STICKING))

@@ -23,6 +23,7 @@ class Traits:
     Attributes:
         drive: What turns it: front wheels, two tracks, or a rudder.
         half_width_m: Of its widest part.
+        nose_m: From its origin to its front.
         margin_m: What its path leaves at each side, at least: for the corners of its hull, a
             trailer that cuts corners, and errors.
         comfort_m: What its path leaves where there is room.
@@ -42,6 +43,7 @@ class Traits:
 
     drive: Literal["wheels", "tracks", "rudder"]
     half_width_m: float
+    nose_m: float
     margin_m: float
     comfort_m: float
     top_speed: float
@@ -61,6 +63,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         "car": Traits(
             drive="wheels",
             half_width_m=0.10,
+            nose_m=0.20,
             margin_m=0.13,
             comfort_m=0.40,
             top_speed=2.0,
@@ -74,6 +77,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         "tank": Traits(
             drive="tracks",
             half_width_m=0.12,
+            nose_m=0.16,
             margin_m=0.12,
             comfort_m=0.40,
             top_speed=1.0,
@@ -89,6 +93,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         "truck": Traits(
             drive="wheels",
             half_width_m=0.10,
+            nose_m=0.25,
             margin_m=0.25,
             comfort_m=0.70,
             top_speed=1.5,
@@ -102,6 +107,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         "boat": Traits(
             drive="rudder",
             half_width_m=0.10,
+            nose_m=0.30,
             margin_m=0.35,
             comfort_m=1.0,
             top_speed=1.2,

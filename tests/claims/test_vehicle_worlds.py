@@ -1,0 +1,135 @@
+"""What the README says of vehicles in simulated worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapechanger.cli.robot.running import run_robot
+from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.twin.in_process import InProcessRobot
+from shapechanger.twin.operator import Whereabouts
+from shapechanger.worlds.course import HELD_OUT, TRAINING
+from shapechanger.worlds.simulation import MujocoWorld
+from tests.robots import write_profile
+
+_COURSE, _START = 5, 11
+
+
+def test_swapped_pins_drive_a_car_backward(tmp_path: Path) -> None:
+    """Between an action and the wheels are the robot's own pins, also where nothing is served."""
+    path = find_profile("lab-car")
+    text = Path(path).read_text()
+    forward, backward = "forward = 22 ", "backward = 27 "
+    assert text.count(forward) == text.count(backward) == 1
+    swapped = text.replace(forward, "forward = 27 ").replace(backward, "backward = 22 ")
+    progress: list[float] = []
+    for wiring in (text, swapped):
+        with closing(MujocoWorld("car", seed=_COURSE, size=None)) as world:
+            attached = write_profile(tmp_path, wiring).guard_plan()
+            robot = InProcessRobot(load_profile(path), world, pictures=False, wired_as=attached)
+            robot.start(lambda world=world: world.place(_START))
+            for _ in range(20):
+                robot.step((0.0, 0.5))
+            robot.close()
+            progress.append(world.progress_m)
+    assert progress[0] > 0.2
+    assert progress[1] < -0.2
+
+
+def _actions() -> list[tuple[float, ...]]:
+    """Five seconds of driving that hits nothing."""
+    rng = np.random.default_rng(3)
+    drawn = rng.uniform((-0.3, 0.2), (0.3, 0.7), (100, 2)).astype(np.float32)
+    return [tuple(action.tolist()) for action in drawn]
+
+
+def test_a_car_in_this_process_is_the_car_that_is_served() -> None:
+    """The same course, start and actions end at the same place, to the last bit.
+
+    One is a guard, a daemon and a board in processes of their own, driven over TLS.
+    """
+    _compare(image=False)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_car_that_sees_is_the_same_car() -> None:
+    """Drawing pictures takes no time of the twin's clock."""
+    _compare(image=True)
+
+
+def _compare(*, image: bool) -> None:
+    """Drive both cars, and see that they are at the same place after each action."""
+    served = _drive_served(_actions(), image)
+    with closing(VehicleEnv("car", image=image)) as env:
+        _, info = env.reset(options={"course": _COURSE, "start": _START})
+        driven = [info["pose"]]
+        for action in _actions():
+            driven.append(env.step(np.array(action, np.float32))[4]["pose"])
+        progress = env.world.progress_m
+    assert progress > 2.0
+    assert [(one.x, one.y, one.heading) for one in served] == driven
+    assert served[-1].truth["progress_m"] == progress
+
+
+def _drive_served(actions: Sequence[Sequence[float]], image: bool) -> list[Whereabouts]:
+    """Where a served car is at its start and after each action."""
+    profile = load_profile(find_profile("lab-car"))
+    with (
+        run_robot(profile, clock="twin", arguments=("--world", "corridor")) as robot,
+        robot.operator() as operator,
+        robot.client(role="person", pace="lockstep", frames=image) as client,
+    ):
+        operator.lay_out(_COURSE)
+        client.take()
+        client.arm()
+        operator.place(_START)
+        seen = client.ask().message
+        found = [operator.where()]
+        for action in actions:
+            client.command(action, answers=seen.seq)
+            seen = client.observation(seen.seq).message
+            found.append(operator.where())
+    return found
+
+
+def _until_it_bumps(env: VehicleEnv) -> tuple[float, bool]:
+    """Reward and end of the step in which the car hits the wall at the next bend."""
+    env.reset(options={"course": _COURSE, "start": _START})
+    for _ in range(400):
+        _, _, terminated, truncated, info = env.step(np.array([-0.3, 0.6], np.float32))
+        assert not truncated
+        if info["collisions"]:
+            return info["reward_collision"], terminated
+    raise AssertionError("It hit nothing.")
+
+
+def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
+    """Unless somebody puts the car back: then it goes on."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        assert _until_it_bumps(env) == (-10.0, True)
+    with closing(VehicleEnv("car", image=False, put_back=True)) as env:
+        assert _until_it_bumps(env) == (-10.0, False)
+        before = env.world.progress_m
+        for _ in range(30):  # The guard keeps it from going forward for a while.
+            _, _, terminated, _, info = env.step(np.array([0.0, 0.4], np.float32))
+            assert not terminated
+        assert info["collisions"] == 1
+        assert info["progress"] > before + 0.1
+
+
+def test_nobody_is_judged_on_a_course_to_learn_on() -> None:
+    """The two kinds of courses share no seed, and an env that holds out draws the other kind."""
+    assert not set(TRAINING) & set(HELD_OUT)
+    with closing(VehicleEnv("car", image=False, courses=(1, 2, 3))) as env:
+        assert env.reset(seed=0)[1]["course"] in (1, 2, 3)
+        env.hold_out()
+        drawn = {env.reset(seed=seed)[1]["course"] for seed in range(8)}
+        assert drawn <= set(HELD_OUT)
+        assert len(drawn) == 8

@@ -1,0 +1,90 @@
+"""Where the vehicle of a twin is that somebody serves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot import serving
+from shapechanger.cli.robot.serving import TwinOptions, place_of, start_twin
+from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.place import Place
+from tests.robots import CAR, changed, write_profile
+
+
+def _shipped(name: str) -> Profile:
+    return load_profile(find_profile(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("lab-car", Place("corridor", "car")),
+        ("lab-tank", Place("corridor", "tank")),
+        ("lab-truck", Place("yard", "truck")),
+        ("lab-boat", Place("harbour", "boat")),
+        ("cat", Place()),
+        ("finger", Place()),
+    ],
+)
+def test_a_vehicle_is_at_home_and_anything_else_in_the_room(name: str, place: Place) -> None:
+    """Whoever asks for nothing gets what fits."""
+    assert place_of(_shipped(name), "", ()) == place
+
+
+def test_lenses_go_where_the_vehicle_goes() -> None:
+    """In the order in which they spoil pictures."""
+    place = place_of(_shipped("lab-car"), "", ("night", "dirt"))
+    assert place == Place("corridor", "car", ("night", "dirt"))
+    assert place_of(_shipped("lab-car"), "yard", ()) == Place("yard", "car")
+
+
+def test_the_room_takes_any_robot() -> None:
+    """Also one that would have a home."""
+    assert place_of(_shipped("lab-car"), "room", ()) == Place()
+
+
+def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path) -> None:
+    """Unless somebody asks for a world: then it hears what does not fit."""
+    text = changed('part = "steering"', 'part = "rudder"')
+    odd = write_profile(tmp_path, text)
+    assert place_of(odd, "", ()) == Place()
+    with pytest.raises(ProfileError, match="A car has no 'rudder'"):
+        place_of(odd, "corridor", ())
+
+
+def test_without_mujoco_everybody_is_in_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And whoever asks for a world hears what to install."""
+    found = serving.find_spec
+    monkeypatch.setattr(
+        serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
+    )
+    assert place_of(_shipped("lab-car"), "", ()) == Place()
+    monkeypatch.setitem(__import__("sys").modules, "shapechanger.embodiments.vehicles", None)
+    with pytest.raises(MissingExtra, match=r"shapechanger\[sim\]"):
+        place_of(_shipped("lab-car"), "corridor", ())
+
+
+def test_what_there_is_not_is_told_with_what_there_is() -> None:
+    """A slip, a body without a vehicle, and a lens for a camera that has none."""
+    car = _shipped("lab-car")
+    with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
+        place_of(car, "coridor", ())
+    with pytest.raises(UnknownName, match=r"No lens matches 'nihgt'. Did you mean 'night'"):
+        place_of(car, "", ("nihgt",))
+    with pytest.raises(ProfileError, match="no cat in MuJoCo, only car, tank, truck, boat; --wor"):
+        place_of(_shipped("cat"), "corridor", ())
+    with pytest.raises(RobotError, match="plain camera: choose a --world for a --lens"):
+        place_of(car, "room", ("night",))
+
+
+def test_a_twin_is_where_its_place_says(tmp_path: Path) -> None:
+    """A place for a command is a place for the board that it starts."""
+    profile = write_profile(tmp_path, CAR)
+    options = TwinOptions(tmp_path, "twin", seed=4, place=place_of(profile, "yard", ()))
+    with start_twin(profile, options) as board, Operator(board.socket_path) as operator:
+        assert operator.where().truth == {"progress_m": 0.0, "collisions": 0.0}

@@ -1,0 +1,67 @@
+"""Whoever shows how to drive."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.transfer.cloning import Demonstrator
+from shapechanger.worlds.home import HOME
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_it_can_drive_what_it_shows(vehicle: str) -> None:
+    """Mistakes and all, it comes along the course and hits nothing."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        driver: Demonstrator = env.demonstrator(3)
+        env.reset(seed=2)
+        driver.begin()
+        mistakes = 0
+        for _ in range(100):
+            meant, done = driver.act()
+            assert env.action_space.contains(meant)
+            assert env.action_space.contains(done)
+            mistakes += not np.array_equal(meant, done)
+            _, _, terminated, _, info = env.step(done)
+            assert not terminated
+        assert info["progress"] > 1.0
+        assert mistakes > 0
+
+
+def test_its_mistakes_follow_from_its_seed() -> None:
+    """Another seed makes others, and another episode too."""
+    shown: list[list[list[float]]] = []
+    with closing(VehicleEnv("car", image=False)) as env:
+        for seed in (1, 1, 2):
+            driver = env.demonstrator(seed)
+            for episode in range(2):
+                env.reset(seed=2)
+                driver.begin()
+                done: list[list[float]] = []
+                for _ in range(30):
+                    action = driver.act()[1]
+                    done.append(action.tolist())
+                    env.step(action)
+                if episode or seed != 2:
+                    shown.append(done)
+    first, second, again, again_second, other_second = shown
+    assert first == again
+    assert second == again_second
+    assert first != second
+    assert second != other_second
+
+
+def test_it_begins_on_the_course_that_is_there() -> None:
+    """After a reset to another course it knows the way there."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        driver = env.demonstrator(1)
+        for course in (3, 4):
+            _, info = env.reset(options={"course": course, "start": 1})
+            driver.begin()
+            for _ in range(40):
+                _, _, terminated, _, info = env.step(driver.act()[1])
+                assert not terminated
+            assert info["progress"] > 0.3

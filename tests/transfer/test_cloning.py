@@ -1,0 +1,248 @@
+"""A study of clones: demonstrations that arms share, budgets, and runs that were cut off."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.demos.cloning import CameraPolicy
+from shapechanger.errors import StudyError
+from shapechanger.transfer import cloning
+from shapechanger.transfer.cloning import Recording, clone_along, demonstrate, evaluate_clone
+from shapechanger.transfer.evaluation import Evaluation, evaluation_envs
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.report import write_report
+from shapechanger.transfer.settings import LEARNERS, CloningSettings, learner_settings
+from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
+from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
+from tests.transfer.studies import BIG
+
+_FRAMING = TINY_CLONING.clone.framing
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Networks this small gain nothing from more."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def _plan() -> Plan:
+    return make_plan(TransferTask(LANE, SLIPPERY), "cloning", TINY_CLONING, seeds=2)
+
+
+def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
+    return {
+        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
+    }
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
+    """A study that was never interrupted, and its folder."""
+    out = tmp_path_factory.mktemp("cloned") / "study"
+    return run_study(_plan(), out, executor=Serial()), out
+
+
+def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
+    """The picture before the action, and not the mistake that was made."""
+    shown = demonstrate(LANE, 150, 20, 3, _FRAMING)
+    assert shown.pictures.shape == (150, 12, 20, 3)
+    assert shown.episodes == (20,) * 7 + (10,)
+    bright = shown.pictures[:, 6, :, 0].argmax(axis=1)
+    left = bright < 8  # Seen on the left: it is right of the middle, and meant to go left.
+    right = bright > 9
+    assert left.any()
+    assert right.any()
+    assert (shown.actions[left, 0] < 0.0).all()
+    assert (shown.actions[right, 0] > 0.0).all()
+
+
+def test_fewer_demonstrations_are_the_first_of_more() -> None:
+    """So that a budget is part of the next one."""
+    more, fewer = (demonstrate(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
+    first = more.first(30)
+    np.testing.assert_array_equal(first.pictures, fewer.pictures)
+    np.testing.assert_array_equal(first.actions, fewer.actions)
+    assert first.episodes == fewer.episodes == (20, 10)
+    other = demonstrate(LANE, 30, 20, 4, _FRAMING)
+    assert not np.array_equal(other.actions, fewer.actions)
+
+
+def test_an_env_without_a_demonstrator_is_refused() -> None:
+    """There is nobody to learn from, and the sentence says where."""
+    with pytest.raises(StudyError, match="BigInvertedPendulum-v1 has no demonstrator"):
+        demonstrate(BIG, 10, 20, 3, _FRAMING)
+
+
+def _cloned(
+    folder: Path, steps: int = 120, *, only_last: bool = False, start: CameraPolicy | None = None
+) -> tuple[CameraPolicy, list[Evaluation]]:
+    found: list[Evaluation] = []
+    policy = clone_along(
+        LANE,
+        TINY_CLONING,
+        steps,
+        5,
+        demonstrations=Recording(folder / "shown.npz", 6),
+        start=start,
+        only_last=only_last,
+        on_evaluation=found.append,
+    )
+    return policy, found
+
+
+def test_a_clone_is_judged_at_each_budget_and_gets_better(tmp_path: Path) -> None:
+    """The last one keeps to the middle, which the first, of nothing, does not."""
+    policy, found = _cloned(tmp_path)
+    assert [one.steps for one in found] == [0, 30, 60, 120]
+    assert found[-1].mean_return > found[0].mean_return + 2.0
+    assert set(found[-1].terms) == {"reward_middle", "reward_speed"}
+    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+
+
+def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
+    """Each budget begins anew, so that none depends on those before it."""
+    _, found = _cloned(tmp_path, 60)
+    _, last = _cloned(tmp_path, 60, only_last=True)
+    assert [one.steps for one in last] == [0, 60]
+    assert last[-1].mean_return == found[-1].mean_return
+
+
+def test_a_clone_goes_on_from_another(tmp_path: Path) -> None:
+    """Its first evaluation is that of the one it begins with, which stays as it is."""
+    policy, found = _cloned(tmp_path)
+    _, tuned = _cloned(tmp_path, 30, start=policy)
+    assert tuned[0].mean_return == found[-1].mean_return
+    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+
+
+def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever comes later learns from the same ones; more are recorded where they are too few."""
+    _cloned(tmp_path, 30)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["shown.npz"]
+    _, found = _cloned(tmp_path, 120)
+    asked: list[int] = []
+    monkeypatch.setattr(cloning, "demonstrate", lambda *_: asked.append(1))
+    assert _cloned(tmp_path, 120)[1] == found
+    _cloned(tmp_path, 60)
+    assert asked == []
+
+
+def test_clones_are_judged_where_nobody_learned() -> None:
+    """On surroundings that are held out, for as many steps as the settings say."""
+    envs = evaluation_envs(LANE, TINY_CLONING)
+    try:
+        assert len(envs) == 2
+        for env in envs:
+            assert env.reset(seed=1)[1]["course"] >= HELD_OUT
+            steps, over = 0, False
+            while not over:
+                env.unwrapped.place = 0.0  # pyright: ignore[reportAttributeAccessIssue]
+                _, _, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
+                over = terminated or truncated
+                steps += 1
+            assert steps == 25
+    finally:
+        for env in envs:
+            env.close()
+
+
+def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
+    """Every arm and seed, at every budget; zero-shot is where fine-tuning begins."""
+    study, out = finished
+    for kind in ("scratch", "fine-tune"):
+        for result in study.of(kind):
+            assert [e.steps for e in result.curve] == [0, 30, 60, 120]
+    for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
+        assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
+    assert [e.steps for e in study.of("source")[0].curve] == [0, 60]
+    assert set(study.summaries) == {"zero-shot", "fine-tune"}
+    policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.zip")
+    again = evaluate_clone(SLIPPERY, policy, TINY_CLONING).mean_return
+    assert again == study.of("scratch")[0].curve[-1].mean_return
+
+
+def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -> None:
+    """Of each seed there is one recording for the target and one for the source."""
+    names = sorted(path.name for path in (finished[1] / "demonstrations").iterdir())
+    assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
+
+
+def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """The plan decides every number, demonstrations and all."""
+    again = run_study(_plan(), tmp_path / "again", executor=Serial())
+    assert _curves(again) == _curves(finished[0])
+    assert again.summaries == finished[0].summaries
+
+
+def test_a_study_that_was_killed_ends_with_the_same_numbers(
+    finished: tuple[Study, Path], tmp_path: Path
+) -> None:
+    """Whatever was left behind of a run, and of a recording."""
+    study, out = finished
+    cut = tmp_path / "cut"
+    shutil.copytree(out, cut)
+    (cut / STUDY_FILE).unlink()
+    for name in ("scratch-1", "source-1", "fine-tune-1"):
+        (cut / "runs" / name / "run.json").unlink()
+    (cut / "runs" / "scratch-1" / "curve.jsonl").write_text("half a li")
+    (cut / "demonstrations" / "scratch-1.npz").unlink()
+    (cut / "demonstrations" / ".scratch-1.7.npz").write_bytes(b"half a pict")
+    kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
+    resumed = run_study(_plan(), cut, executor=Serial())
+    assert _curves(resumed) == _curves(study)
+    assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
+
+
+def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """A page with its learner and its curves, whatever the learner learns by."""
+    path = tmp_path / "report.html"
+    write_report(finished[0], path)
+    page = path.read_text(encoding="utf-8")
+    assert "cloning" in page
+    assert "tests/Lane-v0" in page
+    assert "data:image/" in page
+
+
+def test_settings_that_contradict_themselves_are_refused() -> None:
+    """Budgets grow, and an evaluation has an episode."""
+    for budgets in ((), (0, 5), (5, 5), (10, 5)):
+        with pytest.raises(StudyError, match="Budgets are numbers of steps that grow"):
+            msgspec.structs.replace(TINY_CLONING, budgets=budgets)
+    for name in ("eval_episodes", "eval_steps", "episode_steps"):
+        with pytest.raises(StudyError, match="at least one episode, of at least one step"):
+            msgspec.structs.replace(TINY_CLONING, **{name: 0})
+
+
+def test_a_budget_is_one_of_those_that_there_are() -> None:
+    """Rounded up, and to the largest one at most."""
+    assert [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)] == [
+        30,
+        30,
+        60,
+        120,
+        120,
+    ]
+    assert TINY_CLONING.within(60) == (30, 60)
+    assert (TINY_CLONING.steps, TINY_CLONING.eval_every) == (120, 30)
+
+
+def test_the_learner_is_there_by_its_name() -> None:
+    """Its settings survive the plan's JSON, and are told from those of PPO."""
+    settings = learner_settings("cloning")
+    assert isinstance(settings, CloningSettings)
+    assert settings is LEARNERS["cloning"]
+    plan = _plan()
+    again = msgspec.json.decode(msgspec.json.encode(plan), type=Plan)
+    assert again == plan
+    assert isinstance(again.settings, CloningSettings)

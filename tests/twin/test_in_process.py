@@ -1,0 +1,163 @@
+"""A whole robot in this process: it is armed, driven, stopped and started afresh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.errors import RobotError
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Observation
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.twin.in_process import InProcessRobot
+from shapechanger.twin.world.driving import DrivingWorld
+from tests.robots import CAR, SWAPPED_WAYS, changed, write_profile
+
+_PARTS = {"wheels", "steering"}
+
+
+def _robot(world: DrivingWorld | None = None, *, pictures: bool = False) -> InProcessRobot:
+    profile = load_profile(find_profile("lab-car"))
+    return InProcessRobot(profile, world or _room(), pictures=pictures)
+
+
+def _room() -> DrivingWorld:
+    return DrivingWorld(_PARTS, (160, 120), seed=1)
+
+
+def _speed(robot: InProcessRobot, seen: Observation) -> float:
+    names = Layout.from_json(robot.welcome.state_layout).names
+    return seen.state[names.index("speed")]
+
+
+def test_a_step_is_one_control_period() -> None:
+    """Time moves by 1/20 s, and the observation answers the command of the step."""
+    robot = _robot()
+    first = robot.start()
+    seen, bumped = robot.step((0.0, 0.5))
+    assert seen.state_ns - first.state_ns == 50_000_000
+    assert robot.now_ns == seen.state_ns
+    assert seen.seq == first.seq + 1
+    assert not bumped
+    robot.close()
+
+
+def test_it_drives_as_its_profile_lets_it() -> None:
+    """The throttle rises by its slew, and the encoder sees the wheels turn."""
+    world = _room()
+    robot = _robot(world)
+    robot.start(lambda: world.place(2))
+    begin = world.inputs().travelled_m
+    applied = [robot.step((0.0, 1.0))[0].action_applied[1] for _ in range(10)]
+    assert applied == pytest.approx([min(1.0, 0.2 * (i + 1)) for i in range(10)])
+    seen = robot.step((0.0, 1.0))[0]
+    assert world.inputs().travelled_m > begin + 0.1
+    assert _speed(robot, seen) > 0.3
+    robot.close()
+
+
+def test_it_is_armed_from_the_start_and_says_what_it_is() -> None:
+    """Whoever steps it has nothing to do before."""
+    robot = _robot()
+    seen = robot.start()
+    assert seen.armed
+    assert not seen.emergency
+    assert robot.welcome.robot == "lab-car"
+    assert robot.welcome.clock == "twin"
+    assert robot.welcome.image_size is None
+    robot.close()
+
+
+def test_a_start_forgets_what_was() -> None:
+    """It is switched off and on again: no command acts on, and the same start is the same."""
+    world = _room()
+    robot = _robot(world)
+    first = robot.start(lambda: world.place(2))
+    for _ in range(20):
+        robot.step((0.5, 1.0))
+    again = robot.start(lambda: world.place(2))
+    assert world.inputs().speed == 0.0
+    assert (again.state, again.action_applied) == (first.state, first.action_applied)
+    assert again.state_ns == first.state_ns
+    robot.close()
+
+
+def test_pins_that_are_swapped_drive_it_backward(tmp_path: Path) -> None:
+    """It is the profile's pins that move it, and not a short cut past them."""
+    gone: list[float] = []
+    for text in (CAR, SWAPPED_WAYS):
+        # The one plan says what is attached and what is driven: only one of the two is swapped.
+        world = _room()
+        profile = write_profile(tmp_path, text)
+        robot = InProcessRobot(
+            profile, world, pictures=False, wired_as=write_profile(tmp_path, CAR).guard_plan()
+        )
+        robot.start(lambda world=world: world.place(2))
+        for _ in range(10):
+            robot.step((0.0, 1.0))
+        gone.append(world.inputs().travelled_m)
+        robot.close()
+    assert gone[0] > 0.1
+    assert gone[1] == pytest.approx(-gone[0], rel=0.05)
+
+
+def test_a_command_that_is_refused_says_why() -> None:
+    """As a served robot does; and only once."""
+    robot = _robot()  # Not armed before its start.
+    robot.step((0.0, 1.0))
+    assert robot.refused
+    assert not robot.refused
+    robot.close()
+
+
+def test_a_bump_is_told_though_it_is_over() -> None:
+    """What happens between two observations is not lost."""
+    world = _room()
+    robot = _robot(world)
+    robot.start(lambda: world.place(2))
+    bumps = sum(robot.step((0.0, 1.0))[1] for _ in range(200))
+    assert bumps == 1
+    robot.close()
+
+
+def test_pictures_are_those_of_the_world() -> None:
+    """As JPEG, of the time of the observation, one for each."""
+    world = _room()
+    robot = _robot(world, pictures=True)
+    seen = robot.start()
+    assert robot.welcome.image_size == (160, 120)
+    assert seen.frame is not None
+    picture = simplejpeg.decode_jpeg(seen.frame, "RGB")
+    assert np.abs(picture.astype(float) - world.picture()).mean() < 5.0
+    assert seen.captured_ns == seen.state_ns
+    after = robot.step((0.0, 0.0))[0]
+    assert after.frame_seq == seen.frame_seq + 1
+    # A reader that keeps a picture by its number must not take one of the next start for it.
+    assert robot.start().frame_seq > after.frame_seq
+    robot.close()
+
+
+def test_a_closed_robot_is_at_rest_and_moves_no_more() -> None:
+    """Closing twice does no harm, and a start opens it again."""
+    world = _room()
+    robot = _robot(world)
+    robot.start()
+    robot.step((0.0, 1.0))
+    robot.close()
+    robot.close()
+    with pytest.raises(RobotError, match="was closed"):
+        robot.step((0.0, 1.0))
+    assert robot.start().armed
+    robot.close()
+
+
+def test_a_sensor_that_is_not_wired_is_told_of(tmp_path: Path) -> None:
+    """As the guard on the bench tells it, before anything moves."""
+    unwired = changed('[sensor.pack]\ndriver = "ina219"\n', "")
+    attached = write_profile(tmp_path, unwired.replace("low_battery_v = 6.6\n", "")).guard_plan()
+    profile = write_profile(tmp_path, CAR)
+    with pytest.raises(RobotError, match=r"Sensor 'pack' .* does not answer"):
+        InProcessRobot(profile, _room(), pictures=False, wired_as=attached)

@@ -1,0 +1,90 @@
+"""A board in this process: pins, chips and time without sockets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from gpiozero import DigitalInputDevice, DigitalOutputDevice, Motor
+
+from shapechanger.errors import RobotError
+from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.timekeeper import START_NS
+from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.world.driving import DrivingWorld
+from tests.twin.robots import CAR
+
+_MS = 1_000_000
+
+
+def _board() -> tuple[LocalBoard, DrivingWorld]:
+    world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
+    return LocalBoard(Wiring(CAR), world), world
+
+
+def test_time_moves_only_by_advance() -> None:
+    """It begins where the twin's clock begins, and nobody can wait for it."""
+    board, _ = _board()
+    assert board.now_ns == board.hardware.clock.now_ns() == START_NS
+    board.advance(START_NS + 10 * _MS)
+    assert board.hardware.clock.now_ns() == START_NS + 10 * _MS
+
+
+@pytest.mark.parametrize(
+    "wait",
+    [
+        lambda clock: clock.wait([], START_NS + 1, 0.1),
+        lambda clock: asyncio.run(clock.sleep(0.1)),
+    ],
+    ids=["wait", "sleep"],
+)
+def test_who_waits_would_wait_for_ever(wait: Callable[[Any], object]) -> None:
+    """There is no other process that could let time go by."""
+    board, _ = _board()
+    with pytest.raises(RobotError, match="moves only by `advance`"):
+        wait(board.hardware.clock)
+
+
+def test_a_pin_drives_the_world() -> None:
+    """What gpiozero's devices do with a pin arrives at the motor."""
+    board, world = _board()
+    factory = board.hardware.pin_factory()
+    assert board.hardware.pin_factory() is factory
+    motor = Motor(22, 27, pin_factory=factory)
+    enable = DigitalOutputDevice(25, pin_factory=factory)
+    motor.value = 1.0
+    begin = world.inputs().travelled_m
+    board.advance(START_NS + 200 * _MS)
+    assert world.inputs().travelled_m == begin
+    enable.on()
+    board.advance(START_NS + 400 * _MS)
+    assert world.inputs().travelled_m > begin
+    board.hardware.close()
+
+
+def test_an_input_that_nobody_claimed_disturbs_nobody() -> None:
+    """Edges go to whoever holds the pin, with the level that it has then."""
+    board, world = _board()
+    factory = board.hardware.pin_factory()
+    motor, enable = Motor(22, 27, pin_factory=factory), DigitalOutputDevice(25, pin_factory=factory)
+    motor.value = 1.0
+    enable.on()
+    encoder = DigitalInputDevice(5, pin_factory=factory)  # Its other channel, 6, is not claimed.
+    edges: list[int] = []
+    encoder.when_activated = lambda: edges.append(encoder.value)
+    for i in range(1, 100):
+        board.advance(START_NS + 10 * i * _MS)
+    assert world.inputs().travelled_m > 0.1
+    assert len(edges) > 3
+    assert set(edges) == {1}
+    board.hardware.close()
+
+
+def test_closing_lets_go() -> None:
+    """Twice does no harm."""
+    board, _ = _board()
+    board.hardware.pin_factory()
+    board.hardware.close()
+    board.hardware.close()

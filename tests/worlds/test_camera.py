@@ -1,0 +1,115 @@
+"""Pictures of a camera on board."""
+
+from __future__ import annotations
+
+import gc
+import os
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.errors import RenderError
+from shapechanger.worlds import camera as module
+from shapechanger.worlds.camera import OnboardCamera
+
+_MODEL = """
+<mujoco><asset><material name="m" emission="1" rgba="{colour} 1"/></asset><worldbody>
+<geom type="box" size="0.1 5 5" pos="2 0 0" material="m"/>
+<body><geom size="0.01"/><camera name="eye" xyaxes="0 -1 0 0 0 1"/></body>
+</worldbody></mujoco>
+"""
+
+
+def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_string(_MODEL.format(colour=colour))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_it_sees_what_is_ahead_of_it() -> None:
+    """A red wall is red, and after another model was given a green one is green."""
+    camera = OnboardCamera((32, 16))
+    for colour, brightest in (("1 0 0", 0), ("0 1 0", 1)):
+        model, data = _model(colour)
+        camera.look_through(model, "eye")
+        picture = camera.picture(model, data)
+        assert picture.shape == (16, 32, 3)
+        assert int(picture[8, 16].argmax()) == brightest
+    camera.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_pictures_share_no_memory() -> None:
+    """Whoever keeps one keeps it."""
+    camera = OnboardCamera((32, 16))
+    model, data = _model("1 0 0")
+    camera.look_through(model, "eye")
+    first, second = camera.picture(model, data), camera.picture(model, data)
+    np.testing.assert_array_equal(first, second)
+    assert not np.may_share_memory(first, second)
+    camera.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_two_draw_side_by_side() -> None:
+    """Each has a context of its own, which it makes current."""
+    cameras = [OnboardCamera((32, 16)), OnboardCamera((16, 16))]
+    models = [_model("1 0 0"), _model("0 0 1")]
+    for camera, (model, _) in zip(cameras, models, strict=True):
+        camera.look_through(model, "eye")
+    for _ in range(2):
+        for camera, (model, data), brightest in zip(cameras, models, (0, 2), strict=True):
+            assert int(camera.picture(model, data)[8, 8].argmax()) == brightest
+    for camera in cameras:
+        camera.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_who_forgets_to_close_it_loses_nothing() -> None:
+    """It frees its context itself, and closing twice does no harm."""
+    model, data = _model("1 0 0")
+    for _ in range(3):
+        camera = OnboardCamera((32, 16))
+        camera.look_through(model, "eye")
+        camera.picture(model, data)
+    del camera
+    gc.collect()
+    camera = OnboardCamera((32, 16))
+    camera.close()
+    camera.close()
+
+
+def test_a_camera_that_looks_at_nothing_says_so() -> None:
+    """Before the first model, and after it was closed."""
+    model, data = _model("1 0 0")
+    camera = OnboardCamera((32, 16))
+    with pytest.raises(RenderError, match="looks at nothing yet"):
+        camera.picture(model, data)
+    camera.look_through(model, "eye")
+    camera.close()
+    with pytest.raises(RenderError, match="looks at nothing yet"):
+        camera.picture(model, data)
+
+
+@pytest.mark.parametrize("size", [(0, 16), (16, 0), (-1, -1)])
+def test_no_picture_has_no_pixels(size: tuple[int, int]) -> None:
+    """The sentence says which size was asked for."""
+    with pytest.raises(RenderError, match=f"cannot be {size[0]} x {size[1]} pixels"):
+        OnboardCamera(size)
+
+
+def test_a_fork_of_who_draws_is_told_how_to_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mesa's threads do not come along, and it would wait for them for ever."""
+    monkeypatch.setattr(module, "_drawing", {os.getpid() + 1})
+    camera = OnboardCamera((32, 16))
+    model, data = _model("1 0 0")
+    camera.look_through(model, "eye")
+    with pytest.raises(RenderError, match="forked from one that draws"):
+        camera.picture(model, data)

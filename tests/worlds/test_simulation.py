@@ -1,0 +1,291 @@
+"""A vehicle on a course: what it does, what it senses, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.vehicles import SIM_DT, VEHICLES
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.worlds import simulation
+from shapechanger.worlds.course import Course
+from shapechanger.worlds.home import HOME
+from shapechanger.worlds.look import Look
+from shapechanger.worlds.mount import Jitter
+from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.worlds.world import RESTING_V, Pose
+
+_AHEAD: Mapping[str, Mapping[str, float]] = {
+    "car": {"wheels": 0.5, "steering": 0.0},
+    "truck": {"wheels": 0.5, "steering": 0.0},
+    "tank": {"left track": 0.5, "right track": 0.5},
+    "boat": {"propeller": 0.5, "rudder": 0.0},
+}
+_EACH = pytest.mark.parametrize("vehicle", VEHICLES)
+
+
+def _world(vehicle: str = "car", seed: int = 3) -> MujocoWorld:
+    return MujocoWorld(vehicle, seed=seed, size=None)
+
+
+def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: float) -> None:
+    for _ in range(round(seconds / 0.01)):
+        world.advance(0.01, outputs)
+
+
+def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
+    """The pose that looks straight at the middle of the longest wall from so far away."""
+    ends = [np.array((wall.start, wall.end)) for wall in world.course.walls]
+    start, end = max(ends, key=lambda wall: float(np.hypot(*(wall[1] - wall[0]))))
+    along = (end - start) / np.hypot(*(end - start))
+    x, y = (start + end) / 2.0 + distance * np.array((-along[1], along[0]))
+    return Pose(float(x), float(y), math.atan2(-along[0], along[1]))
+
+
+@_EACH
+def test_a_vehicle_begins_at_home_and_at_rest(vehicle: str) -> None:
+    """It stands on a free lane of the place where it belongs."""
+    world = _world(vehicle)
+    seen = world.inputs()
+    assert world.course.world == HOME[vehicle]
+    assert world.seed == 3
+    assert seen.speed == pytest.approx(0.0, abs=1e-6)
+    assert not world.touches
+    assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
+
+
+@_EACH
+def test_driving_ahead_is_progress(vehicle: str) -> None:
+    """Half of the voltage for two seconds brings each of them along its lane."""
+    world = _world(vehicle)
+    _drive(world, _AHEAD[vehicle], 2.0)
+    assert world.truth()["progress_m"] > 0.3
+    assert world.inputs().speed > 0.2
+    assert world.inputs().travelled_m > 0.2
+
+
+def test_the_same_happens_again() -> None:
+    """A seed and the outputs decide every number."""
+    poses = []
+    for _ in range(2):
+        world = _world()
+        _drive(world, _AHEAD["car"], 1.0)
+        poses.append(world.pose)
+    assert poses[0] == poses[1]
+
+
+def test_it_does_not_matter_how_time_is_cut() -> None:
+    """Time that is no whole step of the simulation waits for the next call."""
+    cut, whole = _world(), _world()
+    for _ in range(300):
+        cut.advance(SIM_DT / 3.0, _AHEAD["car"])
+    for _ in range(10):
+        whole.advance(10.0 * SIM_DT, _AHEAD["car"])
+    assert cut.pose == whole.pose
+    assert cut.data.time == pytest.approx(100 * SIM_DT)
+
+
+def test_placing_begins_anew_where_the_seed_says() -> None:
+    """The same start is the same pose, at rest; another seed is another start."""
+    world = _world()
+    world.place(5)
+    first = world.pose
+    _drive(world, _AHEAD["car"], 1.0)
+    world.place(6)
+    assert world.pose != first
+    world.place(5)
+    assert world.pose == first
+    assert world.progress_m == 0.0
+    assert world.inputs().speed == 0.0
+
+
+def test_the_odometer_counts_through_every_start() -> None:
+    """An encoder does not know that its car was lifted."""
+    world = _world()
+    _drive(world, _AHEAD["car"], 1.0)
+    before = world.inputs().travelled_m
+    world.place(4)
+    assert world.inputs().travelled_m == before
+    _drive(world, {"wheels": -0.5, "steering": 0.0}, 1.0)
+    assert world.inputs().travelled_m < before
+
+
+def test_another_course_is_another_course() -> None:
+    """Laying out takes the place away from under the vehicle."""
+    world = _world()
+    walls = world.course.walls
+    world.lay_out(4)
+    assert world.seed == 4
+    assert world.course.walls != walls
+    world.lay_out(3)
+    assert world.course.walls == walls
+
+
+def test_the_battery_gives_way_under_load() -> None:
+    """Its voltage falls with the current that the motor draws, and by what is left in it."""
+    world = _world()
+    idle = world.inputs()
+    assert RESTING_V - 0.2 < idle.battery_v < RESTING_V
+    world.advance(0.05, {"wheels": 1.0, "steering": 0.0})
+    loaded = world.inputs()
+    assert loaded.current_a > idle.current_a + 1.0
+    assert loaded.battery_v < idle.battery_v
+    world.resting_v = 6.0
+    assert world.inputs().battery_v < 6.0
+
+
+def test_a_wall_ahead_is_as_far_as_it_is() -> None:
+    """What an HC-SR04 would measure is the way from the bumper to the wall."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.9))
+    assert world.distance_m() == pytest.approx(0.9 - world.vehicle.nose_m, abs=0.005)
+
+
+def test_running_into_a_wall_is_one_collision_that_the_bumper_tells() -> None:
+    """And the car stops there."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.7))
+    _drive(world, _AHEAD["car"], 2.0)
+    assert world.collisions == 1
+    assert world.touches
+    assert world.inputs().bumped
+    assert world.inputs().speed == pytest.approx(0.0, abs=0.1)
+    assert world.distance_m() == pytest.approx(0.0, abs=0.03)
+
+
+def test_who_is_put_back_can_drive_on() -> None:
+    """It stands on a free line near by, looks along the course, and what was counted stays."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.7))
+    _drive(world, _AHEAD["car"], 2.0)
+    before, progress = world.pose, world.progress_m
+    world.put_back()
+    after = world.pose
+    assert math.hypot(after.x - before.x, after.y - before.y) < 2.0
+    assert world.collisions == 1
+    assert abs(world.progress_m - progress) < 2.0
+    assert world.inputs().speed == 0.0
+    progress = world.progress_m
+    _drive(world, _AHEAD["car"], 0.6)
+    assert not world.touches
+    assert world.progress_m > progress + 0.05
+
+
+def test_acceleration_is_what_it_feels() -> None:
+    """Forward when it sets off, and to the inside of a bend."""
+    world = _world()
+    _drive(world, _AHEAD["car"], 0.05)
+    assert world.inputs().acceleration_x > 0.1
+    _drive(world, {"wheels": 0.5, "steering": -1.0}, 0.5)
+    seen = world.inputs()
+    assert seen.yaw_rate > 0.2
+    assert seen.acceleration_y == pytest.approx(seen.speed * seen.yaw_rate, rel=0.2)
+
+
+def test_a_current_sets_a_boat_adrift() -> None:
+    """Whoever does nothing on water that flows does not stay."""
+    world = _world("boat")
+    start, flow = world.pose, world.course.current_mps
+    assert math.hypot(*flow) > 0.0
+    _drive(world, {"propeller": 0.0, "rudder": 0.0}, 4.0)
+    moved = world.pose.x - start.x, world.pose.y - start.y
+    assert moved[0] * flow[0] + moved[1] * flow[1] > 0.0
+
+
+def test_without_a_camera_there_is_no_picture() -> None:
+    """The sentence says what to give."""
+    with pytest.raises(WorldError, match="made without a camera: give it a `size`"):
+        _world().picture()
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "world", "sentence"),
+    [
+        ("boat", "corridor", "A boat floats: it cannot drive in a corridor"),
+        ("car", "harbour", "A car does not float: it cannot drive in a harbour"),
+    ],
+)
+def test_who_cannot_drive_there_hears_why(vehicle: str, world: str, sentence: str) -> None:
+    """Water is for those who float, and for nobody else."""
+    with pytest.raises(WorldError, match=sentence):
+        MujocoWorld(vehicle, world, size=None)
+
+
+def test_names_that_nothing_bears() -> None:
+    """A slip of the pen is met with the name that was meant."""
+    with pytest.raises(UnknownName, match=r"No vehicle matches 'tnak'. Did you mean 'tank'"):
+        MujocoWorld("tnak", "corridor", size=None)
+    with pytest.raises(UnknownName, match=r"No world matches 'yrad'. Did you mean 'yard'"):
+        MujocoWorld("car", "yrad", size=None)
+    with pytest.raises(UnknownName, match=r"No lens matches 'nihgt'. Did you mean 'night'"):
+        MujocoWorld("car", size=None, lenses=("nihgt",))
+
+
+def test_what_is_refused_leaves_the_world_as_it_was() -> None:
+    """A course that there is not, or a camera in the floor, must not leave half a world behind."""
+    world = _world()
+    model, course, look = world.model, world.course, world.look
+    with pytest.raises(WorldError, match="Seeds of courses count from 0"):
+        world.lay_out(-1)
+    dim = replace(look, light=0.3)
+    with pytest.raises(WorldError, match="outside the world"):
+        world.lay_out(4, dim, Jitter(up_m=-1.0))
+    assert (world.model, world.course, world.look) == (model, course, look)
+    _drive(world, _AHEAD["car"], 0.2)
+
+
+def test_a_course_that_comes_out_too_tight_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error of whoever lays courses out comes through, and the old course stays."""
+    world = _world()
+
+    def too_tight(kind: str, seed: int) -> Course:
+        raise WorldError(f"No {kind} with seed {seed} can be laid out: too tight.")
+
+    monkeypatch.setattr(simulation, "lay_out", too_tight)
+    with pytest.raises(WorldError, match="No corridor with seed 4 can be laid out"):
+        world.lay_out(4)
+    assert world.seed == 3
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_picture_shows_the_course_and_its_light() -> None:
+    """It is of the size that was asked for, not one colour, and darker with less light."""
+    world = MujocoWorld("car", seed=3, size=(64, 48))
+    bright = world.picture()
+    assert bright.shape == (48, 64, 3)
+    assert bright.dtype == np.uint8
+    assert bright.std() > 5.0
+    world.lay_out(3, replace(Look.of("corridor"), light=0.2))
+    dark = world.picture()
+    assert dark.mean() < 0.8 * bright.mean()
+    world.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_moved_camera_sees_something_else() -> None:
+    """And the one after it is at its place again."""
+    world = MujocoWorld("car", seed=3, size=(64, 48))
+    usual = world.picture()
+    world.lay_out(3, camera=Jitter(yaw_rad=0.05))
+    assert not np.array_equal(world.picture(), usual)
+    world.lay_out(3)
+    np.testing.assert_array_equal(world.picture(), usual)
+    world.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_lenses_spoil_pictures_and_nothing_else() -> None:
+    """The same seed is the same course, seen through a dark glass."""
+    clear = MujocoWorld("car", seed=3, size=(64, 48))
+    night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))
+    assert night.pose == clear.pose
+    assert night.picture().mean() < clear.picture().mean()
+    for world in (clear, night):
+        world.close()
