@@ -35,8 +35,6 @@ def drive_remote(
     Raises:
         RuntimeError: If the episode ends before.
     """
-    # The first time it takes a while, in which a guard in real time waits: better not in the drive.
-    operator.put_back()
     seen: Any
     seen, _ = env.reset(seed=course if start is None else start)
     where = operator.where()

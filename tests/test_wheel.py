@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.envs.vehicle.clones import CLONES
+
 _ROOT = Path(__file__).resolve().parents[1]
 _SRC = _ROOT / "src"
 
@@ -39,6 +41,17 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
     }
     assert "shapechanger/py.typed" in on_disk
     assert on_disk - set(zipfile.ZipFile(wheel).namelist()) == set()
+
+
+def test_wheel_holds_the_clones_and_the_profiles_of_the_vehicles(wheel: Path) -> None:
+    """Each vehicle has its policy, and its robot; the policies have a model card."""
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    for vehicle in ("boat", "car", "tank", "truck"):
+        assert CLONES[vehicle].relative_to(_SRC).as_posix() in inside
+        profile = f"shapechanger/robot/profile/shipped/lab-{vehicle}.toml"
+        assert profile in inside
+    assert "shapechanger/envs/vehicle/clones/README.md" in inside
+    assert set(CLONES) == {"boat", "car", "tank", "truck"}
 
 
 def test_wheel_works_away_from_the_source(wheel: Path, tmp_path: Path) -> None:

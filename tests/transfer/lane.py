@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from shapechanger.layout import Element, Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.settings import CloningSettings
 
-__all__ = ["LANE", "SLIPPERY", "TINY_CLONING", "Lane"]
+__all__ = ["DRY", "ICY", "LANE", "QUICK_CLONING", "SLIPPERY", "TINY_CLONING", "WET", "Lane"]
 
 _ROWS, _COLUMNS = 12, 20
 HELD_OUT: Final = 1_000
@@ -107,9 +108,14 @@ class _Keeper:
 
 
 gym.register("tests/Lane-v0", Lane, max_episode_steps=30)
+# Three with names of their own, as the vehicles of a suite have.
+for _name, _grip in (("Dry", 0.3), ("Wet", 0.2), ("Icy", 0.1)):
+    gym.register(f"tests/{_name}-v1", Lane, max_episode_steps=30, kwargs={"grip": _grip})
 
 LANE = EnvRef("tests.transfer.lane:tests/Lane-v0")
 SLIPPERY = EnvRef("tests.transfer.lane:tests/Lane-v0", {"grip": 0.15})
+
+DRY, WET, ICY = (EnvRef(f"tests.transfer.lane:tests/{name}-v1") for name in ("Dry", "Wet", "Icy"))
 
 # A network and budgets that are learned in a second, and learn something.
 TINY_CLONING = CloningSettings(
@@ -127,5 +133,14 @@ TINY_CLONING = CloningSettings(
         warm_up=4,
         checks=2,
         held_out=0.0,
+    ),
+)
+
+# Learned in no time, for what does not depend on what is learned.
+QUICK_CLONING = msgspec.structs.replace(
+    TINY_CLONING,
+    budgets=(20, 40),
+    clone=msgspec.structs.replace(
+        TINY_CLONING.clone, fewest_steps=10, most_steps=10, warm_up=2, checks=1
     ),
 )

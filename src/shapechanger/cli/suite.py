@@ -57,7 +57,7 @@ class Suite:
         from shapechanger.transfer.files import write_json
         from shapechanger.transfer.settings import learner_settings
         from shapechanger.transfer.study import make_plan, unfinished
-        from shapechanger.transfer.suite import crossings, run_beside, study_folder
+        from shapechanger.transfer.suite import begin_beside, crossings, run_beside
 
         require_seed(self.seed)
         out = self.out or Path("results", self.name)
@@ -76,8 +76,8 @@ class Suite:
                 source_steps=settings.steps if self.steps is None else self.steps,
                 seed=self.seed,
             )
-            folder = study_folder(plan, out)
             try:
+                folder = begin_beside(plan, out)
                 with StudyProgress(run_steps(plan, unfinished(plan, folder))) as progress:
                     study = run_beside(
                         plan, out, executor=executor, on_progress=progress, command=command
@@ -92,7 +92,8 @@ class Suite:
         halves = sum(crossing.halves for crossing in found)
         console.print(
             f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
-            "half of scratch's minutes."
+            "half of scratch's minutes.",
+            soft_wrap=True,
         )
 
     def _tasks(self) -> list[TransferTask]:

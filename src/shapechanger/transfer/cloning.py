@@ -202,7 +202,11 @@ def evaluate_clone(
 
 def is_clone(path: Path) -> bool:
     """Whether a file is one that a clone was saved to, and no other policy."""
-    return zipfile.is_zipfile(path) and WEIGHTS in zipfile.ZipFile(path).namelist()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return WEIGHTS in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
 
 
 def load_clone(path: Path) -> CameraPolicy:

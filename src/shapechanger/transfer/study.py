@@ -13,14 +13,14 @@ import msgspec
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import ForeignStudy, SpaceMismatch, StudyError
+from shapechanger.errors import ForeignStudy, StudyError
 from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.brought import steps_brought_along
 from shapechanger.transfer.env_ref import layouts_of
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
-from shapechanger.transfer.policy_file import load_policy
 from shapechanger.transfer.runs import RunResult, finished, perform
 from shapechanger.transfer.settings import CloningSettings, Settings
 from shapechanger.transfer.training import require_budget
@@ -102,8 +102,10 @@ def make_plan(
     Raises:
         UnknownName: If an env, an arm or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        StudyError: If the budget or the number of seeds is too small.
-        SpaceMismatch: If the policy that was brought along belongs to another body.
+        StudyError: If the budget or the number of seeds is too small, or the policy that was
+            brought along did not learn as the learner does.
+        CorruptStudy: If the file of that policy is missing, or holds none.
+        SpaceMismatch: If that policy belongs to another body.
     """
     budget = settings.whole_updates(settings.steps if steps is None else steps)
     require_budget(settings.steps if steps is None else steps, settings)
@@ -111,13 +113,7 @@ def make_plan(
     body_map = _body_map(task, rules, map_text, units)
     digest = ""
     if source_policy is not None:
-        card = load_policy(source_policy).card
-        if card.env != task.source:
-            raise SpaceMismatch(
-                f"The policy that was brought along was trained in {card.env}, and the source is "
-                f"{task.source}: name the env and the body that it was trained in."
-            )
-        source_budget = card.steps
+        source_budget = steps_brought_along(source_policy, task.source, learner, settings)
         digest = _digest(source_policy)
     else:
         require_budget(source_budget, settings)

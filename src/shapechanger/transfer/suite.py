@@ -14,14 +14,15 @@ from typing import Final
 
 import msgspec
 
+from shapechanger.errors import OutputError
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
 from shapechanger.transfer.metrics import LearningCurves
-from shapechanger.transfer.plan import Plan, Run, RunKind
+from shapechanger.transfer.plan import Plan, RunKind
 from shapechanger.transfer.runs import finished
 from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, run_study
 
-__all__ = ["Crossing", "crossings", "run_beside", "study_folder"]
+__all__ = ["Crossing", "begin_beside", "crossings", "run_beside", "study_folder"]
 
 _OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "scratch")
 _DEMONSTRATIONS: Final = "demonstrations"
@@ -76,13 +77,28 @@ def run_beside(
         CorruptStudy: If a file in one cannot be read.
         OutputError: If `out` cannot be written.
     """
+    folder = begin_beside(plan, out)
+    return run_study(plan, folder, executor=executor, on_progress=on_progress, command=command)
+
+
+def begin_beside(plan: Plan, out: Path) -> Path:
+    """Make a study's folder below `out`, with what the studies beside it have done already.
+
+    Returns:
+        The folder; what is unfinished in it is left to do.
+
+    Raises:
+        ForeignStudy: If its folder holds another study.
+        CorruptStudy: If a file in one cannot be read.
+        OutputError: If `out` cannot be written.
+    """
     make_folder(out)
     folder = study_folder(plan, out)
     claim_folder(plan, folder)
     for other in sorted(out.glob(f"*/{PLAN_FILE}")):
         if other.parent != folder:
             _share(plan, folder, other.parent)
-    return run_study(plan, folder, executor=executor, on_progress=on_progress, command=command)
+    return folder
 
 
 def crossings(studies: Iterable[Study]) -> list[Crossing]:
@@ -108,9 +124,24 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
             make_folder((folder / shown).parent)
             (folder / shown).hardlink_to(sibling / shown)
         if finished(plan, folder, run) is None and finished(other, sibling, run) is not None:
-            mine = run.folder(folder)
-            shutil.rmtree(mine, ignore_errors=True)
-            shutil.copytree(Run(run.kind, run.index).folder(sibling), mine)
+            _copy_whole(run.folder(sibling), run.folder(folder))
+
+
+def _copy_whole(theirs: Path, mine: Path) -> None:
+    """Copy the folder of a run; it appears whole or not at all.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    part = mine.with_name(f".{mine.name}.part")
+    make_folder(mine.parent)
+    try:
+        for old in (part, mine):
+            shutil.rmtree(old, ignore_errors=True)
+        shutil.copytree(theirs, part)
+        part.replace(mine)
+    except OSError as error:
+        raise OutputError(f"Cannot write {mine}: {error.strerror or error}.") from error
 
 
 def _crossing(study: Study) -> Crossing:

@@ -104,6 +104,14 @@ class Board:
         return self._operating.do(message)
 
 
+def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
+    """Let a world open and plan what takes a while, before a guard in real time waits for it."""
+    world.put_back()
+    world.place(seed)
+    if pictures:
+        world.picture()
+
+
 def _end(number: int, frame: FrameType | None) -> None:
     sys.exit(0)
 
@@ -138,8 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     size = (width, height) if given.fifo is not None else None
     place = Place(given.world, given.vehicle, tuple(given.lens))
     world = open_world(place, parts, size, given.seed)
-    if size is not None:
-        world.picture()  # The first takes a while, in which a guard would wait for the board.
+    _warm_up(world, given.seed, pictures=size is not None)
     time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
     camera = None
     if given.fifo is not None:

@@ -65,7 +65,12 @@ class Operator:
         self._link.ask(op="put_back")
 
     def lay_out(self, seed: int) -> None:
-        """Put other surroundings around the vehicle, and the vehicle at a start in them."""
+        """Put other surroundings around the vehicle, and the vehicle at a start in them.
+
+        On a course in MuJoCo this takes some tenths of a second, for which the board stands still,
+        and so does the first `put_back` on it. On a busy machine a guard in real time may be taken
+        for dead meanwhile; a twin that is started with another seed has no such wait.
+        """
         self._link.ask(op="course", seed=seed)
 
     def advance(self, seconds: float) -> int:

@@ -14,7 +14,7 @@ from shapechanger.embodiments.vehicles import SIM_DT, add_vehicle, vehicle_model
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import OnboardCamera
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.home import HOME
+from shapechanger.worlds.home import HOME, require_element
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import lens
 from shapechanger.worlds.look import Look
@@ -117,9 +117,7 @@ class MujocoWorld:
         """
         look = self.look if look is None else look
         course = lay_out(self._world, seed)
-        if self.vehicle.floats != (self._world == "harbour"):
-            what = "floats" if self.vehicle.floats else "does not float"
-            raise WorldError(f"A {self.vehicle.name} {what}: it cannot drive in a {self._world}.")
+        require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
         spec = mujoco.MjSpec()
         add_course(spec, course, look)
         add_vehicle(spec, self.vehicle.name)

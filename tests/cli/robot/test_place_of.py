@@ -8,7 +8,7 @@ import pytest
 
 from shapechanger.cli.robot import serving
 from shapechanger.cli.robot.serving import TwinOptions, place_of, start_twin
-from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName
+from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.operator import Operator
@@ -78,6 +78,10 @@ def test_what_there_is_not_is_told_with_what_there_is() -> None:
         place_of(car, "", ("nihgt",))
     with pytest.raises(ProfileError, match="no cat in MuJoCo, only car, tank, truck, boat; --wor"):
         place_of(_shipped("cat"), "corridor", ())
+    with pytest.raises(WorldError, match="A car does not float: it cannot drive in a harbour"):
+        place_of(car, "harbour", ())
+    with pytest.raises(WorldError, match="A boat floats: it cannot drive in a yard"):
+        place_of(_shipped("lab-boat"), "yard", ())
     with pytest.raises(RobotError, match="plain camera: choose a --world for a --lens"):
         place_of(car, "room", ("night",))
 

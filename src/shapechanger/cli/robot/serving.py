@@ -24,7 +24,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.place import Place
 from shapechanger.twin.start import BoardAt, RunningBoard, start_board
-from shapechanger.worlds.home import HOME
+from shapechanger.worlds.home import HOME, require_element
 
 __all__ = ["ServeOptions", "TwinOptions", "credentials_of", "place_of", "serve_plan", "start_twin"]
 
@@ -103,6 +103,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
     Raises:
         UnknownName: If there is no such place or lens.
         ProfileError: If there is no vehicle in MuJoCo with the parts of the profile.
+        WorldError: If that vehicle cannot drive there.
         MissingExtra: If MuJoCo is needed and not installed.
     """
     if world == _ROOM or (not world and find_spec("mujoco") is None):
@@ -133,6 +134,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
             "--world room takes any robot."
         )
     require_fit(profile.body, parts)
+    require_element(profile.body, floats=VEHICLES[profile.body].floats, world=world)
     return Place(world, profile.body, tuple(lenses))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 
@@ -58,7 +58,8 @@ class CourseDraw:
                 raise UnknownName("kind of courses", courses, _KINDS)
             self._seeds: Sequence[int] = _KINDS[courses]
         else:
-            seeds: Sequence[int] = courses if isinstance(courses, Iterable) else (courses,)
+            given: Any = courses  # Such as one seed alone, of somebody without a type checker.
+            seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
             self._seeds = tuple(seed_as_asked("course", seed) for seed in seeds)
         if not self._seeds:
             raise WorldError("There are no courses to draw from: give at least one seed.")

@@ -1,0 +1,225 @@
+"""`shapechanger suite` as a user runs it, on lanes in place of vehicles."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+import torch
+
+from shapechanger.cli import main
+from shapechanger.cli import suite as suite_command
+from shapechanger.cli.env_arguments import driven, env_ref
+from shapechanger.cli.suite import Suite
+from shapechanger.transfer import executor
+from shapechanger.transfer.executor import Job, OnProgress, Serial
+from shapechanger.transfer.settings import LEARNERS
+from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
+
+_SUITE = ["suite", "vehicles", "--seeds", "2"]
+# The target of one is the target of another, and so with the sources.
+_PAIRS = [f"{a}-to-{b}" for a, b in (("Dry", "Wet"), ("Dry", "Icy"), ("Wet", "Dry"))]
+_PAIRS += [f"{a}-to-{b}" for a, b in (("Wet", "Icy"), ("Icy", "Dry"), ("Icy", "Wet"))]
+
+
+class _Counting(Serial):
+    """Remembers what it did, and may stop before its end.
+
+    Attributes:
+        done: Names of the jobs, in order.
+
+    Args:
+        stops_after: Jobs after which somebody presses Ctrl-C; None for never.
+    """
+
+    def __init__(self, stops_after: int | None = None) -> None:
+        self.done: list[str] = []
+        self._stops_after = stops_after
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        """Do them one by one."""
+        for job in jobs:
+            if len(self.done) == self._stops_after:
+                raise KeyboardInterrupt
+            super().run([job], on_progress)
+            self.done.append(job.name)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def lanes() -> Iterator[None]:
+    """Three lanes in place of four vehicles, and clones that are made in no time."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(suite_command, "_VEHICLES", (DRY.id, WET.id, ICY.id))
+        patch.setitem(LEARNERS, "cloning", QUICK_CLONING)
+        yield
+    torch.set_num_threads(threads)
+
+
+def _run(
+    out: Path, counting: _Counting, *more: str, arguments: Sequence[str] = _SUITE
+) -> tuple[int, str, str]:
+    """Exit code, and what was said on the standard output and on the standard error."""
+    typed = [*arguments, "--out", str(out), *more]
+    said, complained, code = io.StringIO(), io.StringIO(), 0
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(complained),
+    ):
+        patch.setattr(executor, "Processes", lambda workers: counting)
+        patch.setattr(sys, "argv", ["shapechanger", *typed])
+        try:
+            main(typed)
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+    return code, said.getvalue(), complained.getvalue()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Counting, str]:
+    """A suite that nobody stopped: its folder, what was done for it, and what it printed."""
+    out, counting = tmp_path_factory.mktemp("suite") / "all", _Counting()
+    code, said, complained = _run(out, counting)
+    assert code == 0, complained
+    return out, counting, said
+
+
+def test_a_suite_is_one_command(undisturbed: tuple[Path, _Counting, str]) -> None:
+    """A report for each pair, a line of the table for each, and one sentence on them all."""
+    out, _, said = undisturbed
+    lines = [line.strip() for line in said.splitlines()]
+    header = next(i for i, line in enumerate(lines) if line.startswith("study"))
+    assert lines[header].split() == (
+        ["study", "scratch", "zero-shot", "fine-tuned", "scratch,", "min", "fine-tune,", "min"]
+    )
+    assert [line.split()[0] for line in lines[header + 1 : header + 7]] == _PAIRS
+    for name in _PAIRS:
+        assert f"wrote {out / name / 'report.html'}" in said
+        assert (out / name / "report.html").stat().st_size > 10_000
+        command = json.loads((out / name / "study.json").read_text())["command"]
+        assert command == f"shapechanger suite vehicles --seeds 2 --out {out}"
+    assert "of 6 fine-tuning came to what scratch ends with in less than half of" in said
+
+
+def test_the_summary_holds_what_the_table_says(undisturbed: tuple[Path, _Counting, str]) -> None:
+    """suite.json has a value for each pair, in steps, from the studies beside it."""
+    out, _, said = undisturbed
+    found = json.loads((out / "suite.json").read_text())
+    assert [crossing["name"] for crossing in found] == _PAIRS
+    for crossing in found:
+        study = json.loads((out / crossing["name"] / "study.json").read_text())
+        ends = [
+            run["curve"][-1]["mean_return"]
+            for run in study["runs"]
+            if run["run"]["kind"] == "scratch"
+        ]
+        assert crossing["final"] == pytest.approx(sum(ends) / 2)
+        assert 0.0 <= crossing["scratch_steps"] <= 40.0
+        (row,) = (line for line in said.splitlines() if f" {crossing['name']} " in line)
+        assert row.split()[1] == f"{crossing['final']:.1f}"
+        assert ("never" in row) == (crossing["fine_tune_steps"] is None)
+    tuned = [(c["fine_tune_steps"], c["scratch_steps"]) for c in found]
+    halves = sum(steps is not None and steps < scratch / 2 for steps, scratch in tuned)
+    assert f"On {halves} of 6 fine-tuning" in said
+
+
+def test_each_training_is_done_once(undisturbed: tuple[Path, _Counting, str]) -> None:
+    """Three sources and three targets, whoever needs them; two arms for each of six pairs."""
+    done = [name.rpartition("-")[0] for name in undisturbed[1].done]
+    assert {kind: done.count(kind) for kind in done} == {
+        "source": 3 * 2,
+        "random": 3 * 2,
+        "scratch": 3 * 2,
+        "zero-shot": 6 * 2,
+        "fine-tune": 6 * 2,
+    }
+
+
+def test_a_suite_that_was_stopped_goes_on_to_the_same_numbers(
+    undisturbed: tuple[Path, _Counting, str], tmp_path: Path
+) -> None:
+    """Ctrl-C in the second study: the same command does only what is left."""
+    whole, all_of_it, _ = undisturbed
+    out, before = tmp_path / "all", _Counting(stops_after=13)
+    code, said, complained = _run(out, before)
+    assert code == 130
+    way_on = shlex.join(["shapechanger", *_SUITE, "--out", str(out)])
+    assert complained.splitlines()[-1] == f"Stopped. Go on with: {way_on}"
+    assert "report.html" in said
+    assert len(json.loads((out / "suite.json").read_text())) == 1
+    after = _Counting()
+    assert _run(out, after)[0] == 0
+    assert before.done + after.done == all_of_it.done
+    assert (out / "suite.json").read_bytes() == (whole / "suite.json").read_bytes()
+    again = _Counting()
+    assert _run(out, again)[0] == 0
+    assert again.done == []
+
+
+def test_another_suite_in_the_folder_is_refused(
+    undisturbed: tuple[Path, _Counting, str],
+) -> None:
+    """One sentence, and nothing is done."""
+    counting = _Counting()
+    code, _, complained = _run(undisturbed[0], counting, "--seed", "1")
+    assert code == 2
+    assert "holds another study, which differs in seed" in complained
+    assert counting.done == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["suite", "vehicles", "--seeds", "1"], "at least 2 seeds"),
+        (["suite", "vehicles", "--steps", "5"], "smaller than one evaluation"),
+        (["suite", "vehicles", "--seed", "-1"], "A seed is a whole number from 0"),
+        (["suite", "vehicles", "--workers", "0"], "at least one worker"),
+    ],
+)
+def test_nonsense_gets_one_sentence(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Exit code 2, no traceback, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    message = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert words in message
+    assert message.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_suite_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """The message names those that are."""
+    with pytest.raises(SystemExit) as stop:
+        main(["suite", "boats"])
+    assert stop.value.code == 2
+    message = capsys.readouterr().err
+    assert "vehicles" in message
+    assert "lenses" in message
+
+
+def test_the_suites_are_those_of_the_vehicles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve ordered pairs of four, and the car with each lens alone; all are put back."""
+    monkeypatch.setattr(suite_command, "_VEHICLES", ("Car", "Tank", "Truck", "Boat"))
+    pairs = [(task.source, task.target) for task in Suite("vehicles")._tasks()]
+    assert len(set(map(str, pairs))) == len(pairs) == 12
+    assert all(source.id != target.id for source, target in pairs)
+    assert all(env.kwargs == {"put_back": True} for pair in pairs for env in pair)
+    car = driven(env_ref("Car"))
+    assert [(task.source, task.target) for task in Suite("lenses")._tasks()] == [
+        (car, driven(car, (lens,))) for lens in ("night", "glare", "blur", "dirt")
+    ]

@@ -1,0 +1,280 @@
+"""Studies beside one another: what they share, what they do not, and what they say together."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
+from shapechanger.transfer import suite
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Job, OnProgress, Serial
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.study import Study, make_plan, run_study
+from shapechanger.transfer.suite import Crossing, crossings, run_beside, study_folder
+from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
+from tests.transfer.report.studies import make_study
+from tests.transfer.studies import files_of
+
+_KINDS = ("source", "random", "scratch", "zero-shot", "fine-tune")
+
+
+class _Stopped(Exception):
+    """Somebody has looked at the jobs, and none was done."""
+
+
+class _Told(Serial):
+    """Remembers which jobs it was given.
+
+    Args:
+        refuses: Whether to do none of them.
+    """
+
+    def __init__(self, *, refuses: bool = False) -> None:
+        self.names: list[str] = []
+        self._refuses = refuses
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        """Do the jobs."""
+        self.names += [job.name for job in jobs]
+        if self._refuses:
+            raise _Stopped
+        super().run(jobs, on_progress)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Networks this small gain nothing from more."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def _plan(source: EnvRef, target: EnvRef, **more: Any) -> Plan:
+    task = TransferTask(source, target)
+    return make_plan(task, "cloning", QUICK_CLONING, **{"seeds": 2, **more})
+
+
+def _names(*kinds: str) -> set[str]:
+    return {f"{kind}-{index}" for kind in kinds for index in range(2)}
+
+
+def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
+    return {
+        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
+    }
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a suite in which Dry-to-Wet is done; tests work on copies."""
+    out = tmp_path_factory.mktemp("suite") / "suite"
+    told = _Told()
+    run_beside(_plan(DRY, WET), out, executor=told)
+    assert set(told.names) == _names(*_KINDS)
+    return out
+
+
+@pytest.fixture
+def out(first: Path, tmp_path: Path) -> Path:
+    """A copy of the suite's folder."""
+    return Path(shutil.copytree(first, tmp_path / "suite"))
+
+
+def _asked_for(plan: Plan, out: Path) -> set[str]:
+    """The runs that a study beside the others would do; it does none."""
+    told = _Told(refuses=True)
+    with pytest.raises(_Stopped):
+        run_beside(plan, out, executor=told)
+    return set(told.names)
+
+
+def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
+    """Another target, the same source: its policies and demonstrations are taken over."""
+    plan = _plan(DRY, ICY)
+    assert _asked_for(plan, out) == _names("random", "scratch", "zero-shot", "fine-tune")
+    there, here = out / "Dry-to-Wet", study_folder(plan, out)
+    assert here == out / "Dry-to-Icy"
+    for name in _names("source"):
+        taken_over = files_of(here / "runs" / name)
+        assert taken_over == files_of(there / "runs" / name)
+        assert set(taken_over) == {"curve.jsonl", "policy.zip", "run.json"}
+    shown = {path.name: path.read_bytes() for path in (here / "demonstrations").iterdir()}
+    assert set(shown) == {"source-0.npz", "source-1.npz"}
+    for name, content in shown.items():
+        assert (there / "demonstrations" / name).read_bytes() == content
+
+
+def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
+    """Another source, the same target; and the study says what it says when it is alone."""
+    plan, told = _plan(ICY, WET), _Told()
+    beside = run_beside(plan, out, executor=told)
+    assert set(told.names) == _names("source", "zero-shot", "fine-tune")
+    for name in _names("random", "scratch"):
+        there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
+        assert files_of(here) == files_of(there)
+    alone = run_study(plan, out.parent / "alone", executor=Serial())
+    assert _curves(beside) == _curves(alone)
+    assert beside.summaries == alone.summaries
+
+
+def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
+    """Neither the source nor the target is the same."""
+    assert _asked_for(_plan(WET, DRY), out) == _names(*_KINDS)
+
+
+@pytest.mark.parametrize("differs", [{"seed": 1}, {"steps": 20}, {"source_steps": 40}])
+def test_a_study_with_another_plan_lends_nothing(out: Path, differs: dict[str, int]) -> None:
+    """Other seeds or budgets are other trainings."""
+    assert _asked_for(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
+
+
+def test_other_versions_lend_nothing(out: Path) -> None:
+    """What another release has trained is not mixed in."""
+    plan = _plan(DRY, ICY)
+    other = msgspec.structs.replace(plan, versions={**plan.versions, "torch": "0.1"})
+    assert _asked_for(other, out) == _names(*_KINDS)
+
+
+def test_a_run_that_was_cut_off_is_not_lent(out: Path) -> None:
+    """Of two seeds one has ended; the other is done anew."""
+    (out / "Dry-to-Wet" / "runs" / "source-1" / "run.json").unlink()
+    assert _asked_for(_plan(DRY, ICY), out) & _names("source") == {"source-1"}
+
+
+def test_what_is_there_already_stays(out: Path) -> None:
+    """A second look takes nothing over again, and a finished suite does nothing."""
+    plan = _plan(DRY, ICY)
+    _asked_for(plan, out)
+    taken_over = out / "Dry-to-Icy" / "runs" / "source-0" / "run.json"
+    before = taken_over.stat().st_ino
+    _asked_for(plan, out)
+    assert taken_over.stat().st_ino == before
+    told = _Told()
+    run_beside(_plan(DRY, WET), out, executor=told)
+    assert told.names == []
+
+
+def test_a_copy_that_was_cut_off_counts_for_nothing(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run appears whole: what is left of a copy is no run, and is cleared away."""
+
+    def full(theirs: Path, mine: Path) -> None:
+        mine.mkdir(parents=True)
+        for name in ("run.json", "policy.zip"):
+            (mine / name).write_bytes((theirs / name).read_bytes()[:100])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    plan, runs = _plan(DRY, ICY), out / "Dry-to-Icy" / "runs"
+    with monkeypatch.context() as patch:
+        patch.setattr(suite.shutil, "copytree", full)
+        with pytest.raises(OutputError, match="source-0: No space left"):
+            run_beside(plan, out, executor=_Told(refuses=True))
+    assert not (runs / "source-0").exists()
+    _asked_for(plan, out)
+    assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
+    assert files_of(runs / "source-0") == files_of(out / "Dry-to-Wet" / "runs" / "source-0")
+
+
+def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
+    """It may hold what is wanted here, so somebody should look at it."""
+    (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
+    with pytest.raises(CorruptStudy, match=r"Dry-to-Wet/plan\.json .*delete .*Dry-to-Wet to do"):
+        run_beside(_plan(DRY, ICY), out, executor=_Told(refuses=True))
+
+
+def test_a_folder_of_another_study_is_left_alone(out: Path) -> None:
+    """The same pair with another seed is another study."""
+    before = files_of(out)
+    with pytest.raises(ForeignStudy, match="differs in seed"):
+        run_beside(_plan(DRY, WET, seed=1), out, executor=Serial())
+    assert files_of(out) == before
+
+
+def test_a_folder_is_named_after_both_bodies_and_what_is_wrong_with_the_camera() -> None:
+    """So that studies of one pair with several lenses have folders of their own."""
+    car = EnvRef("shapechanger/Car-v1", {"put_back": True})
+    dark = EnvRef("shapechanger/Car-v1", {"put_back": True, "lenses": ["night", "dirt"]})
+    plan = msgspec.structs.replace(make_study().plan, task=TransferTask(car, dark))
+    assert study_folder(plan, Path("all")) == Path("all", "Car-to-Car-night-dirt")
+
+
+_STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluation each 1,024.
+
+
+def _twice(means: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Curves of two seeds around these means, shape (2, 11)."""
+    return means + np.array([[-30.0], [30.0]])
+
+
+def _crossing(
+    fine_tune: NDArray[np.float64], scratch: NDArray[np.float64] = _STEADY, **more: Any
+) -> Crossing:
+    (found,) = crossings([make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)])
+    return found
+
+
+def test_a_crossing_is_found_along_a_line() -> None:
+    """Half-way between two evaluations, of the mean over seeds."""
+    found = _crossing(np.array([0.0, 500.0, 1500.0, *[900.0] * 8]))
+    assert found == Crossing(
+        "Ant-to-BigAnt",
+        final=pytest.approx(1000.0),
+        zero_shot=pytest.approx(400.0),
+        fine_tuned=pytest.approx(900.0),
+        scratch_steps=pytest.approx(10_240.0),
+        fine_tune_steps=pytest.approx(1536.0),
+    )
+    assert found.halves
+
+
+def test_scratch_may_come_to_its_end_before_it() -> None:
+    """What counts is when it is first as good, for both arms alike."""
+    early = np.array([0.0, 2000.0, *[1000.0] * 9])
+    found = _crossing(_STEADY, early)
+    assert found.scratch_steps == pytest.approx(512.0)
+    assert found.fine_tune_steps == pytest.approx(10_240.0)
+    assert not found.halves
+
+
+def test_a_policy_that_is_as_good_at_once_needs_no_step() -> None:
+    """Nothing has to be shown to it."""
+    found = _crossing(np.full(11, 1200.0))
+    assert found.fine_tune_steps == 0.0
+    assert found.halves
+
+
+def test_never_is_not_half() -> None:
+    """Fine-tuning that ends below scratch has no steps to compare."""
+    found = _crossing(np.full(11, 400.0))
+    assert found.fine_tune_steps is None
+    assert not found.halves
+
+
+def test_half_is_less_than_half() -> None:
+    """Exactly half of scratch's steps are not less."""
+    at_half = np.array([*[0.0] * 5, *[1000.0] * 6])
+    assert _crossing(at_half).fine_tune_steps == pytest.approx(5120.0)
+    assert not Crossing("a", 1.0, None, 1.0, 5120.0, 2560.0).halves
+    assert Crossing("a", 1.0, None, 1.0, 5120.0, 2559.9).halves
+
+
+def test_zero_shot_may_be_left_out_and_order_is_kept() -> None:
+    """One line for each study, in their order."""
+    without = make_study(arms=("scratch", "fine-tune"))
+    found = crossings([without, make_study(target=EnvRef("shapechanger/ExtendedAnt-v1"))])
+    assert [crossing.name for crossing in found] == ["Ant-to-BigAnt", "Ant-to-ExtendedAnt"]
+    assert found[0].zero_shot is None
+    assert found[1].zero_shot is not None
