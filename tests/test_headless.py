@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.envs.drawing import run_python
+from tests.drawing import run_python
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="Elsewhere there is always a screen."

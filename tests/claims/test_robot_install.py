@@ -12,7 +12,7 @@ from typing import Final
 
 import pytest
 
-from tests.envs.drawing import missing
+from tests.drawing import missing
 from tests.twin.robots import until
 
 ROOT: Final = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.envs.drawing import run_python
+from tests.drawing import run_python
 
 COMMAND = "from shapechanger.cli import main; main({arguments!r})"
 INTERRUPTED = """

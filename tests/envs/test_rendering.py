@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shapechanger.envs import CATALOGUE
-from tests.envs.drawing import run_python
+from tests.drawing import run_python
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 

@@ -18,7 +18,7 @@ from shapechanger.remote.known import KnownRobot
 from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.oracle import propelled
 from shapechanger.twin.wiring import Wiring
-from tests.envs.drawing import missing
+from tests.drawing import missing
 from tests.robots import IN_A_ROOM, write_profile
 from tests.twin.robots import until
 

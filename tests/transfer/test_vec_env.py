@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.vec_env import ThreadVecEnv, learner_envs
-from tests.envs.drawing import draws, missing
+from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 
 _PENDULUM = "shapechanger/InvertedPendulum-v1"

@@ -91,7 +91,7 @@ def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ) as person:
             person.read_until("not armed")
             person.press("e")
-            read = person.read_until(" armed · cap 1.0")
+            read = person.read_until("\rarmed · cap 1.0")
             person.press("w")
             person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
             # A key that is not pressed again lets go.
@@ -155,7 +155,7 @@ def test_what_no_key_moves_stays_where_it_is(
         ):
             person.read_until("not armed")
             person.press("e")
-            person.read_until(" armed · cap 0.5")
+            person.read_until("\rarmed · cap 0.5")
             person.press("w")
             person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
             assert watcher.ask().message.action_applied[1] == pytest.approx(1.0)
@@ -344,7 +344,7 @@ def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.Mon
         ) as person:
             person.read_until("not armed")
             person.press("e")
-            person.read_until(" armed · cap 0.2")
+            person.read_until("\rarmed · cap 0.2")
 
             def holds_d() -> bool:
                 person.press("d")
@@ -374,7 +374,7 @@ def test_a_person_lets_a_waiting_program_drive(
             person.press("p")
             read = person.read_until("no program waits", read)
             person.press("e")
-            read = person.read_until(" armed · cap 0.5", read)
+            read = person.read_until("\rarmed · cap 0.5", read)
             waits: list[str] = []
 
             def told(sentence: str) -> None:

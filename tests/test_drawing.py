@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.envs.drawing import missing
+from tests.drawing import missing
 
 
 def test_a_test_that_cannot_draw_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
