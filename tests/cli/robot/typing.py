@@ -70,7 +70,7 @@ class Person:
         os.write(self._main, keys.encode())
 
     def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
-        """Wait for words, and say where they end; a line that is drawn anew begins with "\\r"."""
+        """Wait for words, and say where they end; a line drawn anew begins with a return."""
         self.wait_for(lambda: words in self.text[after:], seconds, words)
         return self.text.index(words, after) + len(words)
 
