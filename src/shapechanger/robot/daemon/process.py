@@ -29,6 +29,7 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
 from shapechanger.robot.daemon.session import Door
 from shapechanger.robot.daemon.timekeeper import Timekeeper
+from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.guard.wire import GuardState
 from shapechanger.robot.hardware import Clock, connect
@@ -191,6 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plan = DaemonPlan.from_dict(serve_plan.daemon)
         source, argument = serve_plan.hardware
         clock = connect(source, argument).clock
+        run_early()
         why = asyncio.run(_run(plan, clock, asked))
     except ShapechangerError as error:
         why = str(error)

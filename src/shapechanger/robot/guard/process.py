@@ -23,7 +23,7 @@ from shapechanger.robot.guard.channel import Channel, DaemonChannel, Heartbeat
 from shapechanger.robot.guard.log import log_to_stderr
 from shapechanger.robot.guard.outputs import Outputs
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.guard.priority import run_promptly
+from shapechanger.robot.guard.priority import GUARD, run_promptly
 from shapechanger.robot.guard.rules import Decision, Rules
 from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.guard.serve_plan import read_plan_fd
@@ -288,7 +288,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         opened.callback(guard.close)
         if told:  # While it was being set up.
             guard.ended = told[0]
-        run_promptly()
+        run_promptly(GUARD)
         log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))
         guard.run(heartbeat)
         log.info("ends: %s.", guard.ended)

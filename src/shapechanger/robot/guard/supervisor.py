@@ -28,7 +28,7 @@ from shapechanger.robot.guard import start
 from shapechanger.robot.guard.arguments import AFTER_FAILURE, descriptors
 from shapechanger.robot.guard.child import Child
 from shapechanger.robot.guard.log import log_to_stderr
-from shapechanger.robot.guard.priority import run_promptly
+from shapechanger.robot.guard.priority import SUPERVISOR, run_promptly
 from shapechanger.robot.guard.restarts import Restarts
 from shapechanger.robot.guard.safe_pins import make_safe, preload
 from shapechanger.robot.guard.serve_plan import ServePlan, read_plan_fd
@@ -109,7 +109,7 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             if signal.getsignal(number) != signal.SIG_IGN:  # As `nohup` has it.
                 signal.signal(number, self._end)
-        run_promptly()
+        run_promptly(SUPERVISOR)
         after_failure: tuple[str, ...] = ()
         while True:
             guard, daemon = self._start(after_failure)
