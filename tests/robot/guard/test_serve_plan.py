@@ -76,7 +76,7 @@ def test_outputs_are_mixed_from_actions_and_clipped() -> None:
     assert output_values(plan, (0.5, 0.25)) == (0.75, 0.0)
     assert output_values(plan, (1.0, 1.0)) == (1.0, 0.25)
     assert output_values(plan, (-1.0, -1.0)) == (-1.0, 0.25)
-    with pytest.raises(ValueError, match=r"longer|shorter"):
+    with pytest.raises(ValueError, match="has 2 actions"):
         output_values(plan, (1.0,))
 
 
