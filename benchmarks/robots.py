@@ -13,7 +13,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -24,67 +23,18 @@ import numpy as np
 from benchmarks.echo import EchoRobot
 from benchmarks.row import Row
 from shapechanger.cli.robot.running import RunningRobot, run_robot
-from shapechanger.cli.robot.trial.faults import FAULTS, Fault
-from shapechanger.cli.robot.trial.trial import Trial, TrialResult
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from tests.robots import CAR
 
-__all__ = ["faults", "fuzz", "hold", "link"]
+__all__ = ["fuzz", "hold", "link"]
 
-TRIALS: Final = 100
 ROUND_TRIPS: Final = 3_000
 HOLD_S: Final = 600.0
 COST_S: Final = 20.0
 FUZZED: Final = 1_000_000
 # What each process may keep in memory, MB.
 _PROCESSES: Final[dict[Literal["guard", "daemon"], int]] = {"guard": 25, "daemon": 80}
-
-
-def faults(trials: int = int(os.environ.get("TRIALS", TRIALS))) -> list[Row]:
-    """The time to stop after each fault, on as many robots at a time as there are cores."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        ThreadPoolExecutor(max(1, (os.cpu_count() or 1))) as robots,
-    ):
-        profile = _written(CAR, Path(folder) / "car.toml")
-
-        def tried(fault: Fault, one_shot: bool) -> list[TrialResult]:
-            with Trial(profile, one_shot=one_shot) as trial:
-                return [trial.run(fault) for _ in range(trials)]
-
-        work = [robots.submit(tried, fault, True) for fault in FAULTS.values()]
-        bare = FAULTS["guard and supervisor killed"]
-        without = robots.submit(tried, bare, False)
-        rows = [
-            _fault_row(fault, done.result())
-            for fault, done in zip(FAULTS.values(), work, strict=True)
-        ]
-        return [*rows, _without_one_shot(bare, without.result())]
-
-
-def _fault_row(fault: Fault, results: list[TrialResult]) -> Row:
-    times = np.array([result.stopped_ms for result in results])
-    strangers = sum(bool(result.unauthorised) for result in results)
-    return Row(
-        f"at rest after: {fault.name}",
-        f"p50 {np.percentile(times, 50):.1f}, p99 {np.percentile(times, 99):.1f} ms",
-        f"max {times.max():.1f} ms, {len(results)} trials, {strangers} unauthorised",
-        f"< {results[0].limit_ms:.0f} ms",
-        all(result.kept for result in results),
-    )
-
-
-def _without_one_shot(fault: Fault, results: list[TrialResult]) -> Row:
-    """What is left to the pull-downs and to chance: a pin keeps the level of that moment."""
-    never = sum(bool(np.isinf(result.stopped_ms)) for result in results)
-    return Row(
-        f"{fault.name}, no one-shot fitted: motors that run on for ever",
-        f"{never} of {len(results)}",
-        "throttle at a duty of 0.6, 50 Hz",
-        "none: it shows what the one-shot is for",
-        True,
-    )
 
 
 def link(round_trips: int = ROUND_TRIPS) -> list[Row]:

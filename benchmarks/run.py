@@ -24,7 +24,7 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import robots, speed, speed_vector, vehicles, vehicles_twin
+from benchmarks import robot_faults, robots, speed, speed_vector, vehicles, vehicles_twin
 from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
@@ -125,7 +125,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "robot-link": robots.link,
     "robot-fuzz": robots.fuzz,
     "robot-hold": robots.hold,
-    "robot-faults": robots.faults,
+    "robot-faults": robot_faults.faults,
     "vehicles-frames": vehicles.frames,
     "vehicles-expert": vehicles.expert,
     "vehicles-clone": vehicles.clone,
