@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning import CameraPolicy
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle.clones import CLONES
 
 __all__ = ["blind", "find_clone", "sighted"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Iterator
 
@@ -11,6 +12,11 @@ import pytest
 from hypothesis import settings
 
 from tests.drawing import draws, missing
+
+# What `nohup` or a script starts in the background ignores Ctrl-C, and so would all that the tests
+# start, some of which is there to be interrupted.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # No test asserts a wall-clock time: a busy machine is no defect.
 settings.register_profile("shapechanger", deadline=None)

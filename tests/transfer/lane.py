@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning import CloneSettings, Framing
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.settings import CloningSettings

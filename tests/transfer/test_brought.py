@@ -10,8 +10,9 @@ import msgspec
 import pytest
 import torch
 
-from shapechanger.demos.cloning import CameraPolicy, Framing
 from shapechanger.demos.cloning.errors import PolicyError
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.cloning import Recording, clone_along, evaluate_clone
 from shapechanger.transfer.executor import Serial

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning import CameraPolicy
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.transfer import cloning
 from shapechanger.transfer.cloning import Recording, clone_along, demonstrate, evaluate_clone

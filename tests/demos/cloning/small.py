@@ -6,7 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from shapechanger.demos.cloning import CameraPolicy, CloneSettings, Framing
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
 from tests.demos.cloning.corridor import Drive, drive
 
 __all__ = ["SIZE", "SMALL", "error", "shown"]

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning import CameraPolicy, CloneSettings
 from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import OutputError
 from tests.demos.cloning.small import SMALL, shown
 

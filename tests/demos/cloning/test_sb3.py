@@ -12,8 +12,9 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from shapechanger.demos.cloning import CameraPolicy, prepare
 from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.pictures import prepare
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.sb3 import PreparedPictures, to_sb3
 from tests.demos.cloning.small import SIZE, SMALL
 

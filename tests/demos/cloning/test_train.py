@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning import CameraPolicy, CloneSettings, History, clone
 from shapechanger.demos.cloning.demonstrations import held_out
 from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.train import Check
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.cloning.train import Check, History, clone
 from tests.demos.cloning.small import SMALL, error, shown
 
 _QUICK = msgspec.structs.replace(SMALL, fewest_steps=4, most_steps=4, checks=2, warm_up=1)

@@ -1,23 +1,12 @@
 """Driving policies that are learned from pictures and from what a driver did on seeing them.
 
-`clone` learns one from arrays, `CameraPolicy` keeps, saves and loads it, and
-`shapechanger.demos.cloning.sb3` hands it to a learner that goes on by reward.
+`train.clone` learns one from arrays, `policy.CameraPolicy` keeps, saves and loads it, and `sb3`
+hands it to a learner that goes on by reward. Nothing is imported here: settings are read where
+there is no torch.
 """
 
 from __future__ import annotations
 
-from shapechanger.demos.cloning.pictures import Framing, prepare
-from shapechanger.demos.cloning.policy import CameraPolicy, Card
-from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
-from shapechanger.demos.cloning.train import History, clone
+from typing import Final
 
-__all__ = [
-    "Augmentation",
-    "CameraPolicy",
-    "Card",
-    "CloneSettings",
-    "Framing",
-    "History",
-    "clone",
-    "prepare",
-]
+__all__: Final[list[str]] = []
