@@ -24,7 +24,15 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import robot_faults, robots, speed, speed_vector, vehicles, vehicles_twin
+from benchmarks import (
+    robot_faults,
+    robots,
+    speed,
+    speed_vector,
+    vehicles,
+    vehicles_studies,
+    vehicles_twin,
+)
 from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
 from shapechanger.morphology import compile_body
@@ -130,12 +138,15 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-expert": vehicles.expert,
     "vehicles-clone": vehicles.clone,
     "vehicles-twin": vehicles_twin.twin,
+    "vehicles-pairs": vehicles_studies.pairs,
+    "vehicles-lenses": vehicles_studies.lenses,
+    "vehicles-tries": vehicles_studies.tries,
 }
 
 
 def _asked() -> str:
     """What was asked for besides, as a shell takes it."""
-    names = ("TRIALS", "LAYOUTS", "LP_NUM_THREADS")
+    names = ("TRIALS", "LAYOUTS", "SEEDS", "LP_NUM_THREADS")
     return "".join(f"{name}={os.environ[name]} " for name in names if name in os.environ)
 
 

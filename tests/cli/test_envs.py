@@ -11,6 +11,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.envs import CATALOGUE
+from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.layout import Element, Feature, Layout
 
 
@@ -33,7 +34,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_list_names_every_env(capsys: pytest.CaptureFixture[str]) -> None:
     """Each id of the catalogue is a line."""
     text = said(capsys, "envs", "list")
-    assert all(env_id in text for env_id in CATALOGUE)
+    assert all(env_id in text for env_id in (*CATALOGUE, *VEHICLE_ENVS))
 
 
 def test_show_prints_the_layout_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:

@@ -110,9 +110,9 @@ def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Pat
         _plan(clone_file, task=TransferTask(slippery, ICY))
 
 
-def test_a_clone_is_nothing_for_a_learner_that_tries(clone_file: Path) -> None:
-    """One sentence says which learner takes it."""
-    with pytest.raises(StudyError, match=r"dry\.zip is a clone, and tiny learns by trying: give "):
+def test_a_clone_is_nothing_for_a_learner_without_eyes(clone_file: Path) -> None:
+    """One sentence says which learners take it."""
+    with pytest.raises(StudyError, match=r"dry\.zip is a clone, and tiny does not learn from pict"):
         tiny_plan(source_policy=clone_file)
 
 

@@ -140,6 +140,15 @@ def test_a_study_with_another_plan_lends_nothing(out: Path, differs: dict[str, i
     assert _asked_for(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
 
 
+def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
+    """In its own folder and beside it; what was done with fewer seeds is done."""
+    assert _asked_for(_plan(DRY, WET, seeds=3), out) == {f"{kind}-2" for kind in _KINDS}
+    beside = _asked_for(_plan(DRY, ICY, seeds=3), out)
+    assert not beside & _names("source")
+    with pytest.raises(ForeignStudy, match="differs in seeds"):
+        _asked_for(_plan(DRY, WET), out)
+
+
 def test_other_versions_lend_nothing(out: Path) -> None:
     """What another release has trained is not mixed in."""
     plan = _plan(DRY, ICY)
@@ -229,7 +238,9 @@ def _crossing(
 def test_a_crossing_is_found_along_a_line() -> None:
     """Half-way between two evaluations, of the mean over seeds."""
     found = _crossing(np.array([0.0, 500.0, 1500.0, *[900.0] * 8]))
-    assert found == Crossing(
+    assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]
+    assert found.gains["jumpstart"].value is not None
+    assert msgspec.structs.replace(found, gains={}) == Crossing(
         "Ant-to-BigAnt",
         final=pytest.approx(1000.0),
         zero_shot=pytest.approx(400.0),

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import asked, env_ref, opened
-from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.envs.catalogue import CATALOGUE, VEHICLE_ENVS
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
@@ -30,6 +30,8 @@ class ListEnvs:
         table = Table("id", "body", box=None, pad_edge=False)
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
+        for env_id, (vehicle, summary) in VEHICLE_ENVS.items():
+            table.add_row(env_id, f"{vehicle}: {summary}")
         plain_console().print(table)
 
 

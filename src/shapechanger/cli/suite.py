@@ -28,13 +28,14 @@ _VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
 _LENSES: Final = ("night", "glare", "blur", "dirt")
 _SUMMARY: Final = "suite.json"
 _STEPS_A_MINUTE: Final = 1200.0
+_FILE_WIDTH: Final = 200
 
 
 @dataclass(frozen=True)
 class Suite:
     """Run studies that belong together: a study for each pair, one report each, and a table.
 
-    Stopped half-way, the same command goes on where it was.
+    Stopped half-way, the same command goes on where it was; with more seeds it adds to them.
     """
 
     name: Annotated[Literal["vehicles", "lenses"], tyro.conf.Positional]
@@ -62,7 +63,8 @@ class Suite:
         require_seed(self.seed)
         out = self.out or Path("results", self.name)
         command = shlex.join(["shapechanger", *sys.argv[1:]])
-        console = plain_console()
+        # A file has no width of its own; a table in it should not be folded.
+        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
         settings = learner_settings("cloning")
         found: list[Crossing] = []
@@ -89,6 +91,11 @@ class Suite:
             write_json(out / _SUMMARY, found)
             console.print(f"wrote {folder / 'report.html'}", soft_wrap=True)
         console.print(_table(found))
+        console.print(
+            "Gains are of fine-tuning over scratch, in scores (0: random actions, 1: what scratch "
+            "ends with), with 95 % intervals over seeds.",
+            soft_wrap=True,
+        )
         halves = sum(crossing.halves for crossing in found)
         console.print(
             f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
@@ -107,8 +114,13 @@ class Suite:
 
 
 def _table(found: list[Crossing]) -> Table:
+    """What each study says: returns and minutes first, then gains with their intervals."""
+    from shapechanger.transfer.report.numbers import estimate_text
+
     table = Table(
-        "study", "scratch", "zero-shot", "fine-tuned", "scratch, min", "fine-tune, min", box=None
+        *("study", "scratch", "zero-shot", "fine-tuned", "scratch, min", "fine-tune, min"),
+        *("jumpstart", "total reward gain", "gain at the end"),
+        box=None,
     )
     for crossing in found:
         tuned = crossing.fine_tune_steps
@@ -119,5 +131,6 @@ def _table(found: list[Crossing]) -> Table:
             f"{crossing.fine_tuned:.1f}",
             f"{crossing.scratch_steps / _STEPS_A_MINUTE:.1f}",
             "never" if tuned is None else f"{tuned / _STEPS_A_MINUTE:.1f}",
+            *(estimate_text(gain, signed=True) for gain in crossing.gains.values()),
         )
     return table

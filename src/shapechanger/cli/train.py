@@ -21,7 +21,7 @@ from shapechanger.errors import MissingExtra, OutputError
 if TYPE_CHECKING:
     from shapechanger.transfer.env_ref import EnvRef
     from shapechanger.transfer.evaluation import Evaluation
-    from shapechanger.transfer.settings import CloningSettings
+    from shapechanger.transfer.settings import CloningSettings, SacSettings
 
 __all__ = ["Train"]
 
@@ -50,7 +50,7 @@ class Train:
         from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.policy_file import save_policy
-        from shapechanger.transfer.settings import CloningSettings, learner_settings
+        from shapechanger.transfer.settings import LearnerSettings, learner_settings
         from shapechanger.transfer.training import require_budget, train, use_one_thread
 
         require_seed(self.seed)
@@ -81,8 +81,8 @@ class Train:
 
         try:
             with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
-                if isinstance(settings, CloningSettings):
-                    _clone(env, settings, steps, self.seed, out, show, progress)
+                if not isinstance(settings, LearnerSettings):
+                    _learn_to_drive(env, settings, steps, self.seed, out, show, progress)
                     console.print(f"wrote {out}")
                     return
                 policy = train(
@@ -102,19 +102,20 @@ class Train:
         console.print(f"wrote {out}")
 
 
-def _clone(
+def _learn_to_drive(
     env: EnvRef,
-    settings: CloningSettings,
+    settings: CloningSettings | SacSettings,
     steps: int,
     seed: int,
     out: Path,
     show: Callable[[Evaluation], None],
     progress: StudyProgress,
 ) -> None:
-    """Clone the demonstrator of an env, and write the clone and what it learned from."""
-    from shapechanger.transfer.cloning import Recording, clone_along
+    """Learn from the demonstrator of an env, and write the policy and what it learned from."""
+    from shapechanger.transfer.by_camera import learn_by_camera
+    from shapechanger.transfer.cloning import Recording
 
-    policy = clone_along(
+    policy = learn_by_camera(
         env,
         settings,
         settings.whole_updates(steps),

@@ -138,11 +138,7 @@ class Transfer:
     def _plan(self) -> Plan:
         """What to do."""
         from shapechanger.transfer.plan import TransferTask
-        from shapechanger.transfer.settings import (
-            CloningSettings,
-            LearnerSettings,
-            learner_settings,
-        )
+        from shapechanger.transfer.settings import LearnerSettings, learner_settings
         from shapechanger.transfer.study import make_plan
 
         task = TransferTask(
@@ -152,15 +148,11 @@ class Transfer:
         learner = self.learner or default_learner(task.target)
         settings = learner_settings(learner)
         steps, seeds = self.steps, self.seeds
-        if self.quick and isinstance(settings, CloningSettings):
+        if self.quick:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-            steps = shortest if steps is None else steps
-            seeds = _QUICK_SEEDS if seeds is None else seeds
-        elif self.quick and isinstance(settings, LearnerSettings):
-            shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-            settings = msgspec.structs.replace(
-                settings, eval_every=min(settings.eval_every, settings.whole_updates(shortest // 4))
-            )
+            if isinstance(settings, LearnerSettings):
+                every = min(settings.eval_every, settings.whole_updates(shortest // 4))
+                settings = msgspec.structs.replace(settings, eval_every=every)
             steps = shortest if steps is None else steps
             seeds = _QUICK_SEEDS if seeds is None else seeds
         return make_plan(

@@ -11,7 +11,7 @@ from shapechanger.errors import SpaceMismatch, StudyError
 from shapechanger.transfer.cloning import is_clone, load_clone
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.policy_file import load_policy
-from shapechanger.transfer.settings import CloningSettings, Settings
+from shapechanger.transfer.settings import LearnerSettings, Settings
 
 __all__ = ["steps_brought_along"]
 
@@ -29,6 +29,7 @@ class _Shown(msgspec.Struct):
     env: str
     arguments: dict[str, Any]
     demonstrated_steps: int
+    tried_steps: int = 0
 
 
 def steps_brought_along(path: Path, source: EnvRef, learner: str, settings: Settings) -> int:
@@ -59,10 +60,10 @@ def steps_brought_along(path: Path, source: EnvRef, learner: str, settings: Sett
 
 
 def _of_clone(path: Path, learner: str, settings: Settings) -> _Origin:
-    if not isinstance(settings, CloningSettings):
+    if isinstance(settings, LearnerSettings):
         raise StudyError(
-            f"{path} is a clone, and {learner} learns by trying: give --learner cloning, or bring "
-            f"along a policy of {learner}."
+            f"{path} is a clone, and {learner} does not learn from pictures: give --learner "
+            f"cloning or sac, or bring along a policy of {learner}."
         )
     card = load_clone(path).card
     if card.framing != settings.clone.framing:
@@ -79,14 +80,14 @@ def _of_clone(path: Path, learner: str, settings: Settings) -> _Origin:
             f"The card of {path} does not say from which demonstrations it was cloned ({error}): "
             "bring along one that `shapechanger train` or a study has written."
         ) from error
-    return _Origin(EnvRef(shown.env, shown.arguments), shown.demonstrated_steps)
+    return _Origin(EnvRef(shown.env, shown.arguments), shown.demonstrated_steps + shown.tried_steps)
 
 
 def _of_learned(path: Path, learner: str, settings: Settings) -> _Origin:
     card = load_policy(path).card
-    if isinstance(settings, CloningSettings):
+    if not isinstance(settings, LearnerSettings):
         raise StudyError(
-            f"{path} has learned by trying, with {card.learner}, and {learner} learns from "
+            f"{path} has learned by trying, with {card.learner}, and {learner} begins with "
             f"demonstrations: give --learner {card.learner}, or bring along a clone."
         )
     return _Origin(card.env, card.steps)

@@ -19,7 +19,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.evaluation import Evaluation, evaluate, evaluation_envs
 from shapechanger.transfer.files import make_folder
-from shapechanger.transfer.settings import CloningSettings
+from shapechanger.transfer.settings import CloningSettings, SacSettings
 
 __all__ = [
     "CLONES_ARE_JUDGED_FROM",
@@ -185,11 +185,13 @@ def clone_along(
         )
         on_evaluation(evaluate_clone(env, policy, settings, budget))
         on_steps(budget)
-    return policy.described(env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed)
+    return policy.described(
+        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, tried_steps=0, seed=seed
+    )
 
 
 def evaluate_clone(
-    env: EnvRef, policy: CameraPolicy, settings: CloningSettings, steps: int = 0
+    env: EnvRef, policy: CameraPolicy, settings: CloningSettings | SacSettings, steps: int = 0
 ) -> Evaluation:
     """How good a clone is in an env, after so many demonstrated steps."""
     envs = evaluation_envs(env, settings)

@@ -103,6 +103,10 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         entropy = np.random.SeedSequence(self.seed, spawn_key=(_KINDS.index(run.kind), run.index))
         return int(entropy.generate_state(1)[0] >> 1)
 
+    def grows(self, other: Plan) -> bool:
+        """Whether this is the other study with more seeds: what was done there counts here."""
+        return self.seeds > other.seeds and msgspec.structs.replace(other, seeds=self.seeds) == self
+
     def difference(self, other: Plan) -> str:
         """Names of the fields in which two plans differ, for a message; empty if they are equal."""
         mine: dict[str, Any] = msgspec.structs.asdict(self)

@@ -13,7 +13,8 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.transfer.body_map import MappedEnv
-from shapechanger.transfer.cloning import Recording, clone_along, evaluate_clone, load_clone
+from shapechanger.transfer.by_camera import learn_by_camera
+from shapechanger.transfer.cloning import Recording, evaluate_clone, load_clone
 from shapechanger.transfer.evaluation import (
     Evaluation,
     evaluate,
@@ -24,7 +25,7 @@ from shapechanger.transfer.executor import Report
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.plan import Plan, Run
 from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.settings import CloningSettings, LearnerSettings
+from shapechanger.transfer.settings import CloningSettings, LearnerSettings, SacSettings
 from shapechanger.transfer.training import EVALUATION_SEED, train, use_one_thread
 
 __all__ = ["RunResult", "finished", "perform"]
@@ -105,8 +106,8 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
         append_line(folder / _CURVE, evaluation)
 
     source_path = Path(source_policy or policy_path(Path(study), Run("source", run.index)))
-    if isinstance(plan.settings, CloningSettings) and run.kind != "random":
-        _clone(plan, plan.settings, run, Path(study), source_path, on_evaluation, report)
+    if not isinstance(plan.settings, LearnerSettings) and run.kind != "random":
+        _drive(plan, plan.settings, run, Path(study), source_path, on_evaluation, report)
     elif run.kind in ("source", "scratch", "fine-tune"):
         start = load_policy(source_path) if run.kind == "fine-tune" else None
         policy = _train(plan, run, start, on_evaluation, report)
@@ -119,30 +120,30 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
     write_json(folder / _RESULT, result)
 
 
-def _clone(
+def _drive(
     plan: Plan,
-    settings: CloningSettings,
+    settings: CloningSettings | SacSettings,
     run: Run,
     study: Path,
     source_path: Path,
     on_evaluation: Callable[[Evaluation], None],
     report: Report,
 ) -> None:
-    """Learn from demonstrations in the source or in the target, or see what a clone is worth."""
+    """Learn to drive by camera in the source or in the target, or see what that is worth."""
     if run.kind == "zero-shot":
         on_evaluation(evaluate_clone(plan.task.target, load_clone(source_path), settings))
         return
     of_source = run.kind == "source"
     # The same demonstrations for each arm: the arms differ in what they begin with.
     shown = Run("source" if of_source else "scratch", run.index)
-    env = plan.task.source if of_source else plan.task.target
-    recording = Recording(study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown))
-    policy = clone_along(
-        env,
+    policy = learn_by_camera(
+        plan.task.source if of_source else plan.task.target,
         settings,
         plan.source_steps if of_source else plan.steps,
         plan.seed_of(run),
-        demonstrations=recording,
+        demonstrations=Recording(
+            study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown)
+        ),
         start=load_clone(source_path) if run.kind == "fine-tune" else None,
         # Of a source policy only its beginning and its end are of interest.
         only_last=of_source,

@@ -14,6 +14,7 @@ __all__ = [
     "LEARNERS",
     "CloningSettings",
     "LearnerSettings",
+    "SacSettings",
     "Settings",
     "learner_settings",
 ]
@@ -122,7 +123,62 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-Settings = LearnerSettings | CloningSettings
+class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
+    """Settings of SAC from camera, which begins with a clone; those of SAC under SB3's names.
+
+    Attributes:
+        demonstrated_steps: Steps of demonstrations, which are cloned, and stay in the replay.
+        steps: Steps where nobody asks for another number, those of the demonstrations included.
+        episode_steps: Steps of an episode, after which the next begins on another course.
+        eval_every: Steps of trying between two evaluations.
+        eval_episodes: Episodes of an evaluation, with actions that are the policy's mean.
+        eval_steps: Steps of each of them.
+        learning_rate: Of Adam, of actor and critics.
+        batch_size: Transitions in a batch; half of them are demonstrated.
+        gamma: Discount.
+        ent_coef: Weight of the entropy.
+        critic_warm_up: Updates of the critics before the first step of trying.
+        clone: How the demonstrations are cloned.
+    """
+
+    demonstrated_steps: int
+    steps: int
+    episode_steps: int
+    eval_every: int
+    eval_episodes: int
+    eval_steps: int
+    learning_rate: float
+    batch_size: int
+    gamma: float
+    ent_coef: float
+    critic_warm_up: int
+    clone: CloneSettings = CloneSettings()
+
+    def __post_init__(self) -> None:
+        counts = (self.demonstrated_steps, self.episode_steps, self.eval_every, self.eval_episodes)
+        if min(*counts, self.eval_steps) < 1 or self.batch_size < 2 or self.critic_warm_up < 0:
+            raise StudyError(
+                "SAC from camera needs at least one step of a demonstration, of an episode and "
+                "between two evaluations, one episode, and batches of 2."
+            )
+
+    def whole_updates(self, steps: int) -> int:
+        """The least number of steps that is `steps` or more and ends with an evaluation."""
+        tried = max(1, -(-(steps - self.demonstrated_steps) // self.eval_every))
+        return self.demonstrated_steps + tried * self.eval_every
+
+    def cloning(self) -> CloningSettings:
+        """How its demonstrations are cloned."""
+        return CloningSettings(
+            budgets=(self.demonstrated_steps,),
+            episode_steps=self.episode_steps,
+            eval_episodes=self.eval_episodes,
+            eval_steps=self.eval_steps,
+            clone=self.clone,
+        )
+
+
+Settings = LearnerSettings | CloningSettings | SacSettings
 """The settings of any learner."""
 
 # `ppo-balance` was tuned on InvertedPendulum and BigInvertedPendulum: within 24,576 steps the
@@ -160,6 +216,21 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_episodes=4,
         eval_steps=400,
         # A few held-out pictures choose badly: they stopped two minutes of driving after 150 steps.
+        clone=CloneSettings(held_out=0.0),
+    ),
+    # A minute of demonstrations, and nine of trying.
+    "sac": SacSettings(
+        demonstrated_steps=1200,
+        steps=12_000,
+        episode_steps=200,
+        eval_every=1800,
+        eval_episodes=4,
+        eval_steps=400,
+        learning_rate=3e-4,
+        batch_size=256,
+        gamma=0.97,
+        ent_coef=0.002,
+        critic_warm_up=1000,
         clone=CloneSettings(held_out=0.0),
     ),
 }

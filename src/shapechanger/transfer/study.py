@@ -198,12 +198,15 @@ def unfinished(plan: Plan, out: Path) -> tuple[Run, ...]:
 
 
 def holds(plan: Plan, out: Path) -> bool:
-    """Whether `out` is the folder of this study.
+    """Whether `out` is the folder of this study, done with as many seeds or with fewer.
 
     Raises:
         CorruptStudy: If the plan in it cannot be read.
     """
-    return (out / PLAN_FILE).exists() and _plan_in(out) == plan
+    if not (out / PLAN_FILE).exists():
+        return False
+    found = _plan_in(out)
+    return found == plan or plan.grows(found)
 
 
 def _plan_in(out: Path) -> Plan:
@@ -219,6 +222,8 @@ def _digest(policy: Path) -> str:
 def claim_folder(plan: Plan, out: Path) -> None:
     """Make `out` the folder of this study, or see that it already is.
 
+    A study that was begun with fewer seeds goes on with more: no run depends on how many there are.
+
     Raises:
         OutputError: If it cannot be written.
         ForeignStudy: If it holds another study, or something else.
@@ -227,11 +232,13 @@ def claim_folder(plan: Plan, out: Path) -> None:
     make_folder(out)
     path = out / PLAN_FILE
     if path.exists():
-        if not holds(plan, out):
-            differs = plan.difference(_plan_in(out))
+        found = _plan_in(out)
+        if plan.grows(found):
+            write_json(path, plan)
+        elif found != plan:
             raise ForeignStudy(
-                f"{out} holds another study, which differs in {differs}: give another --out, or "
-                "delete that folder."
+                f"{out} holds another study, which differs in {plan.difference(found)}: give "
+                "another --out, or delete that folder."
             )
         return
     if any(out.iterdir()):

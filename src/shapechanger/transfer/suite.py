@@ -17,7 +17,7 @@ import msgspec
 from shapechanger.errors import OutputError
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
-from shapechanger.transfer.metrics import LearningCurves
+from shapechanger.transfer.metrics import Estimate, LearningCurves
 from shapechanger.transfer.plan import Plan, RunKind
 from shapechanger.transfer.runs import finished
 from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, run_study
@@ -25,6 +25,7 @@ from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, run_stud
 __all__ = ["Crossing", "begin_beside", "crossings", "run_beside", "study_folder"]
 
 _OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "scratch")
+_GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
 _DEMONSTRATIONS: Final = "demonstrations"
 
 
@@ -38,6 +39,9 @@ class Crossing(msgspec.Struct, frozen=True):
         fine_tuned: What fine-tuning ends with.
         scratch_steps: Steps after which scratch first comes to `final`.
         fine_tune_steps: The same of fine-tuning; None if it never does.
+        unit: Of the gains, see `Summary`.
+        gains: What fine-tuning gains over scratch, in target steps and with intervals: `jumpstart`,
+            `total_reward_gain` and `asymptotic_gain`.
     """
 
     name: str
@@ -46,6 +50,8 @@ class Crossing(msgspec.Struct, frozen=True):
     fine_tuned: float
     scratch_steps: float
     fine_tune_steps: float | None
+    unit: str = "score"
+    gains: dict[str, Estimate] = {}
 
     @property
     def halves(self) -> bool:
@@ -110,8 +116,8 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Take over the runs of a sibling that are the same here."""
     remedy = f"delete {sibling} to do that study again"
     other = read_json(sibling / PLAN_FILE, Plan, remedy)
-    alike = msgspec.structs.replace(other, task=plan.task, body_map=plan.body_map) == plan
-    if not alike:
+    alike = msgspec.structs.replace(other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds)
+    if alike != plan:
         return
     kinds: list[RunKind] = []
     if other.task.target == plan.task.target:
@@ -148,6 +154,8 @@ def _crossing(study: Study) -> Crossing:
     scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
     final = float(scratch.returns[:, -1].mean())
     zero_shot = study.of("zero-shot")
+    summary = study.summaries["fine-tune"]
+    measures = summary.in_target_steps
     first = _first_at(scratch, final)
     return Crossing(
         study_folder(study.plan, Path()).name,
@@ -156,6 +164,8 @@ def _crossing(study: Study) -> Crossing:
         float(tuned.returns[:, -1].mean()),
         study.plan.steps if first is None else first,
         _first_at(tuned, final),
+        summary.unit,
+        {name: getattr(measures, name) for name in _GAINS},
     )
 
 

@@ -19,7 +19,7 @@ from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import lens
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.mount import Jitter, move_camera
-from shapechanger.worlds.pathfinder.path import Path, plan_path
+from shapechanger.worlds.pathfinder.path import Path, plan_path_for
 from shapechanger.worlds.pathfinder.progress import Progress
 from shapechanger.worlds.pathfinder.traits import traits_of
 from shapechanger.worlds.scene import add_course
@@ -51,6 +51,7 @@ class MujocoWorld:
     Attributes:
         course: The course.
         look: How it looks.
+        lenses: Names of what is wrong with the camera.
         model: The compiled model.
         data: Its state.
         resting_v: Voltage of the battery without load.
@@ -74,7 +75,8 @@ class MujocoWorld:
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
-        self._lenses = [lens(name) for name in lenses]
+        self.lenses = tuple(lenses)
+        self._distortions = [lens(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
         self.lay_out(seed)
@@ -150,6 +152,16 @@ class MujocoWorld:
         self._touch.reset()
         self._progress.reset(pose.x, pose.y)
 
+    def path(self) -> Path:
+        """A way round the course for this vehicle; planned when it is first asked for.
+
+        Raises:
+            WorldError: If there is none.
+        """
+        if self._path is None:
+            self._path = plan_path_for(self.course, traits_of(self.vehicle.name))
+        return self._path
+
     def put_back(self) -> None:
         """Put the vehicle back on a free line where it is, as a person would who walks beside it.
 
@@ -158,15 +170,10 @@ class MujocoWorld:
         Raises:
             WorldError: If there is no way round the course for this vehicle.
         """
-        if self._path is None:
-            traits = traits_of(self.vehicle.name)
-            self._path = plan_path(
-                self.course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m
-            )
-        here = self._bound.pose()
-        i = self._path.index(self._path.nearest(here.x, here.y).station)
-        x, y = self._path.points[i]
-        self._rest_at(Pose(float(x), float(y), float(self._path.heading[i])))
+        path, here = self.path(), self._bound.pose()
+        i = path.index(path.nearest(here.x, here.y).station)
+        x, y = path.points[i]
+        self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
         self._touch.let_go()
         self._progress.update(float(x), float(y))
 
@@ -227,7 +234,7 @@ class MujocoWorld:
         if self._camera is None:
             raise WorldError("This world was made without a camera: give it a `size`.")
         picture = self._camera.picture(self.model, self.data)
-        for distort in self._lenses:
+        for distort in self._distortions:
             picture = distort(picture, self.course.seed)
         return picture
 

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import SAC
-from stable_baselines3.common.vec_env import DummyVecEnv
 
 from shapechanger.demos.cloning.errors import CloningError, PolicyError
-from shapechanger.demos.cloning.pictures import prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.sb3 import PreparedPictures, to_sb3
+from shapechanger.demos.cloning.sb3 import NormedReLU, SeenByPolicy, from_sb3, to_sb3
 from tests.demos.cloning.small import SIZE, SMALL
 
 _SMALL_BUFFER: dict[str, Any] = {"buffer_size": 32, "batch_size": 4, "learning_starts": 4}
@@ -56,11 +54,11 @@ def test_the_learner_begins_as_the_clone(policy: CameraPolicy) -> None:
     """The same picture, the same action, through all of Stable-Baselines3."""
     model = to_sb3(policy, _Road(), **_SMALL_BUFFER)
     pictures = np.random.default_rng(0).integers(0, 256, (16, 60, 80, 3), np.uint8)
-    small = prepare(pictures, policy.card.framing)
     expected = policy.predict_many(pictures)
     assert np.abs(expected).max() > 0.2
-    np.testing.assert_allclose(model.predict(small, deterministic=True)[0], expected, atol=1e-5)
-    one = model.predict(small[0], deterministic=True)[0]
+    seen = policy.features(pictures)
+    np.testing.assert_allclose(model.predict(seen, deterministic=True)[0], expected, atol=1e-5)
+    one = model.predict(seen[0], deterministic=True)[0]
     np.testing.assert_allclose(one, policy.predict(pictures[0]), atol=1e-5)
 
 
@@ -68,24 +66,27 @@ def test_what_it_tries_is_close_to_that(policy: CameraPolicy) -> None:
     """A clone that began by driving at random would have been cloned for nothing."""
     model = to_sb3(policy, _Road(SIZE), **_SMALL_BUFFER)
     pictures = np.random.default_rng(0).integers(0, 256, (64, *SIZE, 3), np.uint8)
-    tried = model.predict(pictures, deterministic=False)[0]
+    tried = model.predict(policy.features(pictures), deterministic=False)[0]
     apart = np.abs(tried - policy.predict_many(pictures)).mean()
     assert 0.01 < apart < 0.2
 
 
 def test_it_goes_on_learning_and_comes_back(policy: CameraPolicy, tmp_path: Path) -> None:
-    """Its file is one of Stable-Baselines3's own, and the clone stays as it was."""
+    """As a file of Stable-Baselines3, and as a clone that sees as before and acts otherwise."""
     before = policy.network.hands.weight.clone()
-    model = to_sb3(policy, DummyVecEnv([lambda: _Road(SIZE)]), **_SMALL_BUFFER)
-    picture = np.zeros((*SIZE, 3), np.uint8)
+    picture = np.full((1, *SIZE, 3), 80, np.uint8)
+    seen = policy.features(picture)
+    model = to_sb3(policy, _Road(SIZE), **_SMALL_BUFFER)
     model.learn(12)
     assert torch.equal(policy.network.hands.weight, before)
-    assert not torch.equal(model.actor.mu.weight, before)
+    learned = from_sb3(model, policy)
+    assert not torch.equal(learned.network.hands.weight, before)
+    np.testing.assert_array_equal(learned.features(picture), seen)
+    acted = model.predict(seen, deterministic=True)[0]
+    np.testing.assert_allclose(learned.predict_many(picture), acted, atol=1e-5)
     model.save(tmp_path / "model.zip")
     again = SAC.load(tmp_path / "model.zip")
-    np.testing.assert_array_equal(
-        again.predict(picture, deterministic=True)[0], model.predict(picture, deterministic=True)[0]
-    )
+    np.testing.assert_array_equal(again.predict(seen, deterministic=True)[0], acted)
 
 
 def test_settings_reach_the_learner(policy: CameraPolicy) -> None:
@@ -96,13 +97,19 @@ def test_settings_reach_the_learner(policy: CameraPolicy) -> None:
     assert model.critic.qf0[0].out_features == 16
 
 
-def test_the_wrapper_shows_what_the_policy_sees(policy: CameraPolicy) -> None:
-    """In the env's own order of colours."""
-    env = PreparedPictures(_Road(), policy.card.framing)
+def test_the_wrapper_shows_what_the_eyes_see(policy: CameraPolicy) -> None:
+    """Features in place of the picture that the env itself shows."""
+    env = SeenByPolicy(_Road(), policy)
     seen, _ = env.reset(seed=0)
     raw, _ = _Road().reset(seed=0)
     assert env.observation_space.contains(seen)
-    np.testing.assert_array_equal(seen, prepare(raw[None], policy.card.framing)[0])
+    np.testing.assert_array_equal(seen, policy.features(raw[None])[0])
+
+
+def test_a_critic_is_freed_of_mean_and_spread() -> None:
+    """However large its numbers grow, they come out alike."""
+    x = torch.tensor([[1.0, 2.0, 4.0, 9.0]])
+    torch.testing.assert_close(NormedReLU()(x), NormedReLU()(1000.0 * x + 5.0), atol=1e-3, rtol=0.0)
 
 
 @pytest.mark.parametrize(

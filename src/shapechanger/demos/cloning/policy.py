@@ -29,7 +29,7 @@ try:
     from torch import Tensor
 
     from shapechanger.demos.cloning.augment import plain
-    from shapechanger.demos.cloning.network import ACTIONS, CameraNetwork
+    from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
@@ -145,14 +145,33 @@ class CameraPolicy:
         Raises:
             CloningError: If they are no pictures that the policy can see.
         """
-        small = prepare(pictures, self.card.framing)
-        actions = np.empty((len(small), ACTIONS), np.float32)
         with torch.inference_mode():
-            for start in range(0, len(small), _AT_A_TIME):
-                part = torch.as_tensor(small[start : start + _AT_A_TIME].copy())
-                seen = plain(part, torch.arange(len(part)))
-                actions[start : start + _AT_A_TIME] = self.network(seen).numpy()
-        return actions
+            return torch.tanh(self.network.hands(self._seen(pictures))).numpy()
+
+    def features(self, pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """What the eyes make of each of some pictures.
+
+        Args:
+            pictures: Red, green and blue, shape (n, H, W, 3), as recorded or prepared.
+
+        Returns:
+            Features, each at least 0, shape (n, features).
+
+        Raises:
+            CloningError: If they are no pictures that the policy can see.
+        """
+        with torch.inference_mode():
+            return self._seen(pictures).numpy()
+
+    def _seen(self, pictures: NDArray[np.uint8]) -> Tensor:
+        small = prepare(pictures, self.card.framing)
+        found = torch.empty(len(small), self.card.features)
+        for start in range(0, len(small), _AT_A_TIME):
+            part = torch.as_tensor(small[start : start + _AT_A_TIME].copy())
+            found[start : start + len(part)] = self.network.eyes(
+                plain(part, torch.arange(len(part)))
+            )
+        return found
 
     def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
         """The same policy with more on its card.

@@ -27,7 +27,7 @@ class Demonstrator:
     def begin(self) -> None:
         """An episode has begun."""
         self._course = self._world.course
-        self._expert = Expert(self._course, self._world.vehicle.name)
+        self._expert = Expert(self._course, self._world.vehicle.name, path=self._world.path())
         self._expert.reset(self._world.pose)
         self._disturbance = Disturbance.of(
             self._world.vehicle.name, "both", int(self._seeds.integers(2**31))

@@ -17,12 +17,14 @@ from shapechanger.embodiments.vehicles import require_fit, vehicle_model
 from shapechanger.envs.vehicle.asked import Steering, profile_as_asked, size_as_asked
 from shapechanger.envs.vehicle.courses import CourseDraw, Courses
 from shapechanger.envs.vehicle.demonstrator import Demonstrator
+from shapechanger.envs.vehicle.picture import draw_vehicle, vehicle_reach
+from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
 from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.inbox import Received
 from shapechanger.remote.judge import Judge
-from shapechanger.remote.senses import Senses
+from shapechanger.remote.senses import Senses, View
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
@@ -82,6 +84,9 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             `shapechanger.worlds.lens`.
         render_mode: "rgb_array" for `render` to give the newest picture.
 
+    Attributes:
+        parts: What the robot's outputs turn, such as "wheels" and "steering".
+
     Raises:
         UnknownName: If there is no such vehicle, world, profile, steering, weight, lens, render
             mode or kind of courses.
@@ -128,7 +133,8 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             size=(wide, high) if image or render_mode else None,
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
-        require_fit(vehicle, {output.part for output in profile.outputs})
+        self.parts = frozenset(output.part for output in profile.outputs)
+        require_fit(vehicle, self.parts)
         self._robot = InProcessRobot(profile, self._world, pictures=image)
         welcome = self._robot.welcome
         self._senses = Senses(welcome, (wide, high), image, state)
@@ -140,7 +146,6 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.action_space = self._senses.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
         self._last: Observation | None = None
-        self._seen = 0
 
     @property
     def world(self) -> MujocoWorld:
@@ -184,7 +189,8 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             )
         self._judge.start(last)
         self._last = last
-        return self._view(last), self._info(last)
+        view = self._view(last)
+        return view.observation, self._info(last, view)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for one control period.
@@ -200,12 +206,13 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         seen, bumped = self._robot.step(values)
         terminated, terms = self._judge.judge(before, seen, bumped)
         self._last = seen
-        info = self._info(seen) | terms
+        view = self._view(seen)
+        info = self._info(seen, view) | terms
         info["reward_terms"] = terms
         info["refused"] = self._robot.refused
         if self._puts_back and self._world.collisions > collisions:
             self._world.put_back()
-        return self._view(seen), sum(terms.values()), terminated, False, info
+        return view.observation, sum(terms.values()), terminated, False, info
 
     def hold_out(self) -> None:
         """Draw, from the next reset on, courses that no vehicle learns on."""
@@ -231,21 +238,56 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             raise RenderError("There is nothing to see before the first reset().")
         return self._world.picture()
 
+    # What a transfer study asks of an env, whichever kind it is.
+
+    @staticmethod
+    def certify_shift(
+        source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
+    ) -> VehicleShift:
+        """What changes from one vehicle to the other, wrappers included; both are reset.
+
+        Raises:
+            MorphologyError: If one of them is no vehicle.
+            EmptyShift: If nothing does, and `allow_empty` is false.
+        """
+        return certify_vehicles(source, target, allow_empty=allow_empty)
+
+    @property
+    def reach(self) -> float:
+        """How far from the middle of the vehicle its farthest point is, m."""
+        return vehicle_reach(self._world.vehicle.name)
+
+    def picture(
+        self, width: int = 480, height: int = 360, reach: float | None = None
+    ) -> NDArray[np.uint8]:
+        """The vehicle on even ground, from outside, shape (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Metres in view around the middle of the vehicle; None for its own reach.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        return draw_vehicle(self._world.vehicle.name, width, height, reach or self.reach)
+
     def close(self) -> None:
         """Let go of the pins, and free what draws."""
         self._robot.close()
         self._world.close()
 
-    def _view(self, seen: Observation) -> Any:
-        return self._senses.view(Received(seen, time.monotonic(), seen.frame)).observation
+    def _view(self, seen: Observation) -> View:
+        return self._senses.view(Received(seen, time.monotonic(), seen.frame))
 
-    def _info(self, seen: Observation) -> dict[str, Any]:
+    def _info(self, seen: Observation, view: View) -> dict[str, Any]:
         pose = self._world.pose
         return {
             "action_applied": np.array(seen.action_applied, np.float32),
             "stop_reason": seen.stop_reason,
             "armed": seen.armed,
             "emergency": seen.emergency,
+            "absent": view.absent,
             "reward_sources": self._judge.sources(seen),
             "progress": self._world.progress_m,
             "collisions": self._world.collisions,

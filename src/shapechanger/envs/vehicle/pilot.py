@@ -34,7 +34,7 @@ class Pilot:
         seen = self._world.inputs()
         if self._world.course is not self._course:
             self._course = self._world.course
-            self._expert = Expert(self._course, self._world.vehicle.name)
+            self._expert = Expert(self._course, self._world.vehicle.name, path=self._world.path())
         elif self._was_moved(seen.pose):
             self._expert.reset(seen.pose)
         self._before = seen.pose

@@ -133,8 +133,12 @@ def certify(
         allow_empty: Whether to certify a shift that changes nothing.
 
     Raises:
+        MorphologyError: If one of them has no model, such as a vehicle's.
         EmptyShift: If nothing differs and `allow_empty` is false.
     """
+    for env in (source, target):
+        if not hasattr(getattr(env, "unwrapped", env), "model"):
+            raise MorphologyError(f"{_label(env)} has no model that could be compared.")
     models = cast(
         "tuple[mujoco.MjModel, mujoco.MjModel]",
         tuple(attribute(env, "model") for env in (source, target)),

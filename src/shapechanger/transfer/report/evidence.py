@@ -20,7 +20,7 @@ from shapechanger.transfer.report.markup import (
     text,
 )
 from shapechanger.transfer.report.numbers import count, number
-from shapechanger.transfer.settings import CloningSettings, Settings
+from shapechanger.transfer.settings import CloningSettings, SacSettings, Settings
 from shapechanger.transfer.study import Study
 
 __all__ = ["body_map", "learner", "provenance", "shift", "short_name"]
@@ -105,6 +105,12 @@ def _rhythm(settings: Settings) -> str:
         return (
             f"after {budgets} steps. A step is one of a demonstration: a policy is cloned from so "
             "many, each time from the same start, and the arms see the same demonstrations."
+        )
+    if isinstance(settings, SacSettings):
+        return (
+            f"every {count(settings.eval_every)} steps of trying, which begins after "
+            f"{count(settings.demonstrated_steps)} steps of demonstrations: these are cloned, and "
+            "half of what SAC learns from is drawn from them. The arms see the same ones."
         )
     normalised = (
         "Observations and rewards are normalised for the learner by running estimates of their "

@@ -12,7 +12,7 @@ from shapechanger.worlds.course import Course
 from shapechanger.worlds.pathfinder.angles import wrapped
 from shapechanger.worlds.pathfinder.clearance import Obstacles
 from shapechanger.worlds.pathfinder.pace import pace
-from shapechanger.worlds.pathfinder.path import Path, plan_path
+from shapechanger.worlds.pathfinder.path import Path, plan_path_for
 from shapechanger.worlds.pathfinder.pursuit import Pursuit
 from shapechanger.worlds.pathfinder.recovery import Recovery
 from shapechanger.worlds.pathfinder.three_way import ThreeWay
@@ -65,12 +65,7 @@ class Expert:
         path: Path | None = None,
     ) -> None:
         self._traits: Traits = traits_of(vehicle)
-        self.path = path or plan_path(
-            course,
-            self._traits.half_width_m,
-            self._traits.margin_m,
-            comfort_m=self._traits.comfort_m,
-        )
+        self.path = path or plan_path_for(course, self._traits)
         self.speeds = pace(self.path, self._traits)
         self._obstacles = Obstacles(course)
         self._pursuit = Pursuit(self._traits, period_s)

@@ -14,8 +14,9 @@ from shapechanger.worlds.pathfinder.clearance import Obstacles
 from shapechanger.worlds.pathfinder.lattice import Lattice, cheapest_way, lay_lattice
 from shapechanger.worlds.pathfinder.line import ClosedLine, Spot
 from shapechanger.worlds.pathfinder.smoothing import least_bent
+from shapechanger.worlds.pathfinder.traits import Traits
 
-__all__ = ["SPACING_M", "Path", "plan_path"]
+__all__ = ["SPACING_M", "Path", "plan_path", "plan_path_for"]
 
 SPACING_M: Final = 0.1
 """About how far apart the points of a path are."""
@@ -123,6 +124,15 @@ def plan_path(
         f"smooth and leaves {margin_m:.2f} m at each side of a vehicle of "
         f"{2 * half_width_m:.2f} m. Use a smaller margin, or another seed."
     )
+
+
+def plan_path_for(course: Course, traits: Traits) -> Path:
+    """The way round a course for one vehicle.
+
+    Raises:
+        WorldError: There is none.
+    """
+    return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
 
 
 def _smoothed(

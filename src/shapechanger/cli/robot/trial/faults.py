@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from shapechanger.cli.robot.running import RunningRobot
 from shapechanger.cli.robot.trial.driver import Driver
-from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Role
 from shapechanger.link.proof import new_key
@@ -23,9 +23,11 @@ from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.network import BadNetwork
 from shapechanger.twin.operator import Operator
 
-__all__ = ["FAULTS", "Fault", "Make", "Scene"]
+__all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
 
 _LATE_S: Final = 1.0
+# What takes no time takes no longer than this, or the machine stood still meanwhile.
+_AT_ONCE_MS: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,12 @@ class Fault:
         return self.within_ms + waits[self.after]
 
 
+class Untimely(RobotError):
+    """Nobody knows when the fault happened, because the machine stood still meanwhile."""
+
+
 def _now(act: Callable[[Scene], object]) -> Make:
-    """Something that happens at once."""
+    """Something that begins now, and may take a while."""
 
     def make(scene: Scene) -> int:
         at_ns = time.monotonic_ns()
@@ -99,12 +105,23 @@ def _now(act: Callable[[Scene], object]) -> Make:
     return make
 
 
+def _at_once(act: Callable[[Scene], object]) -> Make:
+    """Something that takes no time; if it did, its time is not known."""
+
+    def make(scene: Scene) -> int:
+        at_ns = _now(act)(scene)
+        took_ms = (time.monotonic_ns() - at_ns) / 1e6
+        if took_ms > _AT_ONCE_MS:
+            raise Untimely(f"It took {took_ms:.0f} ms to let the fault happen.")
+        return at_ns
+
+    return make
+
+
 def _signal(program: Literal["guard", "daemon"], number: signal.Signals) -> Make:
     def make(scene: Scene) -> int:
         pid = scene.robot.pid_of(program)
-        at_ns = time.monotonic_ns()
-        os.kill(pid, number)
-        return at_ns
+        return _at_once(lambda _: os.kill(pid, number))(scene)
 
     return make
 
@@ -194,19 +211,19 @@ def _mend_camera(scene: Scene) -> None:
 FAULTS: Final[dict[str, Fault]] = {
     fault.name: fault
     for fault in (
-        Fault("driver killed", _now(lambda s: s.driver.process.kill()), 20.0, "deadline"),
+        Fault("driver killed", _at_once(lambda s: s.driver.process.kill()), 20.0, "deadline"),
         Fault(
             "driver stopped",
-            _now(lambda s: s.driver.process.send_signal(signal.SIGSTOP)),
+            _at_once(lambda s: s.driver.process.send_signal(signal.SIGSTOP)),
             20.0,
             "deadline",
         ),
-        Fault("network silent", _now(_go_silent), 20.0, "deadline", _speak_again),
-        Fault("network reset", _now(lambda s: s.network.reset()), 20.0, "deadline"),
-        Fault("network half closed", _now(lambda s: s.network.half_close()), 20.0, "deadline"),
+        Fault("network silent", _at_once(_go_silent), 20.0, "deadline", _speak_again),
+        Fault("network reset", _at_once(lambda s: s.network.reset()), 20.0, "deadline"),
+        Fault("network half closed", _at_once(lambda s: s.network.half_close()), 20.0, "deadline"),
         # What answers an observation of a second ago is refused, so the last command that acts is
         # one that had arrived already.
-        Fault("network late by 1 s", _now(_be_late), 20.0, "deadline", _be_prompt),
+        Fault("network late by 1 s", _at_once(_be_late), 20.0, "deadline", _be_prompt),
         Fault(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
@@ -217,7 +234,9 @@ FAULTS: Final[dict[str, Fault]] = {
             "a person takes over", _by_another("person", lambda c: c.take()), 20.0, silences=True
         ),
         Fault("a person disarms", _by_another("person", lambda c: c.disarm()), 20.0, silences=True),
-        Fault("network in slices of 1 byte", _now(_slice), 20.0, "deadline", _mend, harms=False),
+        Fault(
+            "network in slices of 1 byte", _at_once(_slice), 20.0, "deadline", _mend, harms=False
+        ),
         Fault(
             "a stranger with a wrong key",
             _now(_knock_with_a_wrong_key),
@@ -295,7 +314,10 @@ FAULTS: Final[dict[str, Fault]] = {
             guards_late=True,
         ),
         Fault(
-            "supervisor killed", _now(lambda s: s.robot.supervisor.kill()), 100.0, then="is gone"
+            "supervisor killed",
+            _at_once(lambda s: s.robot.supervisor.kill()),
+            100.0,
+            then="is gone",
         ),
         # Only hardware is left then: the one-shot of the enable line, 100 ms, and its slack.
         Fault(

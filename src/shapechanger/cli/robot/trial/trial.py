@@ -13,7 +13,7 @@ from typing import Final, Self
 
 from shapechanger.cli.robot.running import RunningRobot, run_robot
 from shapechanger.cli.robot.trial.driver import Driver
-from shapechanger.cli.robot.trial.faults import Fault, Scene
+from shapechanger.cli.robot.trial.faults import Fault, Scene, Untimely
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.profile import Profile
@@ -120,7 +120,8 @@ class Trial:
         """Drive, let the fault happen, and judge by the ledger.
 
         A robot that cannot be driven, because a busy machine kept its guard from beating and it
-        started afresh, is replaced before anything is judged.
+        started afresh, is replaced before anything is judged; and so is one whose fault came at a
+        time that is not known.
 
         Raises:
             RobotError: If no robot can be driven.
@@ -136,7 +137,7 @@ class Trial:
                 ):
                     scene = Scene(robot, driver, network, operator)
                     result = self._tried(fault, scene, began_ns)
-            except _NotDriven as error:
+            except (_NotDriven, Untimely) as error:
                 self.close()
                 if attempt == _ATTEMPTS - 1:
                     raise RobotError(str(error)) from error

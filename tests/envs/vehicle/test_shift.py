@@ -1,0 +1,91 @@
+"""What changes from one vehicle to another: it is told, and nothing is no change."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.errors import EmptyShift, MorphologyError
+
+
+@pytest.fixture
+def blind() -> dict[str, bool]:
+    """Arguments of vehicles that need not be drawn."""
+    return {"image": False, "put_back": True}
+
+
+def test_another_vehicle_is_told_in_sizes_and_answers(blind: dict[str, bool]) -> None:
+    """What it is, and what both do when they are told the same."""
+    with closing(VehicleEnv("car", **blind)) as car, closing(VehicleEnv("tank", **blind)) as tank:
+        text = str(VehicleEnv.certify_shift(car, tank))
+    assert "length: 0.4 m -> 0.32 m" in text
+    assert "driven by: steering and wheels -> left track and right track" in text
+    assert "turns on the spot" in text
+    assert "straight on at a throttle of 0.5 for 20 steps:" in text
+    assert "place" not in text  # Both are at home in a corridor.
+
+
+def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
+    """Unless that is what somebody wants to see."""
+    with closing(VehicleEnv("car", **blind)) as one, closing(VehicleEnv("car", **blind)) as two:
+        with pytest.raises(EmptyShift, match="nothing to transfer across"):
+            VehicleEnv.certify_shift(one, two)
+        shift = VehicleEnv.certify_shift(one, two, allow_empty=True)
+    assert shift.is_empty
+    assert shift.changes == ()
+
+
+@pytest.mark.gl
+def test_a_lens_changes_what_is_seen() -> None:
+    """And nothing else."""
+    size = (40, 30)
+    with (
+        closing(VehicleEnv("car", size=size, put_back=True)) as clear,
+        closing(VehicleEnv("car", size=size, put_back=True, lenses=("night",))) as dark,
+    ):
+        shift = VehicleEnv.certify_shift(clear, dark)
+    assert shift.changes == ("wrong with the camera: nothing -> night",)
+    straight = shift.answers[0].partition(": ")[2].split(" -> ")
+    assert straight[0] == straight[1]
+
+
+def test_wrappers_count(blind: dict[str, bool]) -> None:
+    """The same vehicle that hears half of what it is told does something else."""
+    with (
+        closing(VehicleEnv("car", **blind)) as car,
+        closing(gym.wrappers.TransformAction(VehicleEnv("car", **blind), _halved, None)) as lame,
+    ):
+        shift = VehicleEnv.certify_shift(car, lame)
+    assert shift.changes == ()
+    assert not shift.is_empty
+
+
+def _halved(action: np.ndarray) -> np.ndarray:
+    return 0.5 * action
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_vehicle_is_not_compared_with_an_ant(order: int, blind: dict[str, bool]) -> None:
+    """Whichever of them is asked says so."""
+    with (
+        closing(VehicleEnv("car", **blind)) as car,
+        closing(gym.make("shapechanger/InvertedPendulum-v1")) as pole,
+    ):
+        source, target = (car, pole)[::order]
+        with pytest.raises(MorphologyError, match=r"is no vehicle|has no model"):
+            source.unwrapped.certify_shift(source, target)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("vehicle", ["car", "tank", "truck", "boat"])
+def test_a_vehicle_is_drawn_from_outside(vehicle: str) -> None:
+    """On its ground, in colours of its own, and smaller when more is in view."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        near, far = env.picture(160, 120), env.picture(160, 120, reach=3.0 * env.reach)
+    assert near.shape == (120, 160, 3)
+    gaudy = [int((np.ptp(picture.astype(int), axis=2) > 40).sum()) for picture in (near, far)]
+    assert gaudy[0] > 3 * gaudy[1] > 0
