@@ -42,13 +42,13 @@ class _Tried(msgspec.Struct, frozen=True):
         stopped_ms: See `TrialResult`; None for never.
         limit_ms: What is promised.
         drove: Whether it was driving when the fault came; otherwise the trial says nothing.
-        unauthorised_ms: How long something propelled without a fresh command.
+        unauthorised_ms: How long something propelled without a fresh command; None for for ever.
     """
 
     stopped_ms: float | None
     limit_ms: float
     drove: bool
-    unauthorised_ms: tuple[float, ...]
+    unauthorised_ms: tuple[float | None, ...]
 
     @property
     def kept(self) -> bool:
@@ -101,11 +101,16 @@ def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) 
 def _as_tried(trial: Trial, fault: Fault) -> _Tried:
     result = trial.run(fault)
     return _Tried(
-        None if np.isinf(result.stopped_ms) else result.stopped_ms,
+        _finite(result.stopped_ms),
         result.limit_ms,
         result.drove,
-        tuple((one.end_ns - one.start_ns) / 1e6 for one in result.unauthorised),
+        tuple(_finite((one.end_ns - one.start_ns) / 1e6) for one in result.unauthorised),
     )
+
+
+def _finite(number: float) -> float | None:
+    """A number as JSON can hold it."""
+    return None if np.isinf(number) else number
 
 
 def _row(fault: Fault, found: list[_Tried]) -> Row:
