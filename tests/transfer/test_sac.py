@@ -35,6 +35,7 @@ TINY_SAC = SacSettings(
     gamma=0.9,
     ent_coef=0.01,
     critic_warm_up=20,
+    anchor_rate=1e-3,
     clone=TINY_CLONING.clone,
 )
 
@@ -134,3 +135,22 @@ def test_settings_that_cannot_be_are_refused() -> None:
     """Nothing can be cloned from no step."""
     with pytest.raises(StudyError, match="at least one step of a demonstration"):
         msgspec.structs.replace(TINY_SAC, demonstrated_steps=0)
+
+
+def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
+    """However wrong the critics are, what was demonstrated is not forgotten."""
+    wild = msgspec.structs.replace(TINY_SAC, learning_rate=3e-2, critic_warm_up=0)
+    errors: list[float] = []
+    for rate in (0.0, 3e-2):
+        policy = learn_by_trying(
+            LANE,
+            msgspec.structs.replace(wild, anchor_rate=rate),
+            120,
+            5,
+            demonstrations=Recording(tmp_path / "shown.npz", 6),
+            on_evaluation=lambda evaluation: None,
+        )
+        with np.load(tmp_path / "shown.npz") as shown:
+            apart = policy.predict_many(shown["pictures"]) - shown["actions"]
+        errors.append(float(np.abs(apart).mean()))
+    assert errors[1] < 0.7 * errors[0]

@@ -2,16 +2,18 @@
 
 The demonstrations stay in its replay: half of each batch is drawn from them (P. Ball and others,
 Efficient online reinforcement learning with offline data, ICML 2023). The critics learn on them
-alone first, while the clone waits; so they know what driving is worth before they change it.
+alone first, while the clone waits; so they know what driving is worth before they change it. And
+each step of SAC is followed by one of cloning, so that what was shown is not forgotten.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import torch
+from torch import Tensor, nn
 from torch.nn import functional
 
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -38,7 +40,36 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["MixedReplay", "learn_by_trying"]
+__all__ = ["AnchoredSAC", "MixedReplay", "learn_by_trying"]
+
+# As in cloning: where the loss turns from a square into a straight line.
+_HUBER_BETA: Final = 0.1
+
+
+class AnchoredSAC(SAC):
+    """SAC that takes a step of cloning after each of its own, so that it forgets nobody's driving.
+
+    Attributes:
+        shown: Features and meant actions of the demonstrations, each (n, ...); None for none.
+        anchor: Takes the steps of cloning.
+    """
+
+    shown: tuple[Tensor, Tensor] | None = None
+    anchor: torch.optim.Optimizer | None = None
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """So many steps of both."""
+        super().train(gradient_steps, batch_size)
+        if self.shown is None or self.anchor is None:
+            return
+        seen, meant = self.shown
+        for _ in range(gradient_steps):
+            some = torch.randint(len(seen), (batch_size,))
+            acted = cast("Any", self.actor)(seen[some], deterministic=True)
+            loss = functional.smooth_l1_loss(acted, meant[some], beta=_HUBER_BETA)
+            self.anchor.zero_grad()
+            loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            self.anchor.step()  # pyright: ignore[reportUnknownMemberType]
 
 
 class MixedReplay(ReplayBuffer):
@@ -115,6 +146,7 @@ def learn_by_trying(
         model = to_sb3(
             first,
             made,
+            learner=AnchoredSAC,
             seed=seed % 2**31,
             learning_rate=settings.learning_rate,
             batch_size=settings.batch_size,
@@ -128,6 +160,7 @@ def learn_by_trying(
         replay = _as_replay(shown, first, model)
         cast("Any", model.replay_buffer).demonstrations = replay
         _teach_critics(model, replay, settings)
+        _drop_anchor(model, shown, first, settings)
         watcher = _Watcher(env, settings, first, tried, only_last, on_evaluation, on_steps)
         cast("Any", model).learn(tried, callback=watcher)
         policy = from_sb3(model, first)
@@ -175,6 +208,17 @@ def _teach_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) -> N
         loss.backward()  # pyright: ignore[reportUnknownMemberType]
         learner.critic.optimizer.step()
         polyak_update(learner.critic.parameters(), learner.critic_target.parameters(), learner.tau)
+
+
+def _drop_anchor(
+    model: SAC, shown: Demonstrated, policy: CameraPolicy, settings: SacSettings
+) -> None:
+    """Let it go on cloning what was shown, as far as the settings ask for that."""
+    if not settings.anchor_rate or not isinstance(model, AnchoredSAC):
+        return
+    model.shown = torch.as_tensor(policy.features(shown.pictures)), torch.as_tensor(shown.actions)
+    hands = cast("nn.Linear", model.actor.mu)
+    model.anchor = torch.optim.Adam(hands.parameters(), lr=settings.anchor_rate)
 
 
 class _Watcher(BaseCallback):

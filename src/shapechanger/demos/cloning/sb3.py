@@ -74,7 +74,14 @@ class NormedReLU(nn.Module):
         return functional.relu(functional.layer_norm(x, x.shape[-1:]))
 
 
-def to_sb3(policy: CameraPolicy, env: gym.Env[Any, Any], *, seed: int = 0, **settings: Any) -> SAC:
+def to_sb3(
+    policy: CameraPolicy,
+    env: gym.Env[Any, Any],
+    *,
+    seed: int = 0,
+    learner: type[SAC] = SAC,
+    **settings: Any,
+) -> SAC:
     """A learner that begins by driving as the policy does.
 
     Its deterministic action is the policy's. Its critics do not know yet what is good: let them
@@ -86,6 +93,7 @@ def to_sb3(policy: CameraPolicy, env: gym.Env[Any, Any], *, seed: int = 0, **set
         env: Pictures in; steering and throttle, both in [-1, 1], out. It is wrapped, so that the
             learner sees features.
         seed: Seed of the learner.
+        learner: Its class.
         **settings: Of `stable_baselines3.SAC`, except for the shape of the actor.
 
     Raises:
@@ -105,7 +113,7 @@ def to_sb3(policy: CameraPolicy, env: gym.Env[Any, Any], *, seed: int = 0, **set
         **settings.pop("policy_kwargs", {}),
     }
     seen = SeenByPolicy(env, policy)
-    model = SAC("MlpPolicy", seen, seed=seed, policy_kwargs=kwargs, **settings)
+    model = learner("MlpPolicy", seen, seed=seed, policy_kwargs=kwargs, **settings)
     hands = cast("nn.Linear", model.actor.mu)
     hands.load_state_dict(policy.network.hands.state_dict())
     spread = cast("nn.Linear", model.actor.log_std)
