@@ -98,8 +98,24 @@ def test_a_suite_is_one_command(undisturbed: tuple[Path, _Counting, str]) -> Non
     lines = [line.strip() for line in said.splitlines()]
     header = next(i for i, line in enumerate(lines) if line.startswith("study"))
     assert lines[header].split() == (
-        "study scratch zero-shot fine-tuned scratch, min fine-tune, min "
-        "jumpstart total reward gain gain at the end".split()
+        [
+            "study",
+            "scratch",
+            "zero-shot",
+            "fine-tuned",
+            "scratch,",
+            "min",
+            "fine-tune,",
+            "min",
+            "jumpstart",
+            "total",
+            "reward",
+            "gain",
+            "gain",
+            "at",
+            "the",
+            "end",
+        ]
     )
     assert [line.split()[0] for line in lines[header + 1 : header + 7]] == _PAIRS
     for name in _PAIRS:
