@@ -45,9 +45,9 @@ class _Orders:
         self.state: GuardState | None = None
         self.refused = ""
 
-    def fileno(self) -> int:
-        """There is none, and nobody waits for it."""
-        return -1
+    def filenos(self) -> list[int]:
+        """There are none, and nobody waits for them."""
+        return []
 
     def orders(self) -> tuple[list[Order], list[str]]:
         """All orders that were given since the last call."""

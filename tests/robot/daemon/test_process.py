@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
+from shapechanger.robot.daemon.life import LIFE
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from tests.robot.daemon.plans import car_plan
@@ -26,6 +29,7 @@ class Started:
     guard: socket.socket
     heart: socket.socket
     port: int
+    life: int
 
     def ended(self) -> tuple[int, str]:
         """Its exit status and what it said."""
@@ -66,9 +70,12 @@ def started() -> Iterator[Started]:
     with os.fdopen(ready, "rb") as told:
         port = json.loads(told.readline())["port"]
     heart.settimeout(20.0)
-    yield Started(process, guard, heart, port)
+    said, (life,), _, _ = socket.recv_fds(guard, 16, 2)
+    assert said == LIFE
+    yield Started(process, guard, heart, port, life)
     for end in (guard, heart):
         end.close()
+    os.close(life)
     process.kill()
     process.wait()
     if process.stderr is not None:
@@ -86,6 +93,26 @@ def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> 
     assert status == 0
     assert "listens at 127.0.0.1" in said
     assert "is not announced: only this machine reaches 127.0.0.1" in said
+
+
+def test_its_life_is_over_when_it_is_killed(started: Started) -> None:
+    """It says nothing before, and ends by itself then."""
+    poll = select.poll()
+    poll.register(started.life, select.POLLIN)
+    assert poll.poll(50) == []
+    started.process.kill()
+    assert poll.poll(20_000) == [(started.life, select.POLLHUP)]
+
+
+def test_whoever_holds_its_life_holds_nothing_else(started: Started) -> None:
+    """A connection that the daemon closes is closed, though a thread has a copy of old files."""
+    with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
+        client.sendall(b"this is no request\r\n\r\n")
+        while client.recv(4096):  # Until its end.
+            pass
+    tasks = Path(f"/proc/{started.process.pid}/task")
+    held = {task.name: len(list((task / "fd").iterdir())) for task in tasks.iterdir()}
+    assert 1 in held.values()
 
 
 def test_it_ends_with_the_guard(started: Started) -> None:

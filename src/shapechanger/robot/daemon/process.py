@@ -24,6 +24,7 @@ from shapechanger.robot.daemon.discovery import Announcement
 from shapechanger.robot.daemon.frames import FrameChecks, FrameReader
 from shapechanger.robot.daemon.guard_port import GuardPort
 from shapechanger.robot.daemon.heartbeat import beat
+from shapechanger.robot.daemon.life import show_life
 from shapechanger.robot.daemon.log import start_log
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
@@ -187,6 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     serve_plan = read_plan_fd(asked.plan_fd)
     os.close(asked.plan_fd)
+    show_life(asked.guard_fd)
     log = start_log("daemon")
     try:
         plan = DaemonPlan.from_dict(serve_plan.daemon)

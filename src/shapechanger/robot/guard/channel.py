@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import socket
+import sys
 import time
 from typing import Protocol
 
@@ -15,6 +17,8 @@ __all__ = ["Channel", "DaemonChannel", "Heartbeat"]
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
 _MOST_ORDERS_A_ROUND = 1024
+_FD_BYTES = 4  # A descriptor in an ancillary message is an int of C.
+_DESCRIPTOR = socket.CMSG_SPACE(_FD_BYTES)
 
 
 class Channel(Protocol):
@@ -25,8 +29,8 @@ class Channel(Protocol):
         """Whether whoever gives the orders is gone."""
         ...
 
-    def fileno(self) -> int:
-        """The descriptor, to wait for."""
+    def filenos(self) -> list[int]:
+        """The descriptors to wait for."""
         ...
 
     def orders(self) -> tuple[list[Order], list[str]]:
@@ -49,6 +53,8 @@ class DaemonChannel:
         self._socket = socket.socket(fileno=fd)
         self._socket.setblocking(False)
         self._socket.set_inheritable(False)
+        self._life: int | None = None
+        self._dead = select.poll()
         self._lost = False
 
     @property
@@ -56,21 +62,27 @@ class DaemonChannel:
         """Whether the daemon is gone."""
         return self._lost
 
-    def fileno(self) -> int:
-        """The descriptor, to wait for."""
-        return self._socket.fileno()
+    def filenos(self) -> list[int]:
+        """The descriptors to wait for: the socket, and one that ends when the daemon dies."""
+        life = [] if self._life is None else [self._life]
+        return [self._socket.fileno(), *life]
 
     def orders(self) -> tuple[list[Order], list[str]]:
         """All orders that have arrived, and why others were none, in words."""
+        if self._life is not None and self._dead.poll(0):  # It never says anything.
+            self._lost = True
         orders: list[Order] = []
         malformed: list[str] = []
         for _ in range(_MOST_ORDERS_A_ROUND):
             try:
-                data, _, flags, _ = self._socket.recvmsg(MAX_DATAGRAM)
+                data, sent, flags, _ = self._socket.recvmsg(MAX_DATAGRAM, _DESCRIPTOR)
             except BlockingIOError:
                 break
             except ConnectionResetError:
-                data, flags = b"", 0
+                data, sent, flags = b"", [], 0
+            if sent:
+                self._watch(sent)
+                continue
             if not data:  # The end, or an empty datagram, which nobody sends.
                 self._lost = True
                 break
@@ -97,9 +109,25 @@ class DaemonChannel:
             return False
         return True
 
+    def _watch(self, sent: list[tuple[int, int, bytes]]) -> None:
+        """Take the descriptor that ends when the daemon dies; see `daemon.life`."""
+        kind = (socket.SOL_SOCKET, socket.SCM_RIGHTS)
+        for level, number, data in sent:
+            whole = len(data) - len(data) % _FD_BYTES
+            for at in range(0, whole if (level, number) == kind else 0, _FD_BYTES):
+                fd = int.from_bytes(data[at : at + _FD_BYTES], sys.byteorder)
+                if self._life is None:
+                    self._life = fd
+                    self._dead.register(fd, select.POLLIN)
+                else:  # One is enough, and nobody sends two.
+                    os.close(fd)
+
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
+        if self._life is not None:
+            os.close(self._life)
+            self._life = None
 
 
 class Heartbeat:

@@ -107,7 +107,7 @@ class Guard:
         while not self.ended:
             fds = [heartbeat.fileno()]
             if not self._daemon.lost:  # The end of a stream can be read for ever.
-                fds.append(self._daemon.fileno())
+                fds += self._daemon.filenos()
             has_something = self._clock.wait(fds, until_ns, _WAIT_S)
             heartbeat.beat()
             if heartbeat.lost:

@@ -1,0 +1,61 @@
+"""The guard's end of the daemon's socket: the daemon is gone when its socket ends, or its life."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from shapechanger.robot.guard.channel import DaemonChannel
+from shapechanger.robot.guard.wire import Order, encode
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[DaemonChannel, socket.socket]]:
+    """The guard's end and the daemon's."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    channel = DaemonChannel(ours.detach())
+    yield channel, theirs
+    channel.close()
+    theirs.close()
+
+
+def test_the_end_of_the_socket_is_the_end(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """What was said before it is heard."""
+    channel, daemon = ends
+    daemon.send(encode(Order(kind="halt")))
+    daemon.close()
+    assert [order.kind for order in channel.orders()[0]] == ["halt"]
+    assert channel.lost
+
+
+def test_the_end_of_its_life_is_the_end(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """Though the socket is still open; and it is waited for like the socket."""
+    channel, daemon = ends
+    watched, held = os.pipe()
+    assert len(channel.filenos()) == 1
+    socket.send_fds(daemon, [b"life"], [watched])
+    os.close(watched)
+    assert channel.orders() == ([], [])
+    assert not channel.lost
+    assert len(channel.filenos()) == 2
+    os.close(held)
+    assert channel.orders() == ([], [])
+    assert channel.lost
+
+
+def test_a_second_life_is_not_kept(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """Nobody sends two, and whoever did would fill the guard with descriptors."""
+    channel, daemon = ends
+    pipes = [os.pipe() for _ in range(2)]
+    for watched, _ in pipes:
+        socket.send_fds(daemon, [b"life"], [watched])
+        os.close(watched)
+    assert channel.orders() == ([], [])
+    with pytest.raises(BrokenPipeError):
+        os.write(pipes[1][1], b"x")
+    os.write(pipes[0][1], b"x")  # Somebody still reads the first one.
+    for _, held in pipes:
+        os.close(held)
