@@ -22,6 +22,7 @@ from shapechanger.transfer.sac import MixedReplay, learn_by_trying
 from shapechanger.transfer.settings import SacSettings, learner_settings
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, LANE, TINY_CLONING
+from tests.transfer.studies import BIG
 
 TINY_SAC = SacSettings(
     demonstrated_steps=60,
@@ -154,3 +155,11 @@ def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
             apart = policy.predict_many(shown["pictures"]) - shown["actions"]
         errors.append(float(np.abs(apart).mean()))
     assert errors[1] < 0.7 * errors[0]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
+    """Before anything is learned, with the name of the env."""
+    task = TransferTask(*(LANE, BIG)[::order])
+    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 has no demonstrator, and sac"):
+        make_plan(task, "sac", TINY_SAC, seeds=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NotRequired, Required, TypedDict, Unpack
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.transfer.cloning import Recording, clone_along
@@ -11,7 +12,17 @@ from shapechanger.transfer.evaluation import Evaluation
 from shapechanger.transfer.sac import learn_by_trying
 from shapechanger.transfer.settings import CloningSettings, SacSettings
 
-__all__ = ["learn_by_camera"]
+__all__ = ["Options", "learn_by_camera"]
+
+
+class Options(TypedDict):
+    """What `clone_along` and `learn_by_trying` both take by name."""
+
+    demonstrations: Required[Recording]
+    start: NotRequired[CameraPolicy | None]
+    only_last: NotRequired[bool]
+    on_evaluation: Required[Callable[[Evaluation], None]]
+    on_steps: NotRequired[Callable[[int], None]]
 
 
 def learn_by_camera(
@@ -19,34 +30,9 @@ def learn_by_camera(
     settings: CloningSettings | SacSettings,
     steps: int,
     seed: int,
-    *,
-    demonstrations: Recording,
-    start: CameraPolicy | None = None,
-    only_last: bool = False,
-    on_evaluation: Callable[[Evaluation], None],
-    on_steps: Callable[[int], None] = lambda steps: None,
+    **options: Unpack[Options],
 ) -> CameraPolicy:
     """Learn as the settings say; see `clone_along` and `learn_by_trying`."""
     if isinstance(settings, CloningSettings):
-        return clone_along(
-            env,
-            settings,
-            steps,
-            seed,
-            demonstrations=demonstrations,
-            start=start,
-            only_last=only_last,
-            on_evaluation=on_evaluation,
-            on_steps=on_steps,
-        )
-    return learn_by_trying(
-        env,
-        settings,
-        steps,
-        seed,
-        demonstrations=demonstrations,
-        start=start,
-        only_last=only_last,
-        on_evaluation=on_evaluation,
-        on_steps=on_steps,
-    )
+        return clone_along(env, settings, steps, seed, **options)
+    return learn_by_trying(env, settings, steps, seed, **options)

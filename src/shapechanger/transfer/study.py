@@ -22,7 +22,7 @@ from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
 from shapechanger.transfer.runs import RunResult, finished, perform
-from shapechanger.transfer.settings import CloningSettings, Settings
+from shapechanger.transfer.settings import CloningSettings, LearnerSettings, Settings
 from shapechanger.transfer.training import require_budget
 
 __all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "holds", "make_plan", "run_study", "unfinished"]
@@ -102,11 +102,13 @@ def make_plan(
     Raises:
         UnknownName: If an env, an arm or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        StudyError: If the budget or the number of seeds is too small, or the policy that was
-            brought along did not learn as the learner does.
+        StudyError: If the budget or the number of seeds is too small, the policy that was brought
+            along did not learn as the learner does, or nobody shows what the learner is to learn.
         CorruptStudy: If the file of that policy is missing, or holds none.
         SpaceMismatch: If that policy belongs to another body.
     """
+    if not isinstance(settings, LearnerSettings):
+        _require_demonstrators(task, learner)
     budget = settings.whole_updates(settings.steps if steps is None else steps)
     require_budget(settings.steps if steps is None else steps, settings)
     source_budget = settings.whole_updates(budget // 2 if source_steps is None else source_steps)
@@ -261,6 +263,24 @@ def _body_map(
     if map_text:
         return BodyMap.from_toml(map_text, *layouts)
     return BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
+
+
+def _require_demonstrators(task: TransferTask, learner: str) -> None:
+    """Refuse envs in which nobody shows how, for a learner that begins with that.
+
+    Raises:
+        StudyError: If one is such.
+    """
+    for env in (task.source, task.target):
+        made = env.make()
+        try:
+            shows = hasattr(made.unwrapped, "demonstrator")
+        finally:
+            made.close()
+        if not shows:
+            raise StudyError(
+                f"{env} has no demonstrator, and {learner} learns from one: give another --learner."
+            )
 
 
 def _shift(task: TransferTask) -> str:

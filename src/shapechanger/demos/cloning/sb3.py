@@ -66,7 +66,7 @@ class NormedReLU(nn.Module):
     """A ReLU of numbers that are freed of their mean and spread first.
 
     Critics with it do not think ever better of actions that nobody has tried: P. Ball and others,
-    Efficient online reinforcement learning with offline data, ICML 2023, section 3.2.
+    Efficient online reinforcement learning with offline data, ICML 2023.
     """
 
     def forward(self, x: Tensor) -> Tensor:
