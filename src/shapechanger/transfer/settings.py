@@ -221,8 +221,8 @@ LEARNERS: Final[dict[str, Settings]] = {
         clone=CloneSettings(held_out=0.0),
     ),
     # A minute of demonstrations, and nine of trying. Chosen on the tank that begins with the car's
-    # clone (seed 100, up to 8,400 steps): without an anchor, or ten times as fast, it was soon worse
-    # than the clone; with settings near to these it stayed about as good, and no better.
+    # clone (seed 100, up to 8,400 steps): without an anchor, or ten times as fast, it was soon
+    # worse than the clone; with settings near to these it stayed about as good, and no better.
     "sac": SacSettings(
         demonstrated_steps=1200,
         steps=12_000,

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.daemon.life import LIFE
+from shapechanger.robot.daemon.life import LIFE, show_life
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from tests.robot.daemon.plans import car_plan
@@ -113,6 +113,14 @@ def test_whoever_holds_its_life_holds_nothing_else(started: Started) -> None:
     tasks = Path(f"/proc/{started.process.pid}/task")
     held = {task.name: len(list((task / "fd").iterdir())) for task in tasks.iterdir()}
     assert 1 in held.values()
+
+
+def test_a_guard_that_is_gone_before_is_no_crash() -> None:
+    """Whoever reads its socket says so in words."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.close()
+    with theirs:
+        assert show_life(theirs.fileno())
 
 
 def test_it_ends_with_the_guard(started: Started) -> None:
