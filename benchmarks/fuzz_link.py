@@ -22,13 +22,20 @@ from shapechanger.link.messages import (
     VERSION,
     Acknowledge,
     Arm,
+    Browse,
     Command,
     Disarm,
     EmergencyStop,
+    Fetch,
     Hello,
+    Judge,
+    Mark,
     Ping,
+    Record,
     Release,
+    Suggest,
     Take,
+    Undo,
     encode,
 )
 from shapechanger.robot.daemon.cockpit import Cockpit
@@ -58,6 +65,13 @@ SEEDS = [
         Disarm(),
         EmergencyStop(reason="fuzz"),
         Ping(token=3),
+        Suggest(seq=1, answers=1, values=(0.25, 0.5)),
+        Record(on=True, name="corridor"),
+        Mark(text="a corner"),
+        Undo(seconds=5.0),
+        Browse(before="20260101T000000Z-0001"),
+        Fetch(episode="20260101T000000Z-0001", first=1, count=20),
+        Judge(episode="20260101T000000Z-0001", first=1, last=20),
     )
 ]
 

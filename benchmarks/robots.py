@@ -22,9 +22,9 @@ import numpy as np
 
 from benchmarks.echo import EchoRobot
 from benchmarks.row import Row
-from shapechanger.cli.robot.running import RunningRobot, run_robot
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.running import RunningRobot, run_robot
 from tests.robots import CAR
 
 __all__ = ["fuzz", "hold", "link"]

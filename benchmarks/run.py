@@ -25,6 +25,14 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import (
+    cloning_real,
+    console,
+    corrections,
+    finger_gap,
+    finger_identify,
+    finger_learned,
+    finger_oracle,
+    finger_speed,
     robot_faults,
     robots,
     speed,
@@ -127,7 +135,17 @@ def demo() -> list[Row]:
 
 SUITES: dict[str, Callable[[], list[Row]]] = {
     "bodies": bodies,
+    "cloning-real": cloning_real.real,
+    "console": console.console,
+    "corrections": corrections.corrections,
     "demo": demo,
+    "finger-gap": finger_gap.gap,
+    "finger-rig": finger_gap.rig,
+    "finger-oracle": finger_oracle.oracle,
+    "finger-speed": finger_speed.against_myosuite,
+    "finger-learned": finger_learned.learned,
+    "finger-identify": finger_identify.identified,
+    "finger-identify-arms": finger_identify.with_arms,
     "speed": speed.single,
     "speed-vector": speed_vector.vector,
     "robot-link": robots.link,
@@ -146,8 +164,16 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 
 def _asked() -> str:
     """What was asked for besides, as a shell takes it."""
-    names = ("TRIALS", "LAYOUTS", "SEEDS", "LP_NUM_THREADS")
+    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "VEHICLE", "LP_NUM_THREADS")
     return "".join(f"{name}={os.environ[name]} " for name in names if name in os.environ)
+
+
+def _processor() -> str:
+    """The name of the processor, as the system tells it; else its kind."""
+    facts = Path("/proc/cpuinfo")
+    lines = facts.read_text().splitlines() if facts.exists() else []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
 
 
 def main() -> None:
@@ -161,7 +187,7 @@ def main() -> None:
         RESULTS.mkdir(exist_ok=True)
         facts = {
             "command": f"{_asked()}python -m benchmarks.run {name}",
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "machine": f"{platform.system()}, {os.cpu_count()} cores of {_processor()}",
             "python": platform.python_version(),
             "versions": {
                 package: version(package)

@@ -128,7 +128,7 @@ def _search_row() -> Row:
         watch = twins.ModelWatch(inner.model)
         for _ in range(15):
             twins.forget()
-            times.append(1e3 * _cpu_s(lambda: twins.find_twin(watch, lambda: _spec(inner))))
+            times.append(1e3 * _cpu_s(lambda: twins.find_twin(watch, inner.body_spec)))
     times.sort()
     return Row(
         "finding the fast model of Ant, once a body, CPU time",
@@ -137,10 +137,6 @@ def _search_row() -> Row:
         "none",
         True,
     )
-
-
-def _spec(env: Any) -> Any:
-    return env.family.load(env.fullpath)
 
 
 def _frame_rows() -> list[Row]:

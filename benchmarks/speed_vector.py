@@ -22,9 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shapechanger
+from benchmarks.peer import Peer
 from benchmarks.row import Row
+from shapechanger.envs.stepping.twin import find_twin
+from shapechanger.envs.stepping.watch import ModelWatch
 
-ROUNDS = 15
+ROUNDS = 31
 STEPS = 8
 WARM_UP = 150
 # An interpreter that has EnvPool, if it is not this one.
@@ -82,9 +85,11 @@ def _paired(
     return sorted(ratios)
 
 
-def _row(name: str, ratios: list[float], target: float) -> Row:
+def _row(name: str, ratios: list[float], target: float | None) -> Row:
     middle = statistics.median(ratios)
     spread = f"{ratios[0]:.2f} to {ratios[-1]:.2f} in {len(ratios)} rounds"
+    if target is None:
+        return Row(name, f"{middle:.2f}x", spread, "none", True)
     return Row(name, f"{middle:.2f}x", spread, f">= {target:g}x", middle >= target)
 
 
@@ -92,10 +97,16 @@ def _missing(name: str, why: str, target: float) -> Row:
     return Row(name, "not measured", why, f">= {target:g}x", False)
 
 
-def against_physics(num_envs: int) -> Row:
-    """CPU time of `mj_step(nstep=5)` alone, called from Python, over that of a step of ours."""
+def against_physics(num_envs: int, *, fast: bool = False) -> Row:
+    """CPU time of `mj_step(nstep=5)` alone, called from Python, over that of a step of ours.
+
+    With `fast` the loop steps the fast model too: what is left to save beside the physics.
+    """
     fleet = _Fleet(num_envs)
     model = gym.make("Ant-v5").unwrapped.model
+    if fast:
+        one: Any = fleet.envs.envs[0].unwrapped
+        model = find_twin(ModelWatch(one.model), one.body_spec)
     bare = [(model, mujoco.MjData(model)) for _ in range(num_envs)]
     controls: list[Any] = [data.ctrl for _, data in bare]
     actions = fleet.actions(STEPS)
@@ -120,8 +131,12 @@ def against_physics(num_envs: int) -> Row:
         actions = fleet.actions(STEPS)
         ratios.append(physics() / ours())
     fleet.envs.close()
-    name = f"Ant, N={num_envs}, 1 thread: mj_step loop (from Python) over ours, CPU"
-    return _row(name, sorted(ratios), 1.08)
+    which = "mj_step loop on the fast model" if fast else "mj_step loop (from Python)"
+    return _row(
+        f"Ant, N={num_envs}, 1 thread: {which} over ours, CPU",
+        sorted(ratios),
+        None if fast else 1.08,
+    )
 
 
 def against_sync(num_envs: int) -> Row:
@@ -144,52 +159,18 @@ def against_sync(num_envs: int) -> Row:
     return _row(name, sorted(ratios), 1.75)
 
 
-class _Peer:
+def _peer(kind: str, num_envs: int, threads: int) -> Peer:
     """A vector env in another process."""
-
-    def __init__(self, kind: str, num_envs: int, threads: int) -> None:
-        python = ENVPOOL_PYTHON if kind == "envpool" else sys.executable
-        self._process = subprocess.Popen(
-            [python, str(PEER), kind, str(num_envs), str(threads)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def ready(self) -> str:
-        """Its version, once it is under way; raise what it said if it does not start."""
-        assert self._process.stdout is not None
-        assert self._process.stderr is not None
-        said = self._process.stdout.readline().split()
-        if said[:1] != ["ready"]:
-            lines = self._process.stderr.read().strip().splitlines()
-            raise RuntimeError(lines[-1] if lines else "it ended without a word")
-        return said[1]
-
-    def begin(self, steps: int) -> None:
-        """Let it step."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{steps}\n")
-        self._process.stdin.flush()
-
-    def seconds(self) -> float:
-        """How long that took."""
-        assert self._process.stdout is not None
-        return float(self._process.stdout.readline())
-
-    def close(self) -> None:
-        """End it."""
-        self._process.kill()
-        self._process.communicate()
+    python = ENVPOOL_PYTHON if kind == "envpool" else sys.executable
+    return Peer([python, str(PEER), kind, str(num_envs), str(threads)])
 
 
 def against_envpool() -> Row:
     """Wall-clock time of EnvPool over ours, two threads each."""
     name = "Ant, N=128, 2 threads: EnvPool over ours, wall clock"
-    peer = _Peer("envpool", 128, 2)
+    peer = _peer("envpool", 128, 2)
     try:
-        made_by = peer.ready()
+        made_by, *_ = peer.ready()
     except RuntimeError as error:
         peer.close()
         return _missing(name, f"EnvPool does not start: {error}", 1.2)
@@ -211,7 +192,7 @@ def against_envpool() -> Row:
 
 def against_processes() -> Row:
     """Wall-clock time of two processes of 64 envs and one thread, over 128 envs and two threads."""
-    peers = [_Peer("ours", 64, 1) for _ in range(2)]
+    peers = [_peer("ours", 64, 1) for _ in range(2)]
     for peer in peers:
         peer.ready()
     fleet = _Fleet(128, threads=2)
@@ -251,6 +232,8 @@ def vector() -> list[Row]:
     return [
         against_physics(32),
         against_physics(128),
+        against_physics(32, fast=True),
+        against_physics(128, fast=True),
         against_sync(32),
         against_sync(128),
         against_envpool(),

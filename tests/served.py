@@ -6,13 +6,13 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from shapechanger.cli.robot.running import RunningRobot
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
 from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.operator import Operator
 from shapechanger.twin.oracle import propelled
+from shapechanger.twin.running import RunningRobot
 from shapechanger.twin.wiring import Wiring
 from tests.twin.robots import until
 

@@ -43,6 +43,8 @@ def _names(text: str) -> frozenset[str]:
 _RULES = {
     # The words that both sides share, on a workstation and on a Pi.
     "errors": _Rule(_names("layout link"), _names("numpy msgspec")),
+    # Pages of reports, whatever they report.
+    "pages": _Rule(_names("errors"), _names("numpy matplotlib")),
     # Which OpenGL draws here.
     "headless": _Rule(_names("errors")),
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
@@ -57,28 +59,37 @@ _RULES = {
     ),
     # Rewards and endings: no model file.
     "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
-    # Only the envs join bodies and tasks. A vehicle's env is its whole robot in one process.
+    # Only the envs join bodies and tasks. A vehicle's env is its whole robot in one process, and a
+    # finger's tells what the finger is like.
     "envs": _Rule(
         _names("errors layout headless morphology embodiments tasks")
-        | _names("link robot remote twin worlds"),
+        | _names("link robot remote twin worlds identify"),
         never=_HARDWARE | {"torch"},
     ),
     # Transfer cannot tell a simulator from a car. It writes our version into what it leaves behind,
     # and cloning is one of its learners.
-    "transfer": _Rule(_names("errors layout demos shapechanger"), never=_HARDWARE | _SIMULATORS),
+    "transfer": _Rule(
+        _names("errors layout demos pages shapechanger"), never=_HARDWARE | _SIMULATORS
+    ),
     # The exam for anybody's env, simulated or real.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
     # The robot's side: of `demos` it knows the writer of episodes, which needs nothing.
     "robot": _Rule(_names("errors layout link demos"), never=_HEAVY | {"gymnasium"}),
     "remote": _Rule(_names("errors layout link tasks"), never=_HEAVY),
-    "twin": _Rule(_names("errors layout link robot morphology embodiments tasks worlds")),
+    # One that is served is reached as every robot is.
+    "twin": _Rule(_names("errors layout link robot remote morphology embodiments tasks worlds")),
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
     "demos": _Rule(_names("errors layout"), never=_HARDWARE | _SIMULATORS | {"socket"}),
     # It composes what must not know each other, and nobody imports it.
     "cli": _Rule(
         _names("errors layout link morphology embodiments tasks envs transfer robot remote twin")
-        | _names("teleop demos testing shapechanger headless worlds")
+        | _names("teleop demos pages testing shapechanger headless worlds identify")
+    ),
+    # What a finger is like, from a log; whoever has written it.
+    "identify": _Rule(
+        _names("errors layout morphology embodiments tasks pages"),
+        _names("mujoco scipy numpy msgspec"),
     ),
     # The package itself registers the ids.
     "shapechanger": _Rule(_names("errors layout envs"), _names("gymnasium numpy msgspec")),

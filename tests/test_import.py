@@ -9,7 +9,7 @@ import gymnasium as gym
 import pytest
 
 from shapechanger.envs import CATALOGUE, register_all
-from shapechanger.envs.catalogue import REMOTE_VEHICLE, VEHICLE_ENVS
+from shapechanger.envs.catalogue import FINGER_ENVS, REMOTE_FINGER, REMOTE_VEHICLE, VEHICLE_ENVS
 
 _IDS = (
     "shapechanger/InvertedPendulum-v1",
@@ -32,6 +32,8 @@ _VEHICLES = (
     "shapechanger/Truck-v1",
     "shapechanger/Boat-v1",
 )
+
+_FINGERS = ("shapechanger/Finger-v1", "shapechanger/FingerTrack-v1")
 
 # Every import of a blocked package fails, as where it is not installed.
 _BLOCK = """
@@ -74,15 +76,16 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     )
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
-    assert tuple(ids.split()) == (*_IDS, *_VEHICLES, REMOTE_VEHICLE)
-    assert tuple(VEHICLE_ENVS) == _VEHICLES
+    assert tuple(ids.split()) == (*_IDS, *_VEHICLES, *_FINGERS, REMOTE_FINGER, REMOTE_VEHICLE)
+    assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 
 def test_without_the_simulator_the_message_says_what_to_install() -> None:
     """A user who installed the bare package is one command away."""
-    said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_IDS)).splitlines()
+    plain = (*_IDS, *_FINGERS)
+    said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=plain)).splitlines()
     sentence = "This needs mujoco, which is not installed: run `pip install 'shapechanger[sim]'`."
-    assert said == [sentence] * len(_IDS)
+    assert said == [sentence] * len(plain)
 
 
 def test_without_the_simulator_a_vehicle_says_what_to_install() -> None:

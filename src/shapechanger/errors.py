@@ -10,12 +10,16 @@ ShapechangerError
 ├── SpaceMismatch (ValueError)      two spaces that differ where they must not
 ├── BadAction (ValueError)          an action that an env cannot take
 ├── VectorEnvError (ValueError)     a vector env that cannot be made as it was asked for
+├── FingerError (ValueError)        a finger that cannot be built, or not move as asked
 ├── WorldError (ValueError)         a world that cannot be laid out as it was asked for
+├── PathError (ValueError)          a path for a fingertip that cannot be made as it was asked for
 ├── MapError (ValueError)           a body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    a policy whose weights cannot be moved
 ├── StudyError (ValueError)         a study that cannot start
 │   ├── ForeignStudy                the output folder belongs to something else
 │   └── CorruptStudy                a file of the study cannot be read
+├── DemosError (ValueError)         demonstrations that cannot be recorded, read or learned from
+│   └── BrokenEpisode               an episode that is not whole, and the command that repairs it
 ├── LinkError (ConnectionError)     a robot that cannot be reached, or does not understand
 │   ├── RobotRefused                the robot says no, and why
 │   └── StaleObservation            the newest observation is too old to act on
@@ -38,9 +42,12 @@ from typing import Final
 
 __all__ = [
     "BadAction",
+    "BrokenEpisode",
     "BrokenModel",
     "CorruptStudy",
+    "DemosError",
     "EmptyShift",
+    "FingerError",
     "ForeignStudy",
     "LayoutError",
     "LinkError",
@@ -48,6 +55,7 @@ __all__ = [
     "MissingExtra",
     "MorphologyError",
     "OutputError",
+    "PathError",
     "ProfileError",
     "RenderError",
     "RobotError",
@@ -120,8 +128,16 @@ class VectorEnvError(ShapechangerError, ValueError):
     """A vector env that cannot be made, or reset, as it was asked for."""
 
 
+class FingerError(ShapechangerError, ValueError):
+    """A finger that cannot be built as it was asked for, or cannot do what it should."""
+
+
 class WorldError(ShapechangerError, ValueError):
     """A world to drive in that cannot be laid out as it was asked for."""
+
+
+class PathError(ShapechangerError, ValueError):
+    """A path for a fingertip that cannot be made, or read, as it was asked for."""
 
 
 class MapError(ShapechangerError, ValueError):
@@ -142,6 +158,14 @@ class ForeignStudy(StudyError):
 
 class CorruptStudy(StudyError):
     """A file of the study cannot be read."""
+
+
+class DemosError(ShapechangerError, ValueError):
+    """Demonstrations that cannot be recorded, read or learned from."""
+
+
+class BrokenEpisode(DemosError):
+    """An episode that is not whole."""
 
 
 class LinkError(ShapechangerError, ConnectionError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shapechanger.cli.robot.running import run_robot
+from shapechanger.twin.running import run_robot
 from shapechanger.twin.wiring import Wiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving

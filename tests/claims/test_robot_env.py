@@ -11,11 +11,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.cli.robot.running import RunningRobot, run_robot
 from shapechanger.errors import LinkError
 from shapechanger.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.running import RunningRobot, run_robot
 from shapechanger.twin.wiring import WiredOutput, Wiring
 from tests.robot.profile.texts import HOVERCRAFT
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
@@ -168,7 +168,7 @@ def test_without_sensors_the_reward_is_absent(
     env.close()
 
 
-@pytest.mark.parametrize(("name", "actions"), [("cat", 12), ("finger", 7)])
+@pytest.mark.parametrize(("name", "actions"), [("cat", 12), ("finger-pwm", 7)])
 def test_bodies_that_do_not_drive(
     serve: Callable[[Profile], RunningRobot], name: str, actions: int
 ) -> None:

@@ -31,13 +31,18 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
 def test_the_robot_stops(trial: Trial, name: str) -> None:
     """In time, and never drives without a fresh command of the one who may."""
     fault = FAULTS[name]
-    for _ in range(TRIALS):
+    drove = 0
+    # A robot that a busy machine had stopped before the fault says nothing of the fault.
+    for _ in range(2 * TRIALS):
         result = trial.run(fault)
-        assert result.drove
+        drove += result.drove
         assert result.stopped_ms <= TOLERANCE * result.limit_ms, result
         # Beyond the deadline of the last command an output may be as late as a stop may.
         late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
         assert sum(late_ms) <= (TOLERANCE - 1.0) * fault.within_ms, result
+        if drove == TRIALS:
+            break
+    assert drove == TRIALS
 
 
 def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.cli.robot.running import run_robot
 from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.twin.operator import Whereabouts
+from shapechanger.twin.running import run_robot
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.simulation import MujocoWorld
 from tests.robots import write_profile

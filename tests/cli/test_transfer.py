@@ -215,6 +215,13 @@ def test_play_makes_a_film_where_there_is_no_screen(
         (["transfer", "Ant", "ExtendedAnt", "--rule", "toot_1/motor=zero"], "Did you mean"),
         (["transfer", "Ant", "ExtendedAnt", "--map", "none.toml"], "cannot be read"),
         (["transfer", "Ant", "BigAnt", "--workers", "0"], "at least one worker"),
+        (["transfer", "Ant", "BigAnt", "--arms", "scratch", "identified"], "does not tell how"),
+        (["transfer", "Finger", "Finger", "--target-options", "{"], "no JSON"),
+        (["transfer", "Finger", "Finger", "--target-options", '{"gab": 1}'], "argument 'gab'"),
+        (
+            ["transfer", "Finger", "RemoteFinger", "--target-options", '{"twin": "rael"}'],
+            "real-like",
+        ),
         (["play", "Ant", "--policy", "none.zip"], "There is no policy file none.zip"),
         (["play", "Ant", "--episodes", "0"], "at least one episode"),
         (["play", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),

@@ -14,7 +14,7 @@ import pytest
 from stable_baselines3.common.env_checker import check_env
 
 from shapechanger.envs import CATALOGUE
-from shapechanger.envs.catalogue import VEHICLE_ENVS
+from shapechanger.envs.catalogue import FINGER_ENVS, VEHICLE_ENVS
 from shapechanger.testing import PROMISES, MakeEnv, examine
 
 # Bodies that no id names, and arguments that change a space, keep the same promises.
@@ -40,7 +40,19 @@ _BLIND: dict[str, MakeEnv] = {
     env_id: partial(gym.make, env_id, image=False, world="corridor" if vehicle == "truck" else None)
     for env_id, (vehicle, _) in VEHICLE_ENVS.items()
 }
-_ALL = _MAKERS | _VARIANTS | _BLIND
+_FINGER, _TRACK = FINGER_ENVS
+_FINGERS: dict[str, MakeEnv] = {
+    **{env_id: partial(gym.make, env_id) for env_id in FINGER_ENVS},
+    "finger by tensions": partial(gym.make, _FINGER, actions="tension"),
+    "finger by lengths": partial(gym.make, _FINGER, actions="length"),
+    "finger with goals": partial(gym.make, _FINGER, goal=True),
+    "a real-like finger": partial(gym.make, _FINGER, gap="real-like", finger_seed=3),
+    "another finger each time": partial(gym.make, _FINGER, gap="wide"),
+    "a finger with parameters": partial(gym.make, _FINGER, parameters={"tendon_friction": 1.0}),
+    "another path each time": partial(gym.make, _TRACK, path="random"),
+    "an eight": partial(gym.make, _TRACK, path={"kind": "figure-eight", "hz": 0.25}),
+}
+_ALL = _MAKERS | _VARIANTS | _BLIND | _FINGERS
 _SMALL = (32, 24)
 _SEEING: dict[str, MakeEnv] = {
     **{env_id: partial(gym.make, env_id, size=_SMALL) for env_id in VEHICLE_ENVS},

@@ -53,7 +53,7 @@ from tests.morphology.models import (
 )
 
 # The same examples every time, so that a failure can be looked at twice.
-law = settings(derandomize=True, deadline=None, max_examples=30)
+law = settings(max_examples=30)
 
 FACTORS = st.floats(0.1, 10.0)
 RATIOS = st.floats(0.01, 100.0)

@@ -7,21 +7,32 @@ from hypothesis import strategies as st
 from shapechanger.link.messages import (
     Acknowledge,
     Arm,
+    Browse,
     Challenge,
     ClientMessage,
     Command,
     Disarm,
     EmergencyStop,
+    EpisodeSummary,
     Event,
+    Fetch,
     Hello,
+    Judge,
     Lease,
+    Mark,
     Observation,
+    Piece,
     Ping,
     Pong,
+    Record,
+    RecorderState,
+    Recordings,
     Refused,
     Release,
     RobotMessage,
+    Suggest,
     Take,
+    Undo,
     Welcome,
 )
 
@@ -30,6 +41,18 @@ _counts = st.integers(0, 2**53)
 _times = st.integers(-(2**63), 2**63 - 1)
 _numbers = st.floats(allow_nan=False)
 _vectors = st.lists(_numbers, max_size=8).map(tuple)
+_episodes = st.from_regex(r"^[0-9A-Za-z][0-9A-Za-z._-]{0,30}\Z")
+_summaries = st.builds(
+    EpisodeSummary,
+    id=_episodes,
+    steps=_counts,
+    kept=_counts,
+    seconds=_numbers,
+    closed=st.booleans(),
+    created=_texts,
+    driver=_texts,
+    outcome=_texts,
+)
 
 client_messages: st.SearchStrategy[ClientMessage] = st.one_of(
     st.builds(
@@ -56,6 +79,13 @@ client_messages: st.SearchStrategy[ClientMessage] = st.one_of(
     st.builds(Disarm),
     st.builds(EmergencyStop, reason=_texts),
     st.builds(Ping, token=_counts),
+    st.builds(Suggest, seq=_counts, answers=_counts, values=_vectors),
+    st.builds(Record, on=st.booleans(), name=_texts),
+    st.builds(Mark, text=_texts),
+    st.builds(Undo, seconds=st.floats(0.0, 3_600.0, exclude_min=True)),
+    st.builds(Browse, before=st.just("") | _episodes),
+    st.builds(Fetch, episode=_episodes, first=_counts, count=st.integers(1, 100_000)),
+    st.builds(Judge, episode=_episodes, first=_counts, last=_counts, keep=st.booleans()),
 )
 
 robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
@@ -75,6 +105,7 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
         arming=st.sampled_from(("person", "anyone")),
         clock=st.sampled_from(("real", "twin")),
         session=_counts,
+        can_record=st.booleans(),
     ),
     st.builds(Refused, reason=_texts, seq=st.none() | _counts, fatal=st.booleans()),
     st.builds(
@@ -97,6 +128,30 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
         emergencies=_counts,
         holder=_texts,
         mine=st.booleans(),
+        holder_role=st.sampled_from(("", "person", "program")),
+        commanded=_vectors,
+        suggested=_vectors,
+        suggested_by=_texts,
+    ),
+    st.builds(
+        RecorderState,
+        episode=st.just("") | _episodes,
+        recording=st.booleans(),
+        steps=_counts,
+        dropped=_counts,
+        seconds=_numbers,
+        marks=_counts,
+        text=_texts,
+    ),
+    st.builds(Recordings, episodes=st.lists(_summaries, max_size=3).map(tuple), more=st.booleans()),
+    st.builds(
+        Piece,
+        episode=_episodes,
+        first=_counts,
+        total=_counts,
+        lines=st.lists(_texts, max_size=3).map(tuple),
+        frames=st.lists(st.none() | st.binary(max_size=99), max_size=3).map(tuple),
+        header=_texts,
     ),
     st.builds(Lease, mine=st.booleans(), holder=_texts, reason=_texts),
     st.builds(Event, name=_texts, text=_texts, at_ns=_times),

@@ -12,11 +12,11 @@ from typing import Final
 
 import pytest
 
-from shapechanger.cli.robot.running import RunningRobot, run_robot
 from shapechanger.cli.robot.trial.driver import Driver
 from shapechanger.remote.known import KnownRobot
 from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.oracle import propelled
+from shapechanger.twin.running import RunningRobot, run_robot
 from shapechanger.twin.wiring import Wiring
 from tests.drawing import missing
 from tests.robots import IN_A_ROOM, write_profile

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from shapechanger.transfer.evaluation import evaluate, random_actions
@@ -65,3 +66,33 @@ def test_random_actions_come_from_the_seed() -> None:
     assert not np.array_equal(first, random_actions(Countdown().action_space, 2)(observations))
     assert first.shape == (4, 1)
     assert np.abs(first).max() <= 1.0
+
+
+def test_one_env_plays_several_episodes() -> None:
+    """Of a robot there is but one: it plays one after another, each from a seed of its own."""
+    result = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 3, 7, episodes=3)
+    many = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown() for _ in range(3)], 3, 7)
+    assert result == many
+    assert result.mean_length == 4.0
+
+
+class Succeeding(Countdown):
+    """An episode that says at each step whether it has succeeded, or nothing at all."""
+
+    def __init__(self, said: list[bool]) -> None:
+        self.said = said
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        """Say the next."""
+        said = {"is_success": self.said.pop(0)} if self.said else {}
+        return np.zeros(1), 0.0, not self.said, False, said
+
+
+def test_success_is_the_last_that_was_said() -> None:
+    """Of each episode; an env that says nothing has none."""
+    assert evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 1).success is None
+    envs = [Succeeding(said) for said in ([False, True], [True, False], [True], [])]
+    result = evaluate(lambda o: np.zeros((len(o), 1)), envs, 1)
+    assert result.success == pytest.approx(2 / 3)

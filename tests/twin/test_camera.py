@@ -132,9 +132,9 @@ def test_it_is_fast(tmp_path: Path) -> None:
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     path = str(tmp_path / "none")
     camera = FrontCameraPipe(path, 20.0, 80, latest_only=True, start_ns=0, seed=0)
-    start = time.perf_counter()
+    start = time.process_time()
     sizes = [len(camera.draw(world, i)) for i in range(50)]
-    assert time.perf_counter() - start < 0.5
+    assert time.process_time() - start < 0.5
     assert np.mean(sizes) < 8000
 
 

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import gymnasium as gym
 
-from shapechanger.envs.catalogue import CATALOGUE, VEHICLE_ENVS, find, find_vehicle
+from shapechanger.envs.catalogue import (
+    CATALOGUE,
+    FINGER_ENVS,
+    REMOTE_FINGER,
+    VEHICLE_ENVS,
+    find,
+    find_task,
+)
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.headless import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "require_seed"]
+__all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "options_of", "require_seed"]
 
 # The largest that PyTorch and NumPy both take.
 _LARGEST_SEED: Final = 2**32 - 1
@@ -32,11 +40,11 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
         RenderError: If `MUJOCO_GL` keeps every env from being made.
     """
     require_known_gl()
-    vehicle = find_vehicle(env_id)
-    if vehicle and not body:
-        return EnvRef(vehicle)
+    task = find_task(env_id)
+    if task and not body:
+        return EnvRef(task)
     try:
-        full = vehicle or find(env_id).id
+        full = task or find(env_id).id
     except UnknownName:
         # Envs of others count too, as `module:id` or once registered; `make` looks again.
         if not _has_module(env_id) and env_id not in gym.registry:
@@ -51,7 +59,9 @@ def default_learner(env: EnvRef) -> str:
     """The learner that was tuned on the env's family; that of the ant for any other."""
     if env.id in VEHICLE_ENVS:
         return "cloning"
-    entry = CATALOGUE.get(env.id)
+    if env.id == REMOTE_FINGER:
+        return "ppo-rig"
+    entry = CATALOGUE.get(env.id) or FINGER_ENVS.get(env.id)
     return entry.learner if entry else "ppo-run"
 
 
@@ -100,6 +110,27 @@ def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
         yield made
     finally:
         made.close()
+
+
+def options_of(given: str, flag: str) -> dict[str, Any]:
+    """More arguments of an env, as a user types them.
+
+    Args:
+        given: A JSON object; empty for none.
+        flag: The option of the command.
+
+    Raises:
+        StudyError: If it is no JSON object.
+    """
+    if not given:
+        return {}
+    try:
+        options = json.loads(given)
+    except ValueError as error:
+        raise StudyError(f"{flag} are no JSON ({error}), but {given!r}.") from None
+    if not isinstance(options, dict):
+        raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
+    return cast("dict[str, Any]", options)
 
 
 def require_seed(seed: int) -> None:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import asked, env_ref, opened
-from shapechanger.envs.catalogue import CATALOGUE, VEHICLE_ENVS
+from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, VEHICLE_ENVS
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
@@ -32,6 +32,8 @@ class ListEnvs:
             table.add_row(entry.id, entry.summary)
         for env_id, (vehicle, summary) in VEHICLE_ENVS.items():
             table.add_row(env_id, f"{vehicle}: {summary}")
+        for env_id, task in FINGER_ENVS.items():
+            table.add_row(env_id, task.summary)
         plain_console().print(table)
 
 

@@ -26,7 +26,9 @@ try:
     except ImportError:  # pragma: no cover  # Seen by a process of its own in the tests.
         sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
 
+    from shapechanger.cli.demos import Demos
     from shapechanger.cli.envs import Envs
+    from shapechanger.cli.finger import Finger
     from shapechanger.cli.play import Play
     from shapechanger.cli.robot import Robot
     from shapechanger.cli.stopping import Interrupted
@@ -46,6 +48,8 @@ _Command = (
     | Annotated[Transfer, tyro.conf.subcommand("transfer")]
     | Annotated[Suite, tyro.conf.subcommand("suite")]
     | Annotated[Robot, tyro.conf.subcommand("robot")]
+    | Annotated[Demos, tyro.conf.subcommand("demos")]
+    | Annotated[Finger, tyro.conf.subcommand("finger")]
 )
 
 

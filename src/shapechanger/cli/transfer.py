@@ -15,7 +15,14 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import default_learner, driven, env_ref, opened, require_seed
+from shapechanger.cli.env_arguments import (
+    default_learner,
+    driven,
+    env_ref,
+    opened,
+    options_of,
+    require_seed,
+)
 from shapechanger.cli.progress import StudyProgress
 from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
@@ -51,7 +58,8 @@ class Transfer:
     steps: int | None = None
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; half as many as target steps if not given."""
+    """Source steps of a source policy; the learner's own number if not given, which is half as many
+    as target steps, and more for a rig."""
     quick: bool = False
     """Two seeds and an eighth of the steps: to see that it works, not to believe the numbers."""
     out: Path | None = None
@@ -64,14 +72,16 @@ class Transfer:
     """Another body of the target's family: its name, or edits as JSON."""
     target_lens: tuple[str, ...] = ()
     """What is wrong with the target's camera, for a vehicle: night, glare, blur or dirt."""
+    source_options: str = ""
+    """More arguments of the source as JSON, such as '{"actions": "length"}'."""
+    target_options: str = ""
+    """The same of the target, such as '{"gap": "real-like"}' for a finger."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
-    arms: tuple[Literal["scratch", "zero-shot", "fine-tune"], ...] = (
-        "scratch",
-        "zero-shot",
-        "fine-tune",
-    )
-    """What to compare; scratch is always needed."""
+    arms: tuple[Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"], ...] = ()
+    """What to compare; scratch is always needed. If not given, scratch, zero-shot and fine-tune;
+    where the target is the same task in another finger, also what is learned in a source that was
+    randomised, and in one that was identified by the target's motion."""
     rule: tuple[str, ...] = ()
     """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
     "foot_*/motor=copy ankle_*/motor", "*/contact/*=zero", "ankle_4/angle=hold"."""
@@ -82,7 +92,7 @@ class Transfer:
     seed: int = 0
     """Number that the seeds of all runs are drawn from."""
     workers: int | None = None
-    """Runs at a time; one for each core if not given."""
+    """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
     def run(self) -> None:
         """Do the study, print its table, and write its report."""
@@ -94,8 +104,8 @@ class Transfer:
         import_module("shapechanger.transfer.report.curves")
         # A file has no width of its own; a table in it should not be folded.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        executor = Processes(self.workers)
         plan = self._plan()
+        executor = Processes(1 if plan.exclusive else self.workers)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished(plan, out) if holds(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
@@ -137,14 +147,19 @@ class Transfer:
 
     def _plan(self) -> Plan:
         """What to do."""
+        from shapechanger.transfer.likeness import arms_for
         from shapechanger.transfer.plan import TransferTask
         from shapechanger.transfer.settings import LearnerSettings, learner_settings
         from shapechanger.transfer.study import make_plan
 
+        source = driven(env_ref(self.source, self.source_body))
+        target = driven(env_ref(self.target, self.target_body), self.target_lens)
         task = TransferTask(
-            driven(env_ref(self.source, self.source_body)),
-            driven(env_ref(self.target, self.target_body), self.target_lens),
+            source.having(options_of(self.source_options, "--source-options")),
+            target.having(options_of(self.target_options, "--target-options")),
         )
+        for env in (task.source, task.target):
+            _require_options(env)
         learner = self.learner or default_learner(task.target)
         settings = learner_settings(learner)
         steps, seeds = self.steps, self.seeds
@@ -152,7 +167,7 @@ class Transfer:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
             if isinstance(settings, LearnerSettings):
                 every = min(settings.eval_every, settings.whole_updates(shortest // 4))
-                settings = msgspec.structs.replace(settings, eval_every=every)
+                settings = msgspec.structs.replace(settings, eval_every=every, source_steps=0)
             steps = shortest if steps is None else steps
             seeds = _QUICK_SEEDS if seeds is None else seeds
         return make_plan(
@@ -163,7 +178,7 @@ class Transfer:
             steps=steps,
             source_steps=self.source_steps,
             source_policy=self.source_policy,
-            arms=self.arms,
+            arms=self.arms or arms_for(task),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),
             map_text=_read(self.map) if self.map else "",
@@ -187,8 +202,26 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
     """The steps of each run, for the progress; an evaluation counts as one."""
-    steps = {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}
+    from shapechanger.transfer.plan import LIKENED
+
+    steps = {"scratch": plan.steps, "fine-tune": plan.steps}
+    steps |= dict.fromkeys(("source", *LIKENED), plan.source_steps)
     return {run.name: steps.get(run.kind, 1) for run in runs}
+
+
+def _require_options(env: EnvRef) -> None:
+    """Refuse options that an env does not take.
+
+    Raises:
+        StudyError: If there is one.
+    """
+    try:
+        env.make().close()
+    except TypeError as error:
+        reason, told, _ = str(error).partition(" was raised from the environment creator")
+        if not told:
+            raise
+        raise StudyError(f"{env.id} cannot be made with these options: {reason}.") from error
 
 
 def _split_rule(text: str) -> tuple[str, str]:

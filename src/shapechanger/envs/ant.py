@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -22,7 +22,7 @@ from shapechanger.embodiments.ant import ANT
 from shapechanger.embodiments.family import BodyLike
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.stepping.actions import check_action
-from shapechanger.envs.stepping.tuned import Binding, Outcome, StepResult, TunedStep
+from shapechanger.envs.stepping.tuned import Binding, Outcomes, StepResult, TunedStep
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
 
@@ -39,6 +39,8 @@ _INFO: Final = (
     *("reward_forward", "reward_ctrl", "reward_contact", "reward_survive"),
 )
 _sum: Final = np.add.reduce
+_all: Final = np.logical_and.reduce
+_any: Final = np.logical_or.reduce
 
 
 class _Ant(Binding):
@@ -50,6 +52,7 @@ class _Ant(Binding):
         self.main_body = env.main_body
         self.main_xy = data.body(self.main_body).xpos[:2]
         self.qpos_xy = data.qpos[:2]
+        self.healthy = np.empty(2)
         self.forces = data.cfrc_ext
         self.clipped = np.empty_like(self.forces)
         self.squared = np.empty_like(self.forces)
@@ -60,13 +63,9 @@ class _Ant(Binding):
         self.state_size = sum(view.size for view in self.observed)
         if env.contacts_observed:
             self.observed.append(self.clipped[1:].ravel())
-        self.gathered = [data.qpos, data.qvel, self.main_xy, self.forces.ravel()]
-        self.width = sum(view.size for view in self.gathered)
-
-    def move(self, action: NDArray[Any]) -> list[float]:
-        before = self.main_xy.tolist()
-        super().move(action)
-        return before
+        self.before = [self.main_xy]
+        self.after = [data.qpos, data.qvel, self.main_xy, self.healthy]
+        self.after += [self.trouble, data.cfrc_ext.ravel()]
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -188,6 +187,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     def _kind_of(self, bound: _Ant) -> Hashable:
         if self.render_mode == "human":
             return None
+        bound.healthy[:] = self._healthy_z_range
         kind: tuple[Any, ...] = (
             *(self.tuned, bound.qpos.size, bound.qvel.size, bound.forces.size, bound.dt),
             *(self.place_hidden, self.contacts_observed, tuple(self._contact_force_range)),
@@ -196,53 +196,45 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         )
         return kind, tuple(cast("type[Any]", type(part)) for part in kind)
 
-    @classmethod
     def conclude(
-        cls,
-        envs: Sequence[AntEnv],
-        befores: Sequence[list[float]],
-        gathered: NDArray[np.float64],
-        actions: NDArray[Any],
-    ) -> tuple[NDArray[np.float64], list[Outcome]]:
-        """What ants of one kind see and are given; `_advance` for all of them at once."""
-        one = envs[0]
-        bound: _Ant = one._bound
-        nq, nv = bound.qpos.size, bound.qvel.size
-        place, state, forces = gathered[:, :2], gathered[:, : nq + nv], gathered[:, nq + nv + 2 :]
-        ctrl_cost = one._ctrl_cost_weight * _sum(np.square(actions, order="C"), axis=1)
+        self, before: NDArray[np.float64], after: NDArray[np.float64], actions: NDArray[Any]
+    ) -> Outcomes:
+        """What ants of this kind see and are given; `_advance` for all of them at once."""
+        bound: _Ant = self._bound
+        size = bound.qpos.size + bound.qvel.size
+        place, state = after[:, :2], after[:, :size]
+        main_xy, limits = after[:, size : size + 2], after[:, size + 2 : size + 4]
+        trouble, forces = after[:, size + 4 : size + 7].view(np.int64), after[:, size + 7 :]
+        ctrl_cost = self._ctrl_cost_weight * _sum(np.square(actions, order="C"), axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # As of Python's own numbers.
-            velocity = (gathered[:, nq + nv : nq + nv + 2] - np.array(befores)) / bound.dt
-            tilt = np.square(gathered[:, 4:6])
-            leans: list[float] = (tilt[:, 0] + tilt[:, 1]).tolist()
+            velocity = (main_xy - before) / bound.dt
+            tilt = np.square(after[:, 4:6])
+            z, lean = after[:, 2], tilt[:, 0] + tilt[:, 1]
+            # `1 - 2 * lean > 0` of `_advance` is this to the last bit: near 0.5 it is exact.
+            stands = (limits[:, 0] <= z) & (z <= limits[:, 1]) & (lean < 0.5)
             # The same function as that of `dot`, which need not round a sum of products as NumPy.
             distance = np.sqrt(np.vecdot(place, place))
-        clipped = forces.clip(*one._contact_force_range)
-        observed = [state[:, 2:] if one.place_hidden else state]
-        if one.contacts_observed:
+        healthy = stands & _all(np.isfinite(state), axis=1)
+        clipped = forces.clip(*self._contact_force_range)
+        observed = [state[:, 2:] if self.place_hidden else state]
+        if self.contacts_observed:
             observed.append(clipped[:, bound.forces.shape[1] :])
         observations = np.concatenate(observed, axis=1)
-
-        # NumPy takes longer to start than Python to compare a few numbers. `1 - 2 * lean > 0` of
-        # `_advance` is `lean < 0.5` to the last bit: near 0.5 the difference is exact.
-        finites = cast("list[bool]", np.isfinite(state).all(axis=1).tolist())
-        heights: list[float] = gathered[:, 2].tolist()
-        healthy: list[bool] = []
-        for env, finite, z, lean in zip(envs, finites, heights, leans, strict=True):
-            lowest, highest = env._healthy_z_range
-            healthy.append(finite and lowest <= z <= highest and lean < 0.5)
-        forward_reward = velocity[:, 0] * one._forward_reward_weight
-        healthy_reward = [each * one._healthy_reward for each in healthy]
-        contact_cost = one._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
+        forward_reward = velocity[:, 0] * self._forward_reward_weight
+        healthy_reward = [well * self._healthy_reward for well in healthy.tolist()]
+        contact_cost = self._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
         reward = (forward_reward + healthy_reward) - (ctrl_cost + contact_cost)
-        ends = one._terminate_when_unhealthy
         columns = (
             *(place[:, 0], place[:, 1], distance, velocity[:, 0], velocity[:, 1]),
             *(forward_reward, -ctrl_cost, -contact_cost, healthy_reward),
         )
-        return observations, [
-            (worth, not well and ends, dict(zip(_INFO, values, strict=True)))
-            for worth, well, values in zip(reward, healthy, zip(*columns, strict=True), strict=True)
-        ]
+        return Outcomes(
+            observations,
+            reward,
+            ~healthy & bool(self._terminate_when_unhealthy),
+            dict(zip(_INFO, columns, strict=True)),
+            np.flatnonzero(_any(trouble, axis=1)).tolist() if _any(trouble, axis=None) else (),
+        )
 
     def _observation_features(self, model: Any) -> list[Feature]:
         features = position_features(model)[2 if self.place_hidden else 0 :]

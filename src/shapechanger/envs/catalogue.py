@@ -13,16 +13,22 @@ from shapechanger.errors import UnknownName
 
 __all__ = [
     "CATALOGUE",
+    "FINGER_ENVS",
     "NAMESPACE",
+    "REMOTE_FINGER",
     "REMOTE_VEHICLE",
     "VEHICLE_ENVS",
     "Entry",
+    "TaskEntry",
     "find",
-    "find_vehicle",
+    "find_task",
     "register_all",
 ]
 
 NAMESPACE: Final = "shapechanger"
+
+REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
+"""Id of the env of a finger on a rig, which has the layout of `Finger-v1`."""
 
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 """Id of the env of a robot on the network; its body is whatever answers, so it is no `Entry`."""
@@ -37,6 +43,41 @@ VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     }
 )
 """Vehicle and summary by id: one task, of which no body is a variant of another."""
+
+
+class TaskEntry(msgspec.Struct, frozen=True):
+    """An env whose body is no family's.
+
+    Attributes:
+        entry_point: Where its class is.
+        summary: What it is, in a line.
+        learner: Name of the learner whose settings were tuned on it.
+        episode_steps: After how many steps an episode is truncated.
+    """
+
+    entry_point: str
+    summary: str
+    learner: str
+    episode_steps: int
+
+
+FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
+    {
+        "shapechanger/Finger-v1": TaskEntry(
+            "shapechanger.envs.finger:FingerReachEnv",
+            "finger of seven tendons: reach a point",
+            "ppo-finger",
+            100,
+        ),
+        "shapechanger/FingerTrack-v1": TaskEntry(
+            "shapechanger.envs.finger:FingerTrackEnv",
+            "finger of seven tendons: follow a path",
+            "ppo-finger",
+            250,
+        ),
+    }
+)
+"""The envs of the finger by id."""
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -176,6 +217,18 @@ def register_all() -> None:
                 max_episode_steps=_EPISODE_STEPS,
                 kwargs={"vehicle": vehicle},
             )
+    for env_id, task in FINGER_ENVS.items():
+        if env_id not in gym.registry:
+            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+                env_id, task.entry_point, max_episode_steps=task.episode_steps
+            )
+    if REMOTE_FINGER not in gym.registry:
+        gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+            REMOTE_FINGER,
+            "shapechanger.envs.finger.remote:RemoteFingerEnv",
+            max_episode_steps=FINGER_ENVS["shapechanger/Finger-v1"].episode_steps,
+            nondeterministic=True,  # As with every robot.
+        )
     if REMOTE_VEHICLE not in gym.registry:
         gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
             REMOTE_VEHICLE,
@@ -194,14 +247,16 @@ def find(env_id: str) -> Entry:
     entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
     if entry is None:
         known = [entry.name for entry in CATALOGUE.values()]
-        raise UnknownName("environment", name, [*known, *map(_name, VEHICLE_ENVS)])
+        others = map(_name, (*VEHICLE_ENVS, *FINGER_ENVS, REMOTE_FINGER))
+        raise UnknownName("environment", name, [*known, *others])
     return entry
 
 
-def find_vehicle(env_id: str) -> str | None:
-    """The id of a vehicle's env, of which the name alone, such as `Car`, will do; None for none."""
+def find_task(env_id: str) -> str | None:
+    """The id of an env of no family, such as `Car` or `Finger`; None if it is none of these."""
     full = f"{NAMESPACE}/{_name(env_id)}-v1"
-    return full if full in VEHICLE_ENVS else None
+    known = full in VEHICLE_ENVS or full in FINGER_ENVS or full == REMOTE_FINGER
+    return full if known else None
 
 
 def _name(env_id: str) -> str:

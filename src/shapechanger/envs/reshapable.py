@@ -23,8 +23,9 @@ from shapechanger.envs.layouts import action_layout, position_features, velocity
 from shapechanger.envs.picture import body_reach, draw
 from shapechanger.envs.renderer import Renderer
 from shapechanger.envs.stepping.actions import check_action
+from shapechanger.envs.textures import halve_textures
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology import Body, compile_body, interpolate, to_json
+from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
     StartRules,
@@ -54,6 +55,9 @@ class Reshapable(MujocoEnv):
     The env keeps its rewards, terminations, infos and arguments. What follows from the body is
     derived from it: model, spaces, layouts, start pose.
 
+    An env without a `render_mode` keeps textures of bodies and skies at half their width and
+    height, which saves a third of its memory.
+
     One argument is ours and every env's: `shadows` says whether frames have shadows, reflections
     and smoothed edges; left out, frames of more than 256 x 256 pixels have, as films for people,
     and smaller ones do not, as those that a camera gives a learner twenty times faster.
@@ -74,12 +78,8 @@ class Reshapable(MujocoEnv):
     action_layout: Layout
     standing_height: float | None
     _spec: EnvSpec | None = None
-
-    if TYPE_CHECKING:
-        # Gymnasium's own, which it leaves untyped.
-        def _get_obs(self) -> NDArray[np.float64]: ...
-        def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
-            """Put the body at a pose (nq,) with velocities (nv,)."""
+    # Whether a start state is being drawn.
+    _starting: bool = False
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
         """What must be there before Gymnasium's constructor compiles the model.
@@ -89,6 +89,7 @@ class Reshapable(MujocoEnv):
         self._shadows: bool | None = arguments.pop("shadows", None)
         self.body = self.family.body(body)
         mode = arguments.get("render_mode")
+        self._draws = mode is not None
         if mode == "human":
             require_screen()
         elif mode is not None:
@@ -136,11 +137,22 @@ class Reshapable(MujocoEnv):
 
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Compile the present body in place of the file as it is."""
-        model = compile_body(self.family.load(self.fullpath), self.body)
+        model = compile_body(self._load_family(), self.body)
         # As in Gymnasium's own method: the frame buffer must be as large as the picture.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, self.width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, self.height)
         return model, mujoco.MjData(model)
+
+    def body_spec(self) -> mujoco.MjSpec:
+        """What the model is compiled from: that of the family with the edits of the body."""
+        return reshape(self._load_family(), self.body)
+
+    def _load_family(self) -> mujoco.MjSpec:
+        """The family's model; where nobody looks, with less to look at."""
+        spec = self.family.load(self.fullpath)
+        if not self._draws:
+            halve_textures(spec)
+        return spec
 
     def _follow_body(self) -> None:
         """Derive from the model what the env needs to know of it."""
@@ -221,19 +233,29 @@ class Reshapable(MujocoEnv):
         Joints that the noise moved beyond their limits are moved back, orientations become unit
         quaternions again, and a trunk whose feet the noise pushed into the floor is lifted.
         """
-        observation = super().reset_model()
+        self._starting = True
+        try:
+            return cast("Any", super()).reset_model()
+        finally:
+            self._starting = False
+
+    def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
+        """Put the body at a pose (nq,) with velocities (nv,)."""
+        possible = self._possible(qpos) if self._starting else qpos
+        cast("Any", super()).set_state(possible, qvel)
+
+    def _possible(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The start pose that a drawn one becomes."""
         rules = self._start_rules()
-        pose = rules.keep_within_limits(self.data.qpos)
+        pose = rules.keep_within_limits(drawn)
         mujoco.mj_normalizeQuat(self.model, pose)
-        moved = not np.array_equal(pose, self.data.qpos)
-        if moved:
-            self.set_state(pose, self.data.qvel.copy())
-        lift = rules.lift
-        if lift is not None and (gap := rules.floor_gap(self.model, self.data)) < 0.0:
-            lift.raise_by(pose, -gap)
-            self.set_state(pose, self.data.qvel.copy())
-            moved = True
-        return self._get_obs() if moved else observation
+        if rules.lift is not None:
+            self.data.qpos[:] = pose
+            mujoco.mj_kinematics(self.model, self.data)
+            gap = rules.floor_gap(self.model, self.data)
+            if gap < 0.0:
+                rules.lift.raise_by(pose, -gap)
+        return pose
 
     def _start_rules(self) -> StartRules:
         """What makes a start pose possible, for the model as it is now."""

@@ -13,6 +13,11 @@ client  Take               may I command? Answered by Lease
 client  Arm                (a person, by default) the outputs may move from now on
 robot   Observation        the newest one, each time the client has credit
 client  Command            what to do, in answer to which observation; gives credit for the next
+client  Suggest            what it would do, while somebody else commands; gives credit too
+client  Record Mark Undo   (a person) what is driven becomes an episode on the robot's disk
+robot   RecorderState      how that goes, to everybody
+client  Browse Fetch Judge what was recorded: the list, a piece of an episode, steps good or bad
+robot   Recordings Piece   the answers
 ```
 
 Times are nanoseconds of the robot's monotonic clock. Two machines' clocks are never subtracted: how
@@ -31,26 +36,39 @@ from shapechanger.errors import LinkError
 
 __all__ = [
     "MAX_CLIENT_MESSAGE",
+    "MAX_EPISODES",
+    "MAX_PIECE",
     "MAX_ROBOT_MESSAGE",
     "VERSION",
     "Acknowledge",
     "Arm",
+    "Browse",
     "Challenge",
     "ClientMessage",
     "Command",
     "Disarm",
     "EmergencyStop",
+    "EpisodeSummary",
     "Event",
+    "Fetch",
     "Hello",
+    "Judge",
     "Lease",
+    "Mark",
     "Observation",
+    "Piece",
     "Ping",
     "Pong",
+    "Record",
+    "RecorderState",
+    "Recordings",
     "Refused",
     "Release",
     "RobotMessage",
     "Role",
+    "Suggest",
     "Take",
+    "Undo",
     "Welcome",
     "decode_client_message",
     "decode_robot_message",
@@ -66,6 +84,13 @@ MAX_CLIENT_MESSAGE: Final = 64 * 1024
 MAX_ROBOT_MESSAGE: Final = 4 * 1024 * 1024
 """Bytes of the largest message that a client reads."""
 
+MAX_PIECE: Final = 256 * 1024
+"""Bytes of a `Piece`, about: it ends with the line that reaches them. Larger ones would keep
+observations waiting on a slow radio."""
+
+MAX_EPISODES: Final = 200
+"""Episodes in one `Recordings`; `Browse.before` asks for those before."""
+
 Role = Literal["person", "program"]
 """Who drives. A person takes the robot from a program at once; never the other way round."""
 
@@ -80,6 +105,10 @@ _Name = Annotated[str, Meta(max_length=64)]
 _Words = Annotated[str, Meta(max_length=1024)]
 _Sequence = Annotated[int, Meta(ge=0, le=2**53)]
 _Values = Annotated[tuple[float, ...], Meta(max_length=64)]
+# One folder of the recordings and never another one: no separator, and no dot in front.
+_Episode = Annotated[str, Meta(max_length=128, pattern=r"^[0-9A-Za-z][0-9A-Za-z._-]*\Z")]
+_Before = Annotated[str, Meta(max_length=128, pattern=r"^([0-9A-Za-z][0-9A-Za-z._-]*)?\Z")]
+_Step = Annotated[int, Meta(ge=0, le=2**53)]
 
 
 class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_only=True):
@@ -190,7 +219,124 @@ class Ping(_Message, frozen=True):
     token: _Sequence = 0
 
 
-ClientMessage = Hello | Command | Acknowledge | Take | Release | Arm | Disarm | EmergencyStop | Ping
+class Suggest(_Message, frozen=True):
+    """What a client that does not command would do now; the robot does not do it.
+
+    It is shown to everybody (`Observation.suggested`), recorded as what a policy wanted, and gives
+    credit for the next observation, as a command does. The robot forgets it after its
+    `Welcome.deadline_ms`, and when its sender leaves or commands.
+
+    Attributes:
+        seq: Number of the suggestion; each is larger than the one before. A refusal names it.
+        answers: `seq` of the observation that it was decided on.
+        values: One number for each action of the robot, in the order of its action layout.
+    """
+
+    seq: _Sequence
+    answers: _Sequence
+    values: _Values
+
+
+class Record(_Message, frozen=True):
+    """Begins or ends an episode on the robot's disk; only a person may.
+
+    Answered by `RecorderState`, which everybody gets, or by `Refused`. Whoever commands is
+    recorded, a person or a program, whenever the outputs may move; when the last person leaves, it
+    ends.
+
+    Attributes:
+        on: Whether to record from now on.
+        name: What the episode is about, for people to read.
+    """
+
+    on: bool
+    name: _Name = ""
+
+
+class Mark(_Message, frozen=True):
+    """Puts a mark on the newest step of the episode that is being recorded; only a person may.
+
+    Attributes:
+        text: What it says.
+    """
+
+    text: _Words = ""
+
+
+class Undo(_Message, frozen=True):
+    """Drops the newest steps of the episode that is being recorded; only a person may.
+
+    They stay on the disk, and are not learned from.
+
+    Attributes:
+        seconds: How far back.
+    """
+
+    seconds: Annotated[float, Meta(gt=0.0, le=3_600.0)] = 5.0
+
+
+class Browse(_Message, frozen=True):
+    """Asks for the list of the robot's recordings; answered by `Recordings`.
+
+    Attributes:
+        before: Only episodes whose id sorts before this one; empty for the newest.
+    """
+
+    before: _Before = ""
+
+
+class Fetch(_Message, frozen=True):
+    """Asks for a part of an episode; answered by `Piece`.
+
+    One question about recordings at a time: the next one is refused until the answer has left.
+
+    Attributes:
+        episode: Its id.
+        first: Number of the first line of `steps.jsonl`, from 0.
+        count: How many lines at most.
+    """
+
+    episode: _Episode
+    first: _Step = 0
+    count: Annotated[int, Meta(ge=1, le=100_000)] = 1_000
+
+
+class Judge(_Message, frozen=True):
+    """Says that steps of an episode are bad, or good after all; only a person may.
+
+    Answered by `Recordings` with that episode alone.
+
+    Attributes:
+        episode: Its id; not of the one that is being recorded.
+        first: Number of the first step.
+        last: Number of the last step, which counts too.
+        keep: Whether they are to be learned from.
+    """
+
+    episode: _Episode
+    first: _Step
+    last: _Step
+    keep: bool = False
+
+
+ClientMessage = (
+    Hello
+    | Command
+    | Acknowledge
+    | Take
+    | Release
+    | Arm
+    | Disarm
+    | EmergencyStop
+    | Ping
+    | Suggest
+    | Record
+    | Mark
+    | Undo
+    | Browse
+    | Fetch
+    | Judge
+)
 
 
 # What a robot says.
@@ -228,6 +374,7 @@ class Welcome(_Message, frozen=True):
         arming: Who may arm it.
         clock: Where its time comes from.
         session: Number of this connection.
+        can_record: Whether it has a place to keep recordings.
     """
 
     robot: str
@@ -243,6 +390,7 @@ class Welcome(_Message, frozen=True):
     arming: Literal["person", "anyone"]
     clock: Literal["real", "twin"]
     session: int
+    can_record: bool = False
 
 
 class Refused(_Message, frozen=True):
@@ -282,6 +430,11 @@ class Observation(_Message, frozen=True):
         emergencies: How many emergency stops there were since the robot's start.
         holder: Name of whoever commands; empty for nobody.
         mine: Whether that is this client.
+        holder_role: Who drives; empty for nobody.
+        commanded: The newest command that is in force, times its scale, in the order and units of
+            the command; empty for none.
+        suggested: What a client that does not command would do; empty for none.
+        suggested_by: Who that is, for people to read; empty for none.
     """
 
     seq: int
@@ -302,6 +455,10 @@ class Observation(_Message, frozen=True):
     emergencies: int
     holder: str
     mine: bool
+    holder_role: Literal["", "person", "program"] = ""
+    commanded: tuple[float, ...] = ()
+    suggested: tuple[float, ...] = ()
+    suggested_by: str = ""
 
 
 class Lease(_Message, frozen=True):
@@ -344,7 +501,100 @@ class Pong(_Message, frozen=True):
     now_ns: int
 
 
-RobotMessage = Challenge | Welcome | Refused | Observation | Lease | Event | Pong
+class RecorderState(_Message, frozen=True):
+    """How the recording goes: at each change, and once a second while it goes on.
+
+    Attributes:
+        episode: Id of the episode; of the last one, after it ended; empty for none yet, and while
+            the disk makes a new one.
+        recording: Whether steps are recorded.
+        steps: How many there are.
+        dropped: How many of them were undone.
+        seconds: From its first step to the newest that counts, s.
+        marks: How many marks there are.
+        text: Why it ended by itself, such as a full disk, in a sentence; empty otherwise.
+    """
+
+    episode: _Before = ""
+    recording: bool = False
+    steps: int = 0
+    dropped: int = 0
+    seconds: float = 0.0
+    marks: int = 0
+    text: str = ""
+
+
+class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """One episode in a list.
+
+    Attributes:
+        id: Name of its folder.
+        steps: How many steps it has.
+        kept: How many of them are not dropped.
+        seconds: How long the steps that are kept last, s.
+        closed: Whether it was ended properly; one that is being recorded was not.
+        created: When it began, ISO 8601 in UTC.
+        driver: Who drove, for people to read.
+        outcome: How it ended, such as "collision"; empty for just ended. Of one that cannot be
+            read, why not.
+    """
+
+    id: _Episode
+    steps: int
+    kept: int
+    seconds: float
+    closed: bool
+    created: str
+    driver: str
+    outcome: str
+
+
+class Recordings(_Message, frozen=True):
+    """What was recorded, newest first.
+
+    Attributes:
+        episodes: At most `MAX_EPISODES` of them.
+        more: Whether there are older ones, see `Browse.before`.
+    """
+
+    episodes: tuple[EpisodeSummary, ...]
+    more: bool = False
+
+
+class Piece(_Message, frozen=True):
+    """A part of an episode, as it is on the robot's disk.
+
+    Attributes:
+        episode: Its id.
+        first: Number of the first line, as in the question.
+        total: How many complete lines `steps.jsonl` has now.
+        lines: The lines from `first` on, without their ends; none behind the last one. Fewer than
+            were asked for where they would make a message that is too large.
+        frames: For each line the JPEG that its `frame` names; None where it names none, or the same
+            as the line before in this piece.
+        header: The text of `episode.json` now.
+    """
+
+    episode: _Episode
+    first: int
+    total: int
+    lines: tuple[str, ...]
+    frames: tuple[bytes | None, ...]
+    header: str = ""
+
+
+RobotMessage = (
+    Challenge
+    | Welcome
+    | Refused
+    | Observation
+    | Lease
+    | Event
+    | Pong
+    | RecorderState
+    | Recordings
+    | Piece
+)
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _CLIENT_DECODER: Final = msgspec.msgpack.Decoder(ClientMessage)

@@ -38,6 +38,8 @@ __all__ = ["RobotClient"]
 _MOST_EVENTS: Final = 256
 # How long a call may take beyond the link's own limit, s.
 _MARGIN_S: Final = 2.0
+# How long a robot may look for an answer on its disk, s.
+_DISK_S: Final = 30.0
 
 
 @dataclass
@@ -47,10 +49,12 @@ class _Question:
     Attributes:
         kind: Kind of the answer.
         answer: Where it goes.
+        accepts: Whether a message of that kind is the answer.
     """
 
     kind: type[RobotMessage]
     answer: Future[Any] = field(default_factory=Future[Any])
+    accepts: Callable[[Any], bool] = lambda _: True
 
 
 def _own_name() -> str:
@@ -91,6 +95,8 @@ class RobotClient:
         self._questions: list[_Question] = []
         self._events: deque[Event] = deque(maxlen=_MOST_EVENTS)
         self._refusals: dict[int, str] = {}
+        self._recorder: messages.RecorderState | None = None
+        self._asking = threading.Lock()
         self._seq = 0
         self._failure: LinkError | None = None
         self._ready: Future[Welcome] = Future()
@@ -180,6 +186,11 @@ class RobotClient:
         """The newest observation, however old; None before the first."""
         return self._inbox.newest
 
+    @property
+    def recorder(self) -> messages.RecorderState | None:
+        """What the robot said last of its recorder; None for nothing yet."""
+        return self._recorder
+
     def take(self) -> None:
         """Be the one who commands.
 
@@ -245,6 +256,25 @@ class RobotClient:
         )
         return seq
 
+    def suggest(self, values: Sequence[float], *, answers: int) -> int:
+        """Say what to do while somebody else commands; the robot shows it, and does not do it.
+
+        It counts as long as a command would, and asks for the next observation as one does.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            answers: `seq` of the observation that it was decided on.
+
+        Returns:
+            The number of the suggestion, to ask `refusal` for.
+        """
+        with self._lock:
+            self._seq += 1
+            seq = self._seq
+        told = tuple(float(value) for value in values)
+        self._post(messages.Suggest(seq=seq, answers=answers, values=told))
+        return seq
+
     def acknowledge(self) -> None:
         """Ask for the next observation without commanding anything."""
         newest = self.newest
@@ -299,6 +329,88 @@ class RobotClient:
     def release(self) -> None:
         """Give the command back; the robot stops and disarms."""
         self._post(messages.Release())
+
+    def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
+        """Begin an episode on the robot's disk, or end it; only a person may.
+
+        Args:
+            on: Whether to record from now on.
+            name: What it is about, for people to read.
+
+        Raises:
+            RobotRefused: If the robot does not record, as on a full disk; or records already.
+            LinkError: If it does not answer in time.
+        """
+        return self._ask_recorder(
+            messages.Record(on=on, name=name),
+            lambda state: state.recording == on and bool(state.episode),
+        )
+
+    def mark(self, text: str = "") -> messages.RecorderState:
+        """Mark the newest step of the episode that is being recorded; errors as of `record`."""
+        before = 0 if self._recorder is None else self._recorder.marks
+        return self._ask_recorder(messages.Mark(text=text), lambda state: state.marks > before)
+
+    def undo(self, seconds: float = 5.0) -> messages.RecorderState:
+        """Drop the newest steps of the episode that is being recorded; errors as of `record`.
+
+        Args:
+            seconds: How far back, s; above 0.
+        """
+        before = 0 if self._recorder is None else self._recorder.dropped
+        return self._ask_recorder(
+            messages.Undo(seconds=seconds), lambda state: state.dropped > before
+        )
+
+    def browse(self, before: str = "", timeout_s: float = _DISK_S) -> messages.Recordings:
+        """What was recorded on the robot, newest first.
+
+        Args:
+            before: Only episodes whose id sorts before this one; "" for the newest.
+            timeout_s: How long the robot may look, s.
+
+        Raises:
+            RobotRefused: If it keeps no recordings.
+            LinkError: If it does not answer in time.
+        """
+        return self._ask_library(messages.Browse(before=before), messages.Recordings, timeout_s)
+
+    def fetch(
+        self, episode: str, first: int = 0, count: int = 1_000, timeout_s: float = _DISK_S
+    ) -> messages.Piece:
+        """A part of an episode, as it is on the robot's disk; errors as of `browse`.
+
+        Args:
+            episode: Its id.
+            first: Number of the first line, from 0.
+            count: How many lines at most; fewer come where they would be too large.
+            timeout_s: How long the robot may look, s.
+        """
+        asked = messages.Fetch(episode=episode, first=first, count=count)
+        return self._ask_library(asked, messages.Piece, timeout_s)
+
+    def judge(
+        self, episode: str, first: int, last: int, *, keep: bool, timeout_s: float = _DISK_S
+    ) -> messages.EpisodeSummary:
+        """Say whether steps of an episode are to be learned from; only a person may.
+
+        Args:
+            episode: Its id.
+            first: Number of the first step.
+            last: Number of the last step, which counts too.
+            keep: Whether they are good.
+            timeout_s: How long the robot may look, s.
+
+        Returns:
+            The episode as it is then.
+
+        Raises:
+            RobotRefused: If there are no such steps, or it is being recorded.
+            LinkError: If the robot does not answer in time.
+        """
+        asked = messages.Judge(episode=episode, first=first, last=last, keep=keep)
+        found: messages.Recordings = self._ask_library(asked, messages.Recordings, timeout_s)
+        return found.episodes[0]
 
     def ping(self, timeout_s: float | None = None) -> tuple[float, int]:
         """Ask whether anybody is there.
@@ -375,10 +487,28 @@ class RobotClient:
             failure = self._failure or LinkError("The link to the robot is lost.")
             raise _here(failure) from None
 
-    def _ask(
-        self, message: ClientMessage, kind: type[RobotMessage], timeout_s: float | None = None
+    def _ask_recorder(
+        self, message: ClientMessage, accepts: Callable[[messages.RecorderState], bool]
+    ) -> messages.RecorderState:
+        messages.decode_client_message(messages.encode(message))  # What is wrong is said here.
+        with self._asking:
+            return self._ask(message, messages.RecorderState, _DISK_S, accepts)
+
+    def _ask_library(
+        self, message: ClientMessage, kind: type[RobotMessage], timeout_s: float
     ) -> Any:
-        question = _Question(kind)
+        messages.decode_client_message(messages.encode(message))
+        with self._asking:  # A robot answers one such question at a time.
+            return self._ask(message, kind, timeout_s)
+
+    def _ask(
+        self,
+        message: ClientMessage,
+        kind: type[RobotMessage],
+        timeout_s: float | None = None,
+        accepts: Callable[[Any], bool] = lambda _: True,
+    ) -> Any:
+        question = _Question(kind, accepts=accepts)
         with self._lock:
             self._questions.append(question)
         try:
@@ -431,6 +561,8 @@ class RobotClient:
             with self._lock:
                 self._events.append(message)
             return
+        if isinstance(message, messages.RecorderState):
+            self._recorder = message
         if isinstance(message, messages.Refused):
             if message.fatal:
                 raise RobotRefused(message.reason)
@@ -445,7 +577,12 @@ class RobotClient:
         refused = isinstance(message, messages.Refused)
         with self._lock:
             question = next(
-                (q for q in self._questions if refused or isinstance(message, q.kind)), None
+                (
+                    q
+                    for q in self._questions
+                    if refused or (isinstance(message, q.kind) and q.accepts(message))
+                ),
+                None,
             )
             if question is None:
                 return

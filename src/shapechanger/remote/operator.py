@@ -94,8 +94,13 @@ class Preparation:
             if not self._wait(f"{robot.welcome.robot} is still armed."):
                 raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
 
-    def arm(self, robot: RobotClient, role: str) -> None:
+    def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
         """Arm the robot where we may, or wait until a person has; then it is still ours.
+
+        Args:
+            robot: The robot.
+            role: Who we are.
+            by_person: Whether to leave it to a person, even where we may.
 
         Raises:
             RobotRefused: If nobody does in time.
@@ -112,7 +117,8 @@ class Preparation:
                 continue
             if seen.mine and seen.armed and not seen.emergency:
                 return
-            if role == "person" or (robot.welcome.arming == "anyone" and not seen.emergency):
+            may = robot.welcome.arming == "anyone" and not seen.emergency and not by_person
+            if role == "person" or may:
                 try:
                     robot.arm()
                 except RobotRefused as refusal:

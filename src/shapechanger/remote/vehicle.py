@@ -22,13 +22,15 @@ from shapechanger.remote.latency import frame_age_s, latencies
 from shapechanger.remote.operator import Preparation
 from shapechanger.remote.schedule import Schedule
 from shapechanger.remote.senses import Senses, View
+from shapechanger.remote.takeover import Takeover
 from shapechanger.tasks.drive import DriveReward
 
 __all__ = ["OnReset", "RemoteVehicleEnv"]
 
-OnReset = Literal["operator", "routine"] | Callable[[int | None], object]
+OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
 """Who brings the robot to the start."""
 
+_WAYS_TO_RESET: Final = ("operator", "person", "routine")
 # s. How long a robot that waits for us, and so never hurries, may take for a step.
 _LOCKSTEP_S: Final = 10.0
 
@@ -60,14 +62,19 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     Terminated by a collision, unless the reward says otherwise. Truncated when the link is lost, at
     an emergency stop, when the robot is disarmed and when somebody else takes it;
     `info["truncated_because"]` says why. After a lost link the observation is the last one, and
-    the next `reset` connects again.
+    the next `reset` connects again. With `interventions=True` a person may take the robot without
+    ending the episode: the program's actions are then only shown to them, and when they give it
+    back and arm it, the program drives on.
 
     ## Info
     `action_applied` and `stop_reason`: what the robot does, and why it is not what it was told;
     `refused`: why it refused the command of this step; `events`: what happened, in sentences;
     `latency`, s, see `latencies`; `frame_age`, s, and `frame_repeated`; `deadline_missed`: steps of
     this episode that ended half a period late or more; `armed`, `emergency`; `absent`: numbers of
-    the state that nothing measures now, which are the middle of their range.
+    the state that nothing measures now, which are the middle of their range; `captured_ns` and
+    `decided_ns`: when the picture was taken and when the command behind what the robot does
+    arrived there, ns of the robot's clock; `intervene_action`: what a person commands in place of
+    the program, and only while one does.
 
     Args:
         robot: Name of a robot that is remembered, or its address as HOST or HOST:PORT.
@@ -80,13 +87,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             for each command and answers one period later.
         reward: Weights that replace those of the robot's profile, by name.
         on_reset: "operator": a person puts the robot back and arms it; where anyone may, it is
-            armed at once. "routine": the commands of the profile. Or what to call with the seed.
+            armed at once. "person": a person arms it in any case. "routine": the commands of the
+            profile. Or what to call with the seed.
         on_waiting: Is told in a sentence what a reset waits for; None for a warning in the log of
             `shapechanger.remote.operator` once it waits for 2 s.
         reset_timeout_s: How long a reset may wait, s.
         max_observation_age_s: How long a step may wait for an observation, s; None for as long as
             the robot takes an answer to one.
         timeout_s: How long the robot may be silent until the link is lost, s.
+        interventions: Whether a person may take the robot and give it back within an episode.
         role: Who drives.
         name: Who connects, for people to read.
         render_mode: "rgb_array" for `render` to give the robot's newest picture at its own size.
@@ -115,18 +124,20 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         reset_timeout_s: float = 60.0,
         max_observation_age_s: float | None = None,
         timeout_s: float = 2.0,
+        interventions: bool = False,
         role: Role = "program",
         name: str = "",
         render_mode: str | None = None,
     ) -> None:
         self._arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
-        if not callable(on_reset) and on_reset not in ("operator", "routine"):
-            raise UnknownName("way to reset", on_reset, ("operator", "routine"))
+        if not callable(on_reset) and on_reset not in _WAYS_TO_RESET:
+            raise UnknownName("way to reset", on_reset, _WAYS_TO_RESET)
         self._robot = _found(robot)
         self._key, self._fingerprint = key, fingerprint
         self._pace: Pace = pace
         self._role: Role = role
         self._name = name
+        self._takeover = Takeover(allowed=interventions)
         self._on_reset = on_reset
         self._on_waiting = on_waiting
         self._reset_timeout_s = reset_timeout_s
@@ -168,6 +179,16 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return self._client.welcome
 
     @property
+    def newest_jpeg(self) -> bytes | None:
+        """The picture in the newest observation, as the robot sent it; None without one."""
+        return None if self._last is None or not self._senses.has_image else self._last.jpeg
+
+    @property
+    def record_clock(self) -> Literal["real", "twin"]:
+        """Where the nanoseconds in `info` come from."""
+        return self.welcome.clock
+
+    @property
     def action_layout(self) -> Layout:
         """What the numbers of an action mean."""
         return self._senses.action_layout
@@ -205,13 +226,14 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             ready.disarm(robot)
         if callable(self._on_reset):
             self._on_reset(seed)
-        ready.arm(robot, self._role)
+        ready.arm(robot, self._role, by_person=self._on_reset == "person")
         if self._on_reset == "routine":
             ready.play(robot)
         received = ready.first(robot, self._senses.rest, self._is_after)
         view = self._senses.view(received)
         self._last, self._last_view = received, view
         self._judge.start(received.message)
+        self._takeover.start()
         self._missed, self._has_stepped = 0, False
         robot.events()  # What happened before is not of this episode.
         return view.observation, self._info(received, view)
@@ -234,7 +256,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             self._has_stepped = True
         sent_at = self._clock()
         try:
-            seq = robot.command(values, answers=last.message.seq)
+            seq = self._takeover.act(robot, values, last.message)
             received = self._next(robot, last, sent_at)
             view = self._senses.view(received)
         except LinkError as failure:
@@ -251,7 +273,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         info["refused"] = robot.refusal(seq)
         clock = robot.welcome.clock
         info["latency"] = latencies(last.message, seq, sent_at, received, clock)
-        info["truncated_because"] = _interruption(received.message)
+        is_lent = self._takeover.goes_on(received.message)
+        info["truncated_because"] = "" if is_lent else _interruption(received.message)
         self._last, self._last_view = received, view
         truncated = not terminated and bool(info["truncated_because"])
         return view.observation, sum(terms.values()), terminated, truncated, info
@@ -352,7 +375,12 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             "absent": view.absent,
             "reward_sources": self._judge.sources(message),
             "deadline_missed": self._missed,
+            "captured_ns": message.captured_ns,
+            "decided_ns": message.command_ns,
         }
+        by_person = self._takeover.action(message) if self._role == "program" else None
+        if by_person is not None:
+            info["intervene_action"] = np.array(by_person, np.float32)
         if self._senses.has_image:
             info["frame_age"] = frame_age_s(received, self._clock())
             info["frame_repeated"] = not view.fresh

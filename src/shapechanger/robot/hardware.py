@@ -11,9 +11,13 @@ import importlib
 import select
 import time
 from collections.abc import Sequence
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from shapechanger.errors import RobotError
+
+if TYPE_CHECKING:  # They need the SDK, and only a rig has it.
+    from shapechanger.robot.drivers.dynamixel.port import Port
+    from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
 __all__ = [
     "REAL",
@@ -66,6 +70,10 @@ class Clock(Protocol):
 class I2cBus(Protocol):
     """The part of `smbus2.SMBus` that the drivers use."""
 
+    def write_byte(self, i2c_addr: int, value: int) -> None:
+        """Send one byte to a chip that has no registers."""
+        ...
+
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
         """One register."""
         ...
@@ -117,6 +125,10 @@ class Hardware(Protocol):
 
     def servo_pins(self) -> ServoPins:
         """Pins that send servo pulses."""
+        ...
+
+    def servo_port(self, settings: BusSettings) -> Port:
+        """The port of a servo bus."""
         ...
 
     def close(self) -> None:
@@ -190,6 +202,12 @@ class RealHardware:
         from shapechanger.robot.drivers.lgpio_servo import LgpioServoPins
 
         return LgpioServoPins()
+
+    def servo_port(self, settings: BusSettings) -> Port:
+        """A serial port over `dynamixel_sdk`."""
+        from shapechanger.robot.drivers.dynamixel.port import open_serial_port
+
+        return open_serial_port(settings)
 
     def close(self) -> None:
         """Let go of the pins."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, cast
 
 import gymnasium as gym
@@ -28,6 +29,10 @@ class EnvRef(msgspec.Struct, frozen=True):
         """The id, with the arguments if there are any."""
         arguments = ", ".join(f"{name}={value}" for name, value in self.kwargs.items())
         return f"{self.id} ({arguments})" if arguments else self.id
+
+    def having(self, more: Mapping[str, Any]) -> EnvRef:
+        """The same env with more arguments, or with others in their place."""
+        return EnvRef(self.id, {**self.kwargs, **more})
 
     def make(self, **more: Any) -> gym.Env[Any, Any]:
         """Make the env.

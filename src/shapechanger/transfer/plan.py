@@ -13,13 +13,18 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.settings import Settings
 
-__all__ = ["ARMS", "Arm", "Plan", "Run", "RunKind", "TransferTask"]
+__all__ = ["ARMS", "EVERY_ARM", "LIKENED", "Arm", "Plan", "Run", "RunKind", "TransferTask"]
 
-Arm = Literal["scratch", "zero-shot", "fine-tune"]
-RunKind = Literal["source", "random", "scratch", "zero-shot", "fine-tune"]
+Arm = Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"]
+RunKind = Literal["source", "random"] | Arm
 
 ARMS: Final[tuple[Arm, ...]] = ("scratch", "zero-shot", "fine-tune")
-_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *ARMS)
+"""What every pair of envs can be compared by."""
+LIKENED: Final[tuple[Arm, ...]] = ("randomised", "identified")
+"""What is learned in a source that was made more like the target; see
+`shapechanger.transfer.likeness`."""
+EVERY_ARM: Final[tuple[Arm, ...]] = (*ARMS, *LIKENED)
+_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM)
 # Welch's interval needs two of each; fewer than five are too wide to say much.
 _FEWEST_SEEDS: Final = 2
 
@@ -52,6 +57,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         source_policy: SHA-256 of the policy file that was brought along; empty if the study trains
             its own, one for each seed.
         last_k: How many of the last evaluations count as the end of a run.
+        exclusive: Whether only one run at a time can have the target, as a robot.
+        individual: The argument of the target that says which individual it is, of which each seed
+            meets another one; empty if there is but one target.
         versions: Version of each package that the numbers depend on: a study that goes on with
             others would mix two kinds of numbers.
 
@@ -70,6 +78,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     seed: int = 0
     source_policy: str = ""
     last_k: int = 3
+    exclusive: bool = False
+    individual: str = ""
     versions: dict[str, str]
 
     def __post_init__(self) -> None:
@@ -79,8 +89,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
                 f"got {self.seeds}."
             )
         for arm in self.arms:
-            if arm not in ARMS:
-                raise UnknownName("arm", arm, ARMS)
+            if arm not in EVERY_ARM:
+                raise UnknownName("arm", arm, EVERY_ARM)
         if len(set(self.arms)) != len(self.arms):
             raise StudyError(f"Each arm is named once, got {', '.join(self.arms)}.")
         if "scratch" not in self.arms or len(self.arms) < 2:
@@ -89,11 +99,11 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     def runs(self) -> tuple[Run, ...]:
         """Every run of the study, those that others wait for first."""
         brought = bool(self.source_policy)
-        wanted: list[RunKind] = ["random", *(arm for arm in ARMS if arm in self.arms)]
-        if not brought:
+        wanted: list[RunKind] = ["random", *(arm for arm in EVERY_ARM if arm in self.arms)]
+        if not brought and {"zero-shot", "fine-tune"} & set(self.arms):
             wanted.insert(0, "source")
         # One policy that was brought along does the same in every run; one says it all.
-        once = {"zero-shot"} if brought else set[str]()
+        once = {"zero-shot"} if brought and not self.individual else set[str]()
         return tuple(
             Run(kind, i) for kind in wanted for i in range(1 if kind in once else self.seeds)
         )
@@ -102,6 +112,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         """The seed of a run, independent of every other run's and of what else runs."""
         entropy = np.random.SeedSequence(self.seed, spawn_key=(_KINDS.index(run.kind), run.index))
         return int(entropy.generate_state(1)[0] >> 1)
+
+    def target_of(self, run: Run) -> EnvRef:
+        """The target of a run: where there are individuals, that of its index."""
+        if not self.individual:
+            return self.task.target
+        return self.task.target.having({self.individual: run.index})
 
     def grows(self, other: Plan) -> bool:
         """Whether this is the other study with more seeds: what was done there counts here."""

@@ -15,6 +15,7 @@ from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.transfer.body_map import MappedEnv
 from shapechanger.transfer.by_camera import learn_by_camera
 from shapechanger.transfer.cloning import Recording, evaluate_clone, load_clone
+from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.evaluation import (
     Evaluation,
     evaluate,
@@ -23,7 +24,8 @@ from shapechanger.transfer.evaluation import (
 )
 from shapechanger.transfer.executor import Report
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
-from shapechanger.transfer.plan import Plan, Run
+from shapechanger.transfer.likeness import likened_source
+from shapechanger.transfer.plan import LIKENED, Plan, Run
 from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.settings import CloningSettings, LearnerSettings, SacSettings
 from shapechanger.transfer.training import EVALUATION_SEED, train, use_one_thread
@@ -33,6 +35,8 @@ __all__ = ["RunResult", "finished", "perform"]
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
 _POLICY: Final = "policy.zip"
+# The env of a policy that was learned in a source made more like the target.
+_SOURCE: Final = "source.json"
 
 
 class RunResult(msgspec.Struct, frozen=True):
@@ -58,7 +62,7 @@ def finished(plan: Plan, study: Path, run: Run) -> RunResult | None:
         CorruptStudy: If its file cannot be read, or is not that of this run.
     """
     path = run.folder(study) / _RESULT
-    trains = run.kind in ("source", "scratch", "fine-tune")
+    trains = run.kind in ("source", "scratch", "fine-tune", *LIKENED)
     if not path.exists() or (trains and not policy_path(study, run).exists()):
         return None
     remedy = f"delete {path.parent} to do that run again"
@@ -112,10 +116,16 @@ def perform(plan: Plan, run: Run, study: str, source_policy: str, report: Report
         start = load_policy(source_path) if run.kind == "fine-tune" else None
         policy = _train(plan, run, start, on_evaluation, report)
         save_policy(policy, folder / _POLICY)
+    elif run.kind in LIKENED:
+        source = likened_source(plan, run)
+        write_json(folder / _SOURCE, source)
+        policy = _train_in(plan, source, run, report)
+        save_policy(policy, folder / _POLICY)
+        on_evaluation(_evaluate_unchanged(plan, run, policy))
     elif run.kind == "random":
         on_evaluation(_evaluate_random(plan, run))
     else:
-        on_evaluation(_evaluate_unchanged(plan, load_policy(source_path)))
+        on_evaluation(_evaluate_unchanged(plan, run, load_policy(source_path)))
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
     write_json(folder / _RESULT, result)
 
@@ -131,13 +141,13 @@ def _drive(
 ) -> None:
     """Learn to drive by camera in the source or in the target, or see what that is worth."""
     if run.kind == "zero-shot":
-        on_evaluation(evaluate_clone(plan.task.target, load_clone(source_path), settings))
+        on_evaluation(evaluate_clone(plan.target_of(run), load_clone(source_path), settings))
         return
     of_source = run.kind == "source"
     # The same demonstrations for each arm: the arms differ in what they begin with.
     shown = Run("source" if of_source else "scratch", run.index)
     policy = learn_by_camera(
-        plan.task.source if of_source else plan.task.target,
+        plan.task.source if of_source else plan.target_of(run),
         settings,
         plan.source_steps if of_source else plan.steps,
         plan.seed_of(run),
@@ -165,7 +175,7 @@ def _train(
     if not isinstance(plan.settings, LearnerSettings):
         raise StudyError(f"{plan.learner} does not learn by trying.")
     return train(
-        plan.task.source if of_source else plan.task.target,
+        plan.task.source if of_source else plan.target_of(run),
         plan.learner,
         plan.settings,
         plan.source_steps if of_source else plan.steps,
@@ -179,24 +189,39 @@ def _train(
 
 def _evaluate_random(plan: Plan, run: Run) -> Evaluation:
     """What actions drawn at random are worth in the target."""
-    envs = evaluation_envs(plan.task.target, plan.settings)
+    envs = evaluation_envs(plan.target_of(run), plan.settings)
     try:
         # Each run draws its own actions, from starts of its own.
         seed = plan.seed_of(run)
-        return evaluate(random_actions(envs[0].action_space, seed), envs, seed)
+        actions = random_actions(envs[0].action_space, seed)
+        return evaluate(actions, envs, seed, episodes=plan.settings.eval_episodes)
     finally:
         for env in envs:
             env.close()
 
 
-def _evaluate_unchanged(plan: Plan, source: TrainedPolicy) -> Evaluation:
+def _train_in(plan: Plan, source: EnvRef, run: Run, report: Report) -> TrainedPolicy:
+    """Learn in a source that was made more like the target."""
+    if not isinstance(plan.settings, LearnerSettings):
+        raise StudyError(f"{plan.learner} does not learn by trying.")
+    return train(
+        source,
+        plan.learner,
+        plan.settings,
+        plan.source_steps,
+        plan.seed_of(run),
+        on_evaluation=lambda evaluation: None,
+        on_steps=report,
+    )
+
+
+def _evaluate_unchanged(plan: Plan, run: Run, source: TrainedPolicy) -> Evaluation:
     """What a source policy is worth in the target, made to look like the source by the map."""
     envs = [
-        MappedEnv(plan.task.target.make(), plan.body_map)
-        for _ in range(plan.settings.eval_episodes)
+        MappedEnv(env, plan.body_map) for env in evaluation_envs(plan.target_of(run), plan.settings)
     ]
     try:
-        return evaluate(source.act, envs, EVALUATION_SEED)
+        return evaluate(source.act, envs, EVALUATION_SEED, episodes=plan.settings.eval_episodes)
     finally:
         for env in envs:
             env.close()

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.replay import MixedReplay
 from shapechanger.demos.cloning.sb3 import from_sb3, to_sb3
 from shapechanger.errors import MissingExtra
 from shapechanger.transfer.cloning import (
@@ -34,9 +35,7 @@ try:
     from stable_baselines3 import SAC
     from stable_baselines3.common.buffers import ReplayBuffer
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.type_aliases import ReplayBufferSamples
     from stable_baselines3.common.utils import polyak_update
-    from stable_baselines3.common.vec_env import VecNormalize
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
@@ -70,29 +69,6 @@ class AnchoredSAC(SAC):
             self.anchor.zero_grad()
             loss.backward()  # pyright: ignore[reportUnknownMemberType]
             self.anchor.step()  # pyright: ignore[reportUnknownMemberType]
-
-
-class MixedReplay(ReplayBuffer):
-    """A replay whose batches are half of demonstrations.
-
-    Attributes:
-        demonstrations: Where that half comes from; None for none.
-    """
-
-    demonstrations: ReplayBuffer | None = None
-
-    def sample(self, batch_size: int, env: VecNormalize | None = None) -> ReplayBufferSamples:
-        """A batch, the demonstrated transitions last."""
-        if self.demonstrations is None:
-            return super().sample(batch_size, env)
-        half = batch_size // 2
-        own = cast("Any", super().sample(batch_size - half, env))
-        shown = self.demonstrations.sample(half, env)
-        both: list[Any] = [
-            None if one is None or other is None else torch.cat((one, other))
-            for one, other in zip(own, shown, strict=True)
-        ]
-        return ReplayBufferSamples(*both)
 
 
 def learn_by_trying(

@@ -19,6 +19,7 @@ from shapechanger.transfer.brought import steps_brought_along
 from shapechanger.transfer.env_ref import layouts_of
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
+from shapechanger.transfer.likeness import require_likeness
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
 from shapechanger.transfer.runs import RunResult, finished, perform
@@ -90,8 +91,7 @@ def make_plan(
         settings: Its settings.
         seeds: Runs of each arm, at least 2.
         steps: Target steps of a run; None for the learner's own number.
-        source_steps: Source steps of a source policy; None for half as many as target steps, so
-            that there is something left to compare when they are counted too.
+        source_steps: Source steps of a source policy; None for the learner's own number.
         source_policy: File of a policy to bring along in place of training one for each seed.
         arms: What to compare.
         seed: Number that the seeds of all runs are drawn from.
@@ -111,8 +111,11 @@ def make_plan(
         _require_demonstrators(task, learner)
     budget = settings.whole_updates(settings.steps if steps is None else steps)
     require_budget(settings.steps if steps is None else steps, settings)
-    source_budget = settings.whole_updates(budget // 2 if source_steps is None else source_steps)
-    body_map = _body_map(task, rules, map_text, units)
+    if source_steps is None:
+        own = settings.source_steps if isinstance(settings, LearnerSettings) else 0
+        source_steps = own or budget // 2
+    source_budget = settings.whole_updates(source_steps)
+    body_map, individual, exclusive = _looked_at(task, tuple(arms), rules, map_text, units)
     digest = ""
     if source_policy is not None:
         source_budget = steps_brought_along(source_policy, task.source, learner, settings)
@@ -132,6 +135,8 @@ def make_plan(
         source_policy=digest,
         # Each evaluation of a clone is another clone, of another number of demonstrations.
         last_k=1 if isinstance(settings, CloningSettings) else _LAST_K,
+        individual=individual,
+        exclusive=exclusive,
         versions={
             "shapechanger": shapechanger.__version__,
             "python": platform.python_version(),
@@ -248,21 +253,29 @@ def claim_folder(plan: Plan, out: Path) -> None:
     write_json(path, plan)
 
 
-def _body_map(
-    task: TransferTask, rules: Mapping[str, Any] | None, map_text: str, units: str
-) -> BodyMap:
-    """The map between the layouts of two envs."""
+def _looked_at(
+    task: TransferTask,
+    arms: tuple[Arm, ...],
+    rules: Mapping[str, Any] | None,
+    map_text: str,
+    units: str,
+) -> tuple[BodyMap, str, bool]:
+    """The map between two envs' layouts, what tells one target from another, and who shares it."""
     source, target = task.source.make(), task.target.make()
     try:
         source_observation, source_action = layouts_of(source)
         target_observation, target_action = layouts_of(target)
+        require_likeness(task, arms, target.unwrapped)
+        individual: str = getattr(target.unwrapped, "individual", "")
+        exclusive: bool = getattr(target.unwrapped, "exclusive", False)
     finally:
         source.close()
         target.close()
     layouts = (source_observation, target_observation, source_action, target_action)
     if map_text:
-        return BodyMap.from_toml(map_text, *layouts)
-    return BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
+        return BodyMap.from_toml(map_text, *layouts), individual, exclusive
+    body_map = BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
+    return body_map, individual, exclusive
 
 
 def _require_demonstrators(task: TransferTask, learner: str) -> None:

@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import Any, cast
 
 import gymnasium as gym
+import msgspec
+import numpy as np
 
 import shapechanger
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
-from shapechanger.transfer.evaluation import Evaluation, evaluate
+from shapechanger.transfer.evaluation import Evaluation, evaluate, evaluation_envs, is_alone
 from shapechanger.transfer.policy_file import Card, Normalisation, TrainedPolicy, actor
 from shapechanger.transfer.settings import LearnerSettings, Settings
 from shapechanger.transfer.transplant import transplant
-from shapechanger.transfer.vec_env import learner_envs
+from shapechanger.transfer.vec_env import learner_envs, the_only
 
 try:
     import torch
@@ -42,9 +44,19 @@ OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
 
 
-def _make_training_envs(env: EnvRef, settings: LearnerSettings, threads: int | None) -> VecEnv:
-    """The envs that a learner steps together, normalised if the settings say so."""
-    envs: VecEnv = VecMonitor(learner_envs(env, settings.n_envs, threads))
+def _make_training_envs(
+    env: EnvRef, settings: LearnerSettings, threads: int | None, only: gym.Env[Any, Any] | None
+) -> VecEnv:
+    """The envs that a learner steps together, normalised if the settings say so.
+
+    Args:
+        env: The env.
+        settings: Of the learner.
+        threads: How many threads step it.
+        only: The one there is; None where as many are made as the settings say.
+    """
+    together = learner_envs(env, settings.n_envs, threads) if only is None else the_only(only)
+    envs: VecEnv = VecMonitor(together)
     return VecNormalize(envs, gamma=settings.gamma) if settings.normalise else envs
 
 
@@ -138,8 +150,12 @@ def train(
     """
     require_budget(steps, settings)
     # These import the module of the id, if it names one.
-    evaluation_envs = [env.make() for _ in range(settings.eval_episodes)]
-    envs = _make_training_envs(env, settings, threads)
+    judged = evaluation_envs(env, settings)
+    if alone := is_alone(judged[0]):
+        # It is trained in what it is judged in, and an update has as many steps as ever.
+        n_steps = settings.n_envs * settings.n_steps
+        settings = msgspec.structs.replace(settings, n_envs=1, n_steps=n_steps)
+    envs = _make_training_envs(env, settings, threads, judged[0] if alone else None)
     try:
         if source is None or body_map is None:
             model = _fresh_model(envs, settings, seed, tensorboard)
@@ -147,11 +163,11 @@ def train(
             model = _moved_model(envs, settings, seed, tensorboard, source, body_map)
         # Before `learn`: it begins with a reset, which already moves the running statistics.
         act = actor(model, _statistics(envs))
-        on_evaluation(evaluate(act, evaluation_envs, EVALUATION_SEED))
-        watcher = _Evaluations(settings, evaluation_envs, on_evaluation, on_steps)
+        on_evaluation(evaluate(act, judged, EVALUATION_SEED, episodes=settings.eval_episodes))
+        watcher = _Evaluations(settings, judged, on_evaluation, on_steps)
         cast("Any", model).learn(settings.whole_updates(steps), callback=watcher)
         watcher.evaluate_now()
-        observation, action = layouts_of(evaluation_envs[0])
+        observation, action = layouts_of(judged[0])
         card = Card(
             env,
             observation,
@@ -165,8 +181,8 @@ def train(
         return TrainedPolicy(model, _statistics(envs), card)
     finally:
         envs.close()
-        for evaluation_env in evaluation_envs:
-            evaluation_env.close()
+        for one in judged:
+            one.close()
 
 
 def use_one_thread() -> None:
@@ -209,6 +225,7 @@ class _Evaluations(BaseCallback):
     ) -> None:
         super().__init__()
         self._every = settings.eval_every
+        self._episodes = settings.eval_episodes
         self._envs = envs
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
@@ -222,14 +239,24 @@ class _Evaluations(BaseCallback):
         if self.num_timesteps >= self._next:
             self.evaluate_now()
             self._next += self._every
+            if is_alone(self._envs[0]):
+                self._begin_again()
 
     def evaluate_now(self) -> None:
         """Evaluate the policy as it is."""
         assert isinstance(self.model, PPO)
         act = actor(self.model, _statistics(self.training_env))
-        result = evaluate(act, self._envs, EVALUATION_SEED, self.num_timesteps)
+        result = evaluate(
+            act, self._envs, EVALUATION_SEED, self.num_timesteps, episodes=self._episodes
+        )
         self.logger.record("eval/mean_return", result.mean_return)
         self.logger.record("eval/mean_length", result.mean_length)
         for name, value in result.terms.items():
             self.logger.record(f"eval/{name}", value)
         self._on_evaluation(result)
+
+    def _begin_again(self) -> None:
+        """Begin another episode where the evaluation has left the env that is trained in."""
+        model = cast("Any", self.model)
+        model._last_obs = self.training_env.reset()
+        model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)

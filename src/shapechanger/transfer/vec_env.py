@@ -19,7 +19,7 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["ThreadVecEnv", "learner_envs"]
+__all__ = ["ThreadVecEnv", "learner_envs", "the_only"]
 
 _Indices = None | int | Iterable[int]
 
@@ -67,15 +67,16 @@ class ThreadVecEnv(VecEnv):
         self,
     ) -> tuple[NDArray[Any], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Take one step in each env; observations, rewards, ends and infos."""
-        observations, steps, restarts = self._envs.step_each(self._actions)
-        rewards, terminated, truncated, infos = zip(*steps, strict=True)
-        for info, ended, cut_off in zip(infos, terminated, truncated, strict=True):
-            info["TimeLimit.truncated"] = cut_off and not ended
-        for i, restart in restarts.items():
+        observations, results = self._envs.step_each(self._actions)
+        infos = results.of_each()
+        cut_off = results.truncated & ~results.terminated
+        for info, cut in zip(infos, cut_off.tolist(), strict=True):
+            info["TimeLimit.truncated"] = cut
+        for i, restart in results.restarts.items():
             infos[i]["terminal_observation"] = restart.final_observation
             self.reset_infos[i] = restart.info
-        ends = np.array(terminated, np.bool_) | np.array(truncated, np.bool_)
-        return observations, np.array(rewards, np.float32), ends, list(infos)
+        ends = results.terminated | results.truncated
+        return observations, results.rewards.astype(np.float32), ends, infos
 
     def close(self) -> None:
         """Close the envs; twice is fine."""
@@ -128,3 +129,8 @@ def learner_envs(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
     if spec is not None and str(spec.vector_entry_point).startswith("shapechanger."):
         return ThreadVecEnv(env.id, num_envs, threads=threads, **env.kwargs)
     return DummyVecEnv([env.make for _ in range(num_envs)])
+
+
+def the_only(env: gym.Env[Any, Any]) -> VecEnv:
+    """The one env there is, as Stable-Baselines3 wants it."""
+    return DummyVecEnv([lambda: env])

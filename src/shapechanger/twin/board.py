@@ -15,7 +15,9 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
+from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.priority import run_early
 from shapechanger.twin import wire
 from shapechanger.twin.camera import FrontCameraPipe
 from shapechanger.twin.connection import Connection
@@ -65,9 +67,10 @@ class Board:
         self._camera = camera
         self._surroundings = Surroundings(wiring, world, time.now_ns())
         sensors = self._surroundings.sensors
-        self._pins = PinBoard(wiring, chips_of(wiring.plan, world.inputs), ledger, seed)
+        self._pins = PinBoard(wiring, chips_of(wiring.plan, world), ledger, seed)
         self._pins.on_output = sensors.output_changed
-        self._operating = Operating(world, sensors, self._pins, camera, ledger, time.now_ns)
+        rig = self._surroundings.rig
+        self._operating = Operating(world, sensors, self._pins, camera, ledger, time.now_ns, rig)
         self._switchboard = Switchboard(
             listening, owner_fd, self._pins, sensors.levels, time.clock, time.now_ns, self._operate
         )
@@ -95,6 +98,8 @@ class Board:
             self._camera.take(self._world, now_ns)
 
     def _operate(self, connection: Connection, message: wire.Message) -> wire.Message | None:
+        if message["op"] == "servo":
+            return self._speak_to_servos(message)
         if message["op"] == "wait":
             self._time.wait(connection, message["until"])
             return None
@@ -102,6 +107,16 @@ class Board:
             self._time.sleep(connection, message["id"], message["ns"])
             return None
         return self._operating.do(message)
+
+    def _speak_to_servos(self, message: wire.Message) -> wire.Message:
+        """Hand bytes to the servo bus, and back what has come."""
+        rig = self._surroundings.rig
+        if rig is None:
+            raise RobotError("This twin has no servo bus.")
+        rig.require(message["device"])
+        if message["data"]:
+            rig.line.receive(bytes.fromhex(message["data"]))
+        return {"data": rig.line.send().hex()}
 
 
 def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
@@ -132,6 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--world", default="", help="kind of place; none for the plain room")
     parser.add_argument("--vehicle", default="", help="what drives there, such as car")
     parser.add_argument("--lens", action="append", default=[], help="what is wrong with the camera")
+    parser.add_argument("--finger", default="", help="parameters of a finger, as JSON")
     parser.add_argument("--one-shot-ms", type=float, help="of the enable line; none without it")
     given = parser.parse_args(arguments)
 
@@ -144,9 +160,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     width, height = (int(number) for number in given.size.split("x"))
     parts = {output.part for output in plan.outputs if output.part}
     size = (width, height) if given.fifo is not None else None
-    place = Place(given.world, given.vehicle, tuple(given.lens))
+    place = Place(given.world, given.vehicle, tuple(given.lens), given.finger)
     world = open_world(place, parts, size, given.seed)
     _warm_up(world, given.seed, pictures=size is not None)
+    if given.clock == "real":
+        run_early()  # It stands for hardware, which is never late because a machine is busy.
     time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
     camera = None
     if given.fifo is not None:

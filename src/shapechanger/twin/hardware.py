@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.twin.board_port import BoardPort
 from shapechanger.twin.clock import GrantedClock, SteadyClock
 from shapechanger.twin.i2c import TwinBus
 from shapechanger.twin.link import Link
@@ -48,6 +50,14 @@ class TwinHardware:
     def servo_pins(self) -> TwinServoPins:
         """Pins that send servo pulses."""
         return TwinServoPins(self._link, self._clock)
+
+    def servo_port(self, settings: BusSettings) -> BoardPort:
+        """The port of the servos.
+
+        Raises:
+            RobotError: If the board has none there.
+        """
+        return BoardPort(self._link, self._clock, settings)
 
     def close(self) -> None:
         """Let go of the pins and say goodbye to the board."""

@@ -24,6 +24,10 @@ class TwinBus:
         self._clock = clock
         self._bus = bus
 
+    def write_byte(self, i2c_addr: int, value: int) -> None:
+        """Send one byte: on the wire that is a register that nothing is written to."""
+        self.write_i2c_block_data(i2c_addr, value, [])
+
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
         """One register."""
         return self.read_i2c_block_data(i2c_addr, register, 1)[0]

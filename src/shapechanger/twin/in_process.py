@@ -24,6 +24,8 @@ from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.guard.wire import GuardState, Order
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.pin_board import PinBoard
+from shapechanger.twin.rig import Rig
 from shapechanger.twin.wiring import Wiring
 from shapechanger.worlds.world import World
 
@@ -169,6 +171,32 @@ class InProcessRobot:
         self._advance(self._period_ns)
         return self._observe(), self._state.bumps > bumps
 
+    def arm(self) -> None:
+        """Arm the robot, as a person does who has looked after what stopped it.
+
+        Raises:
+            RobotError: If it does not arm, and why.
+        """
+        self._orders.refused = refused = ""  # What was refused before says nothing of this.
+        for _ in range(_MOST_TRIES):
+            now_ns = self._board.now_ns
+            self._orders.waiting.append(Order(kind="arm", issued_ns=now_ns, person=True))
+            self._advance(self._tick_ns)
+            refused = self.refused
+            if self._state.armed and not refused:
+                return
+        raise RobotError(f"The robot does not arm: {refused or self._state.stop_reason}")
+
+    @property
+    def rig(self) -> Rig | None:
+        """The servos on a bus since the last start; None without any."""
+        return self._board.rig
+
+    @property
+    def pins(self) -> PinBoard:
+        """The pins and chips since the last start."""
+        return self._board.pins
+
     @property
     def refused(self) -> str:
         """Why the guard refused the newest command, in words; empty when it did not."""
@@ -214,13 +242,7 @@ class InProcessRobot:
         settings = (output.settings for output in self._plan.outputs)
         patience_s = max((number(one, "arm_s") for one in settings if "arm_s" in one), default=0.0)
         self._advance(round(patience_s * 1e9))
-        for _ in range(_MOST_TRIES):
-            now_ns = self._board.now_ns
-            self._orders.waiting.append(Order(kind="arm", issued_ns=now_ns, person=True))
-            self._advance(self._tick_ns)
-            if self._state.armed:
-                return
-        raise RobotError(f"The robot does not arm: {self._state.stop_reason}")
+        self.arm()
 
     def _observe(self) -> Observation:
         self._observed += 1

@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.twin import wire
 from shapechanger.twin.i2c import TwinBus
 from shapechanger.twin.ledger import NoLedger
 from shapechanger.twin.pin_board import Owner, PinBoard, chips_of
+from shapechanger.twin.rig import Rig
 from shapechanger.twin.servo_pins import TwinServoPins
+from shapechanger.twin.servos.port import LinePort
 from shapechanger.twin.surroundings import Surroundings
 from shapechanger.twin.timekeeper import START_NS
 from shapechanger.twin.wired import EdgeListener
@@ -98,9 +101,10 @@ class LocalClock:
 class LocalHardware:
     """Pins, buses and time of a board in this process; see `shapechanger.robot.hardware`."""
 
-    def __init__(self, link: LocalLink, clock: LocalClock) -> None:
+    def __init__(self, link: LocalLink, clock: LocalClock, rig: Rig | None = None) -> None:
         self._link = link
         self._clock = clock
+        self._rig = rig
         self._pin_factory: Any = None
 
     @property
@@ -124,6 +128,17 @@ class LocalHardware:
         """Pins that send servo pulses."""
         return TwinServoPins(self._link, self._clock)
 
+    def servo_port(self, settings: BusSettings) -> LinePort:
+        """The port of the servos.
+
+        Raises:
+            RobotError: If the board has none there.
+        """
+        if self._rig is None:
+            raise RobotError(f"There is no {settings.device} at this twin.")
+        self._rig.require(settings.device)
+        return LinePort(self._rig.line, settings.baud)
+
     def close(self) -> None:
         """Let go of the pins."""
         if self._pin_factory is not None:
@@ -141,17 +156,20 @@ class LocalBoard:
         seed: Of the phase of software PWM.
 
     Attributes:
+        pins: Its pins and chips.
         hardware: What a guard in this process drives.
+        rig: The servos on a bus; None without any.
     """
 
     def __init__(self, wiring: Wiring, world: World, seed: int = 0) -> None:
         self._clock = LocalClock()
         self._surroundings = Surroundings(wiring, world, self._clock.time_ns)
         sensors = self._surroundings.sensors
-        self._pins = PinBoard(wiring, chips_of(wiring.plan, world.inputs), NoLedger(), seed)
-        self._pins.on_output = sensors.output_changed
-        self._link = LocalLink(self._pins, sensors.levels)
-        self.hardware = LocalHardware(self._link, self._clock)
+        self.pins = PinBoard(wiring, chips_of(wiring.plan, world), NoLedger(), seed)
+        self.pins.on_output = sensors.output_changed
+        self._link = LocalLink(self.pins, sensors.levels)
+        self.rig = self._surroundings.rig
+        self.hardware = LocalHardware(self._link, self._clock, self.rig)
 
     @property
     def now_ns(self) -> int:
@@ -161,5 +179,5 @@ class LocalBoard:
     def advance(self, now_ns: int) -> None:
         """Let time, the world and the sensors go on."""
         self._clock.time_ns = now_ns
-        for edge in self._surroundings.advance(now_ns, self._pins.levels):
+        for edge in self._surroundings.advance(now_ns, self.pins.levels):
             self._link.notice(edge.pin, edge.level, edge.t)

@@ -10,6 +10,7 @@ from shapechanger.twin import wire
 from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
 from shapechanger.twin.ledger import LedgerWriter
 from shapechanger.twin.pin_board import PinBoard
+from shapechanger.twin.rig import Rig
 from shapechanger.twin.sensors import PinSensors
 from shapechanger.worlds.world import RESTING_V, World
 
@@ -28,6 +29,7 @@ class Operating:
         camera: The front camera; None without one.
         ledger: Where it is written down.
         now_ns: The time.
+        rig: The servos on a bus; None without any.
     """
 
     def __init__(
@@ -38,7 +40,9 @@ class Operating:
         camera: FrontCameraPipe | None,
         ledger: LedgerWriter,
         now_ns: Callable[[], int],
+        rig: Rig | None = None,
     ) -> None:
+        self._rig = rig
         self._world = world
         self._sensors = sensors
         self._pins = pins
@@ -76,6 +80,14 @@ class Operating:
                 return self._noted(f"distance {'dead' if message['dead'] else message['metres']}")
             case "chip":
                 return self._break_chip(message["bus"], message["address"], message["dead"])
+            case "servo_fault":
+                self._servos().break_servo(message["tendon"], message["how"])
+                return self._noted(f"servo {message['tendon']} {message['how'] or 'well'}")
+            case "magnet":
+                self._pins.encoder(message["joint"]).set_magnet(message["how"])
+                return self._noted(f"magnet {message['joint']} {message['how'] or 'well'}")
+            case "tensions":
+                return {"tensions": self._servos().tensions()}
             case "levels":
                 levels = self._pins.levels
                 return {
@@ -101,6 +113,11 @@ class Operating:
                 }
             case op:
                 raise RobotError(f"The twin's board does not know what {op!r} is.")
+
+    def _servos(self) -> Rig:
+        if self._rig is None:
+            raise RobotError("This twin has no servo bus.")
+        return self._rig
 
     def _put_back(self) -> wire.Message:
         try:

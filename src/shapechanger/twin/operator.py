@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from shapechanger.twin.camera import CameraFault
+from shapechanger.twin.chips.as5600 import Magnet
 from shapechanger.twin.levels import Channel, Levels, Pulse
 from shapechanger.twin.link import Link
+from shapechanger.twin.rig import ServoFault
 
 __all__ = ["Operator", "Whereabouts"]
 
@@ -104,6 +106,18 @@ class Operator:
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
         """Let a chip stop answering, or answer again."""
         self._link.ask(op="chip", bus=bus, address=address, dead=dead)
+
+    def break_servo(self, tendon: str, how: ServoFault) -> None:
+        """Let something happen to the servo of a tendon; "" takes back what can be taken back."""
+        self._link.ask(op="servo_fault", tendon=tendon, how=how)
+
+    def break_magnet(self, joint: str, how: Magnet = "gone") -> None:
+        """Let something happen to the magnet of a joint's encoder; "" for one that is well."""
+        self._link.ask(op="magnet", joint=joint, how=how)
+
+    def tensions(self) -> dict[str, float]:
+        """What each tendon on the servo bus is pulled with now, N, by name."""
+        return self._link.ask(op="tensions")["tensions"]
 
     def levels(self) -> Levels:
         """What all outputs do now."""

@@ -8,17 +8,20 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.settings import whole
 from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.twin.chips.as5600 import As5600
 from shapechanger.twin.chips.chip import Chip
 from shapechanger.twin.chips.ina219 import Ina219
 from shapechanger.twin.chips.mpu6050 import Mpu6050
 from shapechanger.twin.chips.pca9685 import Pca9685
+from shapechanger.twin.chips.tca9548a import Tca9548a
+from shapechanger.twin.joints import joint_chips
 from shapechanger.twin.ledger import Ledger
 from shapechanger.twin.levels import Channel, Levels, Pulse
 from shapechanger.twin.wiring import Wiring
-from shapechanger.worlds.world import Readings
+from shapechanger.worlds.world import World
 
 __all__ = ["Owner", "PinBoard", "chips_of"]
 
@@ -187,6 +190,8 @@ class PinBoard:
         """
         chip = self._chip(bus, address)
         chip.write(register, data)
+        if isinstance(chip, Tca9548a):
+            return  # It moves nothing, and hundreds of such bytes a second would fill the ledger.
         self._ledger.write(
             t, "i2c", bus=bus, address=address, register=register, data=data, pid=pid
         )
@@ -202,6 +207,19 @@ class PinBoard:
                     hz=round(pulse.hz, 3),
                     pid=pid,
                 )
+
+    def encoder(self, joint: str) -> As5600:
+        """The encoder of a joint.
+
+        Raises:
+            UnknownName: If no encoder is on such a joint.
+        """
+        muxes = [chip for chip in self._chips.values() if isinstance(chip, Tca9548a)]
+        behind = [chip for mux in muxes for chip in mux.channels.values()]
+        encoders = {chip.joint: chip for chip in behind if isinstance(chip, As5600)}
+        if joint not in encoders:
+            raise UnknownName("joint with an encoder", joint, encoders)
+        return encoders[joint]
 
     def _take_channels(self, at: tuple[int, int], chip: Pca9685) -> list[tuple[int, Pulse]]:
         """Follow a chip's channels; those that changed."""
@@ -241,8 +259,13 @@ class PinBoard:
         return chip
 
 
-def chips_of(plan: GuardPlan, readings: Callable[[], Readings]) -> dict[tuple[int, int], Chip]:
-    """The chips that a robot has, by bus and address."""
+def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
+    """The chips that a robot has, by bus and address.
+
+    Raises:
+        RobotError: If the world has other joints than the robot.
+    """
+    readings = world.inputs
     chips: dict[tuple[int, int], Chip] = {}
     for output in plan.outputs:
         if output.settings.get("over") == "pca9685":
@@ -252,4 +275,6 @@ def chips_of(plan: GuardPlan, readings: Callable[[], Readings]) -> dict[tuple[in
         if sensor.driver in ("mpu6050", "ina219"):
             at = whole(sensor.settings, "bus"), whole(sensor.settings, "address")
             chips[at] = Mpu6050(readings) if sensor.driver == "mpu6050" else Ina219(readings)
+        elif sensor.driver == "as5600":
+            chips |= joint_chips(sensor, world)
     return chips

@@ -24,11 +24,13 @@ class Place:
             with boxes in it, which needs nothing.
         vehicle: What drives there, such as "car"; in the room it follows from the parts.
         lenses: What is wrong with the camera, see `shapechanger.worlds.lens`.
+        finger: Parameters of the finger whose tendons the robot pulls, as JSON; "" for none.
     """
 
     world: str = ""
     vehicle: str = ""
     lenses: tuple[str, ...] = ()
+    finger: str = ""
 
 
 def open_world(
@@ -47,7 +49,15 @@ def open_world(
         ProfileError: If the vehicle has other parts.
         WorldError: If the vehicle cannot drive there.
         MissingExtra: If MuJoCo is needed and not installed.
+        FingerError: If the parameters of the finger are none.
     """
+    if place.finger:
+        try:
+            from shapechanger.embodiments.finger import FingerParameters
+            from shapechanger.twin.world.finger import FingerWorld
+        except ModuleNotFoundError as error:
+            raise MissingExtra(error.name or "mujoco", "sim") from error
+        return FingerWorld(FingerParameters.from_json(place.finger), seed)
     if not place.world:
         return DrivingWorld(frozenset(parts), size or ROOM, seed)
     try:

@@ -159,6 +159,8 @@ def start_board(
         if place is not None and place.world:
             command += ["--world", place.world, "--vehicle", place.vehicle]
             command += [part for lens in place.lenses for part in ("--lens", lens)]
+        if place is not None and place.finger:
+            command += ["--finger", place.finger]
         fifo_path = None
         if camera is not None:
             fifo_path = folder / _FIFO

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from shapechanger.twin.esc import SpeedController
 from shapechanger.twin.levels import Levels
+from shapechanger.twin.rig import rig_of
 from shapechanger.twin.sensors import Edge, PinSensors
 from shapechanger.twin.wiring import Wiring
 from shapechanger.worlds.world import World
 
 __all__ = ["Surroundings"]
+
+# A board that a busy machine kept waiting for longer does not count that time for its servos: they
+# would take its silence for the guard's, and their watchdogs would let go.
+_MOST_STILL_NS: Final = 40_000_000
 
 
 class Surroundings:
@@ -21,6 +28,7 @@ class Surroundings:
 
     Attributes:
         sensors: What is on the input pins.
+        rig: The servos on a bus; None without any.
         now_ns: How far the world has gone.
     """
 
@@ -28,6 +36,7 @@ class Surroundings:
         self._wiring = wiring
         self._world = world
         self.sensors = PinSensors(wiring.plan, world)
+        self.rig = rig_of(wiring.plan, world)
         self.now_ns = now_ns
         self._controllers = {
             name: SpeedController(plan)
@@ -39,6 +48,8 @@ class Surroundings:
         """Let the world go on until now; the edges of inputs on the way."""
         start_ns = self.now_ns
         if now_ns > start_ns:
+            if self.rig is not None:
+                self.rig.line.advance(min(now_ns - start_ns, _MOST_STILL_NS))
             self._world.advance((now_ns - start_ns) / 1e9, self.parts(levels))
             self.now_ns = now_ns
         return self.sensors.advance(start_ns, self.now_ns, self._world.inputs())

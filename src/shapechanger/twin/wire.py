@@ -12,13 +12,15 @@ pin     pin, duty, hz, t      level (hz 0) or software PWM of an output
 pulse   pin, us, hz, t        servo pulses; 0 us for none; the pin is claimed with the first
 read    id, bus, address, register, length       answered by data, or errno
 write   id, bus, address, register, data, t      answered by nothing more, or errno
+servo   id, device, data      bytes for the servo bus, hex; answered by data that came from it
 wait    until                 done with what was granted; grant the next time
 sleep   id, ns                let time go by; answered by t, captured_ns
 bye                           a client that leaves on purpose
 ```
 
 What an operator says besides, see `Operator`: `place`, `camera`, `press`, `battery`, `distance`,
-`chip`, `levels` and `where`. It is answered after everything that was said before.
+`chip`, `servo_fault`, `magnet`, `tensions`, `levels` and `where`. It is answered after everything
+that was said before.
 
 What the board says:
 

@@ -142,6 +142,8 @@ class Wiring:
                 return self._servo(output, self._pulse(output, levels))
             case "esc":
                 return self._esc(output, self._pulse(output, levels))
+            case "dynamixel":  # It is on a bus, and no level of a pin says what it does.
+                return WiredOutput(None, True)
             case driver:
                 raise RobotError(f"The twin does not know what a {driver!r} is wired to.")
 

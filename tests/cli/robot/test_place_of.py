@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shapechanger.cli.robot import serving
-from shapechanger.cli.robot.serving import TwinOptions, place_of, start_twin
+from shapechanger.cli.robot.serving import TwinOptions, finger_of, place_of, start_twin
+from shapechanger.embodiments.finger import NOMINAL, FingerParameters
+from shapechanger.envs.finger.gap import GAPS
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -28,12 +31,22 @@ def _shipped(name: str) -> Profile:
         ("lab-truck", Place("yard", "truck")),
         ("lab-boat", Place("harbour", "boat")),
         ("cat", Place()),
-        ("finger", Place()),
+        ("finger", Place(finger=NOMINAL.to_json())),
+        ("finger-pwm", Place()),
     ],
 )
 def test_a_vehicle_is_at_home_and_anything_else_in_the_room(name: str, place: Place) -> None:
     """Whoever asks for nothing gets what fits."""
     assert place_of(_shipped(name), "", ()) == place
+
+
+def test_a_finger_is_one_of_a_gap_where_it_is_asked_for() -> None:
+    """The same that `Finger-v1` draws for that seed."""
+    drawn = finger_of(_shipped("finger"), "real-like", 3)
+    assert drawn is not None
+    expected = GAPS["real-like"].draw(np.random.default_rng(3))
+    assert FingerParameters.from_json(drawn.finger) == expected
+    assert finger_of(_shipped("lab-car"), "", None) is None
 
 
 def test_lenses_go_where_the_vehicle_goes() -> None:

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.cli.robot.running import run_robot
 from shapechanger.remote.known import KnownRobot, remember
 from shapechanger.remote.vehicle import RemoteVehicleEnv
+from shapechanger.twin.running import run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
-from tests.robots import CAR, IN_A_ROOM, changed, write_profile
+from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
 
 SERVO = """\
 # A car with a servo that somebody must calibrate.
@@ -79,7 +79,7 @@ def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E arms, W drives, X disarms, Space stops, Q leaves; the wheels of the twin turn."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
-        run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot,
+        run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.operator() as operator,
     ):
         known = robot.known
@@ -128,6 +128,9 @@ driver = "servo"
 over = "lgpio"
 pin = 18
 mix = { blade = 1.0 }
+
+[limits]
+deadline_ms = 1000
 """
 """A truck whose blade is up at rest, and which no key moves."""
 
@@ -336,7 +339,7 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
 def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A steering of three levels does nothing below its threshold; a person hears why."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot:
+    with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
         with Person(
@@ -361,7 +364,7 @@ def test_a_person_lets_a_waiting_program_drive(
     """P gives the robot to the program, armed, and the person stays to stop it."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
-        run_robot(write_profile(tmp_path), arguments=IN_A_ROOM) as robot,
+        run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.operator() as operator,
     ):
         known = robot.known

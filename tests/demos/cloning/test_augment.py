@@ -9,6 +9,7 @@ from torch import Tensor
 
 from shapechanger.demos.cloning.augment import augmented, plain
 from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.demos.cloning.mirror import STEERING
 from shapechanger.demos.cloning.settings import Augmentation
 
 _NOTHING = {"mirror": 0.0, "shift": 0, "gain": 1.0, "colour": 1.0, "offset": 0.0, "noise": 0.0}
@@ -27,7 +28,9 @@ def _augmented(seed: int = 0, **changes: float) -> tuple[Tensor, Tensor, Tensor,
     index = torch.arange(len(pictures))
     augmentation = Augmentation(**{**_NOTHING, **_NOTHING_ELSE, **changes})  # pyright: ignore[reportArgumentType]
     generator = torch.Generator().manual_seed(seed)
-    seen, wanted = augmented(pictures, actions, index, augmentation, generator)
+    seen, turned = augmented(pictures, index, augmentation, generator)
+    mirrored = torch.as_tensor(STEERING(actions.numpy()))
+    wanted = torch.where(turned[:, None], mirrored, actions)
     return seen, wanted, plain(pictures, index), actions
 
 

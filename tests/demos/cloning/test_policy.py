@@ -77,10 +77,13 @@ def test_light_hardly_matters() -> None:
     )
 
 
-def test_a_picture_of_another_shape_is_refused() -> None:
+def test_a_picture_of_another_size_is_seen_and_no_picture_is_refused() -> None:
     """In a sentence, not with a page of Torch."""
-    with pytest.raises(CloningError, match="do not divide"):
-        _policy().predict(np.zeros((50, 50, 3), np.uint8))
+    assert _policy().predict(np.zeros((50, 50, 3), np.uint8)).shape == (2,)
+    with pytest.raises(CloningError, match="Pictures are an array of uint8"):
+        _policy().predict(np.zeros((50, 50), np.uint8))
+    with pytest.raises(CloningError, match="drives by pictures, and there is none"):
+        _policy().predict(None, np.zeros(3))
 
 
 def _weights(state: Any) -> bytes:
@@ -162,7 +165,7 @@ def test_nothing_in_the_file_is_run(path: Path, capsys: pytest.CaptureFixture[st
         {"framing": {"height": 0}},
         {"framing": {"height": 10**7, "width": 10**7}},
         {"framing": {"height": 10**30}},
-        {"format": 2},
+        {"format": 3},
     ],
 )
 def test_a_card_that_lies_is_refused(path: Path, changes: dict[str, Any]) -> None:

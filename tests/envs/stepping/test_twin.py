@@ -165,7 +165,7 @@ def test_a_filter_of_contacts_is_obeyed() -> None:
 def test_a_wrong_margin_is_found_out() -> None:
     """The test sees what the rules would have got wrong: here the larger margin, not the sum."""
     ant = AntEnv()
-    fast = copy.copy(find_twin(ant._watch, lambda: ant.family.load(ant.fullpath)))
+    fast = copy.copy(find_twin(ant._watch, ant.body_spec))
     assert moves_equally(ant.model, fast)
     fast.pair_margin[:] = 0.01
     assert not moves_equally(ant.model, fast)
@@ -186,7 +186,7 @@ def test_a_wrong_margin_is_found_out() -> None:
 def test_any_other_difference_is_found_out(change: Any) -> None:
     """Of one pair, of one body, of the solver."""
     ant = AntEnv()
-    fast = copy.copy(find_twin(ant._watch, lambda: ant.family.load(ant.fullpath)))
+    fast = copy.copy(find_twin(ant._watch, ant.body_spec))
     change(fast)
     assert not moves_equally(ant.model, fast)
 

@@ -10,7 +10,7 @@ from gymnasium.vector import VectorEnv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.vector.infos import batched
+from shapechanger.envs.vector.infos import Columns, batched, in_columns
 from tests.envs.vector.sameness import require_same
 
 _VECTOR = np.arange(3.0)
@@ -32,6 +32,10 @@ _CASES: dict[str, list[dict[str, Any]]] = {
 }
 
 
+def _ours(infos: list[dict[str, Any]]) -> dict[str, Any]:
+    return batched(in_columns(range(len(infos)), infos), len(infos))
+
+
 def _gymnasiums(infos: list[dict[str, Any]]) -> dict[str, Any]:
     envs: Any = VectorEnv()
     envs.num_envs = len(infos)
@@ -44,7 +48,7 @@ def _gymnasiums(infos: list[dict[str, Any]]) -> dict[str, Any]:
 @pytest.mark.parametrize("infos", _CASES.values(), ids=_CASES)
 def test_odd_infos_are_batched_as_gymnasium_does(infos: list[dict[str, Any]]) -> None:
     """Keys and their order, types, masks."""
-    require_same(batched(infos), _gymnasiums(infos))
+    require_same(_ours(infos), _gymnasiums(infos))
 
 
 _numbers = st.floats(allow_nan=False, width=32) | st.booleans() | st.integers(-1000, 1000)
@@ -57,4 +61,20 @@ _infos = st.dictionaries(_keys, _numbers.map(np.float64)) | st.fixed_dictionarie
 @given(st.lists(_infos, min_size=1, max_size=6))
 def test_any_infos_are_batched_as_gymnasium_does(infos: list[dict[str, Any]]) -> None:
     """Any mixture of keys."""
-    require_same(batched(infos), _gymnasiums(infos))
+    require_same(_ours(infos), _gymnasiums(infos))
+
+
+@given(st.lists(st.sampled_from([0, 1, 2]), min_size=1, max_size=8), st.randoms())
+def test_what_is_told_in_columns_is_batched_alike(told: list[int], order: Any) -> None:
+    """Whichever thread was the first, and with envs among them that are told of by themselves."""
+    infos = [{"a": np.float64(i), "b": i} if part else {"b": 0.5} for i, part in enumerate(told)]
+    parts: list[Columns] = []
+    for part in (1, 2):
+        numbers = [i for i, each in enumerate(told) if each == part]
+        if numbers:
+            values = {"a": np.array(numbers, np.float64), "b": np.array(numbers)}
+            parts.append(Columns(numbers, values))
+    alone = [i for i, each in enumerate(told) if each == 0]
+    parts += in_columns(alone, [infos[i] for i in alone])
+    order.shuffle(parts)
+    require_same(batched(parts, len(infos)), _gymnasiums(infos))

@@ -32,10 +32,20 @@ class _Plain(gym.Env[Any, Any]):
         self.raises = raises
         self.steps = 0
         self.thread: int | None = None
+        self.threads: list[int] = []
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
         """Begin."""
+        self.threads.append(threading.get_ident())
         return np.zeros(1), {}
+
+    def render(self) -> Any:
+        """Look."""
+        self.threads.append(threading.get_ident())
+
+    def close(self) -> None:
+        """End."""
+        self.threads.append(threading.get_ident())
 
     def step(self, action: Any) -> Any:
         """Go on."""
@@ -115,6 +125,23 @@ def test_envs_stay_with_their_thread() -> None:
     assert seen[0][:2] == [threading.get_ident()] * 2
     assert seen[0][2] == seen[0][3] != threading.get_ident()
     envs.close()
+
+
+def test_whatever_may_draw_happens_in_the_thread_of_an_env() -> None:
+    """Resets of some and with a body, pictures and calls, and the end: OpenGL demands it."""
+    envs, members = _plain({})
+    envs.step(np.zeros((4, 1)))
+    homes = [one.thread for one in members]
+    for number in range(4):
+        mask = np.arange(4) == number
+        envs.reset(options={"reset_mask": mask})
+        envs.reset(options={"reset_mask": mask, "body": "another"})
+    envs.render()
+    envs.call("render")
+    envs.close()
+    for home, one in zip(homes, members, strict=True):
+        assert one.threads == [home] * 6
+    assert len({*homes}) == 2
 
 
 @pytest.mark.parametrize(("asked", "started"), [(1, 0), (2, 1), (3, 2), (9, 2)])

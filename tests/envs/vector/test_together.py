@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -31,13 +32,13 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many ants were concluded together, each time."""
     counts: list[int] = []
-    original: Any = AntEnv.conclude.__func__  # type: ignore[attr-defined]
+    original = AntEnv.conclude
 
-    def counting(cls: Any, envs: Any, *rest: Any) -> Any:
-        counts.append(len(envs))
-        return original(cls, envs, *rest)
+    def counting(env: AntEnv, before: Any, after: Any, actions: Any) -> Any:
+        counts.append(len(after))
+        return original(env, before, after, actions)
 
-    monkeypatch.setattr(AntEnv, "conclude", classmethod(counting))
+    monkeypatch.setattr(AntEnv, "conclude", counting)
     return counts
 
 
@@ -215,7 +216,7 @@ def test_what_an_ant_raises_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     envs.step(np.zeros((4, 8), np.float32))
     times = [env.unwrapped.data.time for env in envs.envs]
 
-    def broken(action: Any) -> None:
+    def broken() -> None:
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(envs.envs[2].unwrapped._bound, "move", broken)
@@ -225,3 +226,38 @@ def test_what_an_ant_raises_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     moved = [env.unwrapped.data.time > time for env, time in zip(envs.envs, times, strict=True)]
     assert moved == [True, True, False, True]
     envs.close()
+
+
+def test_an_ant_that_another_thread_still_steps_is_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its own thread is done with all else, and waits."""
+    ours, theirs = _pair([{}] * 4, threads=2)
+    require_same(ours.reset(seed=0), theirs.reset(seed=0))
+    actions = np.full((4, 8), 0.5, np.float32)
+    require_same(ours.step(actions), theirs.step(actions))
+    first, second, third = (ours.envs[i].unwrapped._bound for i in (0, 1, 2))
+    move_first, move_second, move_third = first.move, second.move, third.move
+    begun, taken, done, told = (threading.Event() for _ in range(4))
+
+    def own() -> None:
+        begun.set()
+        assert taken.wait(20.0)
+        move_first()
+        done.set()
+
+    def helped() -> None:
+        taken.set()
+        assert done.wait(20.0)
+        told.wait(0.3)  # Nobody tells: so long the other thread could read what has not moved.
+        move_second()
+
+    def of_the_other() -> None:
+        assert begun.wait(20.0)  # Before that there is nothing to help with.
+        move_third()
+
+    monkeypatch.setattr(first, "move", own)
+    monkeypatch.setattr(second, "move", helped)
+    monkeypatch.setattr(third, "move", of_the_other)
+    require_same(ours.step(actions), theirs.step(actions))
+    _close(ours, theirs)

@@ -106,6 +106,11 @@ class Client:
         await self.say(Take())
         return await self.expect(Lease)
 
+    async def obtain(self) -> None:
+        """Ask for the command until it is had; what was told about another's comes first."""
+        while not (await self.take()).mine:
+            pass
+
     async def observe(self) -> Observation:
         """Ask for an observation."""
         await self.say(Acknowledge())
@@ -183,8 +188,7 @@ class Running:
 
     async def armed(self, client: Client) -> None:
         """Let a person take the command and arm."""
-        while not (await client.take()).mine:
-            pass
+        await client.obtain()
         await self.arm(client)
         await until(lambda: self.guard.state.armed, "the guard is armed")
 

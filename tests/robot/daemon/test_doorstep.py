@@ -54,6 +54,30 @@ def test_a_crowd_of_one_address_costs_only_itself() -> None:
     asyncio.run(play())
 
 
+def test_who_was_given_something_waits_anew() -> None:
+    """A page comes in many parts, and its sockets must not be dropped between two of them."""
+
+    async def play() -> None:
+        doorstep = Doorstep(most=2, most_of_one=2, patience_s=0.05)
+        page, silent = Fake("a"), Fake("a")
+        for visitor in (page, silent):
+            doorstep.enter(id(visitor), visitor)
+        async with asyncio.timeout(20.0):
+            while not silent.dropped:
+                doorstep.renew(id(page))
+                await asyncio.sleep(0.002)
+        assert not page.dropped
+        doorstep.enter("next", Fake("a"))
+        doorstep.renew(id(page))
+        doorstep.enter("newest", Fake("a"))
+        assert not page.dropped
+        doorstep.renew("gone")
+        doorstep.close()
+        assert page.dropped == 1
+
+    asyncio.run(play())
+
+
 def test_who_asks_for_nothing_is_dropped_in_time() -> None:
     """And who asked, or has shown the key, or has gone, is not."""
 

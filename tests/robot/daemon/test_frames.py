@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -146,7 +145,6 @@ def test_garbage_without_end_opens_the_camera_again(camera: FakeCamera, watched:
 
 def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
     """A camera that hangs must not keep the daemon from ending."""
-    began = time.monotonic()
     watched.reader.close()
-    assert time.monotonic() - began < 1.5
+    assert not watched.reader._thread.is_alive()
     assert watched.reports == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+from pathlib import Path
 
 import aiohttp
 import pytest
@@ -21,12 +22,15 @@ def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
     assert counts["understood"] > 10
 
 
-def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The daemon answers each with a reason or not at all, and serves the next one as ever."""
+    secret = tmp_path / "secret"
+    secret.mkdir()
+    (secret / "episode.json").write_text("{}")
     rng = random.Random(2)
 
     async def play() -> None:
-        async with running(car_plan(), monkeypatch) as robot:
+        async with running(car_plan(recordings=str(tmp_path / "kept")), monkeypatch) as robot:
             for _ in range(150):
                 async with robot.client() as client:
                     try:
@@ -39,5 +43,8 @@ def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch) -> None
                 assert (await client.drive(1, 0.0, 0.5)).applied_seq == 1
             moving = [order for order in robot.guard.orders if order.kind == "command"]
             assert [order.values for order in moving] == [(0.0, 0.5)]
+            # A program records nothing, and writes nothing anywhere.
+            assert [path.name for path in tmp_path.iterdir()] == ["secret"]
+            assert [path.name for path in secret.iterdir()] == ["episode.json"]
 
     asyncio.run(play())

@@ -13,12 +13,19 @@ from shapechanger.errors import LinkError
 from shapechanger.link.messages import (
     VERSION,
     Arm,
+    Browse,
     Command,
     Disarm,
     EmergencyStop,
+    Fetch,
     Hello,
+    Judge,
+    Mark,
+    Record,
     Release,
+    Suggest,
     Take,
+    Undo,
     encode,
 )
 from shapechanger.robot.cameras.camera import Frame
@@ -28,6 +35,7 @@ from shapechanger.robot.guard.wire import Order
 from tests.robot.daemon.plans import car_plan, guard_state
 
 MAX_AGE_NS = 400 * 1_000_000
+DEADLINE_NS = 250 * 1_000_000
 _places = st.integers(0, 3)
 _numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
 
@@ -39,6 +47,7 @@ class Told:
         self.role = role
         self.sent: dict[int, int] = {}
         self.newest_command = -1
+        self.newest_suggestion = -1
 
 
 class Robot(RuleBasedStateMachine):
@@ -54,8 +63,11 @@ class Robot(RuleBasedStateMachine):
         self.told: dict[int, Told] = {}
         self.holder: int | None = None
         self.numbers = 0
+        self.commanded_ns = 0
         self.stops = 0
         self.halts = 0
+        # Where a suggestion that counts comes from, its values, and when it is forgotten.
+        self.suggestion: tuple[int, tuple[float, ...], int] | None = None
 
     def connected(self) -> bool:
         """Whether there is anybody."""
@@ -77,6 +89,7 @@ class Robot(RuleBasedStateMachine):
         if place not in self.sessions:
             return
         self.sessions.pop(place).close()
+        self.forget_suggestion(place)
         if self.holder == place:
             self.holder = None
             self.stops += 1
@@ -90,6 +103,7 @@ class Robot(RuleBasedStateMachine):
         if held is None or (held == "program" and self.told[place].role == "person"):
             self.halts += held is not None
             self.holder = place
+            self.forget_suggestion(place)
 
     @rule(place=_places)
     def release(self, place: int) -> None:
@@ -155,8 +169,50 @@ class Robot(RuleBasedStateMachine):
                 self.halts += 1
             elif self.is_fresh(place, answers):
                 self.allowed.append((seq, tuple(scale * value for value in values)))
+                self.commanded_ns = self.now_ns
         told.newest_command = max(told.newest_command, seq)
         assert self.say(place, message)
+
+    @precondition(connected)
+    @rule(
+        place=_places,
+        seq=st.integers(0, 12),
+        back=st.integers(-1, 3),
+        values=st.lists(_numbers, min_size=1, max_size=3).map(tuple),
+    )
+    def suggest(self, place: int, seq: int, back: int, values: tuple[float, ...]) -> None:
+        """Somebody says what they would do: it counts if they do not command, and moves nothing."""
+        if place not in self.sessions:
+            return
+        before, told, answers = len(self.orders), self.told[place], self.answers(place, back)
+        new = seq > told.newest_suggestion
+        told.newest_suggestion = max(told.newest_suggestion, seq)
+        good = len(values) == 2 and all(map(math.isfinite, values))
+        self.say(place, Suggest(seq=seq, answers=answers, values=values))
+        if self.holder != place and new and good and self.is_fresh(place, answers):
+            self.suggestion = place, values, self.now_ns + DEADLINE_NS
+        assert len(self.orders) == before
+
+    @rule(
+        place=_places,
+        wish=st.sampled_from(
+            (
+                Record(on=True),
+                Record(on=False),
+                Mark(text="here"),
+                Undo(),
+                Browse(),
+                Fetch(episode="20260101T000000Z-0001"),
+                Judge(episode="20260101T000000Z-0001", first=0, last=3),
+            )
+        ),
+    )
+    def wish(self, place: int, wish: Any) -> None:
+        """Somebody wants something recorded or shown, which this robot cannot; nothing moves."""
+        before = len(self.orders)
+        if self.say(place, wish):
+            assert len(self.orders) == before
+            assert not self.cockpit.recorder.on
 
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
@@ -208,6 +264,30 @@ class Robot(RuleBasedStateMachine):
         place = next((p for p, s in self.sessions.items() if s.who == held), None)
         assert place == self.holder
 
+    @invariant()
+    def the_newest_suggestion_is_shown_as_long_as_it_counts(self) -> None:
+        """The same as in the reference, with its sender."""
+        shown, expected = self.cockpit.suggested(), self.suggestion
+        if expected is None or self.now_ns > expected[2]:
+            assert shown is None
+        else:
+            assert shown is not None
+            assert shown.values == expected[1]
+            assert shown.who == self.sessions[expected[0]].who
+
+    @invariant()
+    def no_command_is_in_force_unless_somebody_commands(self) -> None:
+        """And not for longer than the deadline."""
+        if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
+            assert self.cockpit.commanded() == ()
+        elif self.cockpit.commanded():
+            assert self.cockpit.commanded() == self.allowed[-1][1]
+
+    def forget_suggestion(self, place: int) -> None:
+        """What was suggested there does not count any more."""
+        if self.suggestion is not None and self.suggestion[0] == place:
+            self.suggestion = None
+
     def answers(self, place: int, back: int) -> int:
         """Number of an observation: the last one that was sent there, or so many before it."""
         return max(0, max(self.told[place].sent, default=0) - back)
@@ -226,4 +306,4 @@ class Robot(RuleBasedStateMachine):
 
 
 TestRobot = Robot.TestCase
-TestRobot.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)
+TestRobot.settings = settings(max_examples=150, stateful_step_count=60)

@@ -8,6 +8,9 @@ from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.port import Port
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.drivers.output import OutputDriver, open_output
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
@@ -96,6 +99,10 @@ class FakeBus:
             raise OSError(121, "Remote I/O error")
         return self.chips[address]
 
+    def write_byte(self, i2c_addr: int, value: int) -> None:
+        """Send one byte."""
+        self.write_i2c_block_data(i2c_addr, value, [])
+
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
         """One register."""
         return self._chip(i2c_addr).get(register, 0)
@@ -161,6 +168,10 @@ class FakeHardware:
     def servo_pins(self) -> FakeServoPins:
         """The pulses."""
         return self.pulses
+
+    def servo_port(self, settings: BusSettings) -> Port:
+        """There is none here: servos have a twin of their own."""
+        raise RobotError(f"The bus at {settings.device} cannot be opened.")
 
     def close(self) -> None:
         """Let go."""

@@ -254,7 +254,5 @@ TestRules = _World.TestCase
 TestRules.settings = settings(
     max_examples=200,
     stateful_step_count=30,
-    deadline=None,
-    derandomize=True,
     suppress_health_check=[HealthCheck.too_slow],
 )

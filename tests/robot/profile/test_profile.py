@@ -123,7 +123,7 @@ def test_a_speed_may_come_from_the_profile() -> None:
 
 def test_layout_of_a_tendon_has_one_side() -> None:
     """A tendon cannot push."""
-    finger = load_profile(shipped_profiles()["finger"])
+    finger = load_profile(shipped_profiles()["finger-pwm"])
     assert set(finger.action_layout().low) == {0.0}
     assert set(finger.state_layout().low) == {0.0}
 

@@ -16,7 +16,7 @@ from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import HOVERCRAFT, changed, read
 
 NAMES = (
-    *("boat", "boat-twin", "car", "car-esc", "cat", "finger"),
+    *("boat", "boat-twin", "car", "car-esc", "cat", "finger", "finger-pwm"),
     *("lab-boat", "lab-car", "lab-tank", "lab-truck", "tank", "truck"),
 )
 PLANS = {name: load_profile(path).guard_plan() for name, path in shipped_profiles().items()}
@@ -43,7 +43,9 @@ def test_every_comment_belongs_to_the_wiring(name: str) -> None:
     assert len(re.findall(r"# .", text)) >= 5
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("cat", "finger")])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if name not in ("cat", "finger", "finger-pwm")]
+)
 def test_vehicles_take_the_same_command(name: str) -> None:
     """Steering first, then throttle, as everywhere in the field."""
     assert [action.name for action in PLANS[name].actions][:2] == ["steering", "throttle"]
@@ -104,7 +106,7 @@ def test_a_cat_stands_as_in_2017() -> None:
 @given(pull=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
 def test_tendons_pull_one_to_one(pull: list[float]) -> None:
     """Slack is one end of a servo's travel, taut the other one, and no tendon moves another."""
-    outputs = values(PLANS["finger"], pull)
+    outputs = values(PLANS["finger-pwm"], pull)
     assert list(outputs) == ["EIP", "DI", "PI", "FDP", "FDS", "LUM", "EDC"]
     assert list(outputs.values()) == pytest.approx([2.0 * p - 1.0 for p in pull])
 

@@ -10,6 +10,7 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import Finding, examine_robot, unit_name
 
 _CAMERA = CameraPlan("pattern")
@@ -147,3 +148,18 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         ports = [f for f in examine_robot(CAR, None, port, tmp_path) if f.check == "port"]
     assert [f.level for f in ports] == ["missing"]
+
+
+def test_an_adapter_that_waits_is_told_of(tmp_path: Path) -> None:
+    """Servos that are heard 16 ms late would be silent for the guard."""
+    rig = load_profile(find_profile("finger")).guard_plan()
+    timer = "sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
+    assert _found(tmp_path, rig)["latency timer"].level == "unknown"
+    assert "plug in the adapter" in _found(tmp_path, rig)["devices"].sentence
+    _write(tmp_path, "dev/ttyUSB0", "")
+    _write(tmp_path, timer, "16\n")
+    assert _found(tmp_path, rig)["latency timer"].level == "missing"
+    assert _found(tmp_path, rig)["devices"].level == "good"
+    _write(tmp_path, timer, "1\n")
+    assert _found(tmp_path, rig)["latency timer"].level == "good"
+    assert _found(tmp_path, rig)["enable line"].level == "good"

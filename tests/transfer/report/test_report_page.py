@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.pages.pictures import png
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.report import measure_rows, verdict, write_report
 from shapechanger.transfer.report.page import report_html
-from shapechanger.transfer.report.pictures import png
 from shapechanger.transfer.study import Study
 from tests.transfer.report.studies import make_study, rising, same_body
 

@@ -10,7 +10,9 @@ import tyro
 from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
+from shapechanger.cli.robot.fetch import Fetch
 from shapechanger.cli.robot.find import Find, Forget, Remember
+from shapechanger.cli.robot.home import Home
 from shapechanger.cli.robot.init import Init
 from shapechanger.cli.robot.key import Key
 from shapechanger.cli.robot.safe_pins import SafePins
@@ -29,12 +31,14 @@ class Robot:
         Annotated[Init, tyro.conf.subcommand("init")]
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+        | Annotated[Home, tyro.conf.subcommand("home")]
         | Annotated[Serve, tyro.conf.subcommand("serve")]
         | Annotated[Key, tyro.conf.subcommand("key")]
         | Annotated[Find, tyro.conf.subcommand("find")]
         | Annotated[Remember, tyro.conf.subcommand("remember")]
         | Annotated[Forget, tyro.conf.subcommand("forget")]
         | Annotated[Drive, tyro.conf.subcommand("drive")]
+        | Annotated[Fetch, tyro.conf.subcommand("fetch")]
         | Annotated[Stop, tyro.conf.subcommand("stop")]
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
         | Annotated[Selftest, tyro.conf.subcommand("selftest")]

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from shapechanger.cli.robot.running import RunningRobot
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.running import RunningRobot
 
 __all__ = ["Check", "check_robot"]
 

@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.text import Text
 
 from shapechanger.cli.robot.jogger import Ended, Jogger, Keys, end_if_asked, live_line
-from shapechanger.cli.robot.running import run_robot
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.remote.client import RobotClient
@@ -28,6 +27,7 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     widened,
 )
+from shapechanger.twin.running import run_robot
 
 __all__ = ["Calibration"]
 

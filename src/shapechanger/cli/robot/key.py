@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from shapechanger.cli.console import plain_console
-from shapechanger.errors import UnknownName
+from shapechanger.errors import MissingExtra, UnknownName
 
 if TYPE_CHECKING:
     from shapechanger.robot.daemon.credentials import Credentials
@@ -26,6 +27,12 @@ class Key:
     """Name of the robot."""
     credentials: Path | None = None
     """Folder of its key and certificate, if not the one that `init` made."""
+    qr: bool = False
+    """Show the picture that brings a phone to the console. It holds the key: show it to nobody who
+    must not drive."""
+    address: str = ""
+    """With --qr: where the phone reaches the robot, HOST or HOST:PORT; this machine's name if not
+    given."""
 
     def run(self) -> None:
         """Print them, and how another computer remembers them."""
@@ -42,6 +49,26 @@ class Key:
             f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}",
             soft_wrap=True,
         )
+        if self.qr:
+            self._show_qr(credentials)
+
+    def _show_qr(self, credentials: Credentials) -> None:
+        """The console's address with the key as a QR code."""
+        try:
+            import segno
+        except ImportError as error:
+            raise MissingExtra("segno", "robot") from error
+        from shapechanger.cli.robot.opening import console_address
+        from shapechanger.link.fingerprint import fingerprint_hex
+        from shapechanger.remote.known import KnownRobot
+
+        key = credentials.key_file.read_text().strip()
+        address = self.address or f"{socket.gethostname()}.local"
+        robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
+        console = console_address(robot)
+        plain_console().print(f"\nThe console is at {console}; this brings a phone there:\n")
+        # Printed as it is: what measures and wraps text would take the picture apart.
+        segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
 
 
 def shown_credentials(credentials: Credentials) -> str:

@@ -16,11 +16,14 @@ from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.trial.trial import TrialResult
+    from shapechanger.cli.robot.trial.faults import Fault
+    from shapechanger.cli.robot.trial.trial import Trial, TrialResult
     from shapechanger.robot.profile.profile import Profile
 
 __all__ = ["Selftest"]
 
+# How often a trial is made again in which the robot stood before the fault: it says nothing.
+_MORE_TRIES = 2
 _MARKS = {"good": "good", "bad": "BAD", "unknown": "?"}
 
 
@@ -76,7 +79,7 @@ class Selftest:
                     table.add_row(fault.name, "", "", f"this robot has no {fault.needs}")
                     continue
                 with console.status(fault.name):
-                    results = [trial.run(fault) for _ in range(self.trials)]
+                    results = [_tried(trial, fault) for _ in range(self.trials)]
                 kept = all(result.kept for result in results)
                 good = good and kept
                 limit = f"{results[0].limit_ms:.0f} ms"
@@ -87,8 +90,8 @@ class Selftest:
     def _on_hardware(self, profile: Profile) -> bool:
         from shapechanger.cli.robot.checks import check_robot
         from shapechanger.cli.robot.jumper import check_jumper
-        from shapechanger.cli.robot.running import run_robot
         from shapechanger.cli.robot.wheels import ask_for_wheels_up
+        from shapechanger.twin.running import run_robot
 
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
@@ -106,6 +109,16 @@ class Selftest:
                     f"{_MARKS[check.level]:4}  {check.name}: {check.sentence}", soft_wrap=True
                 )
         return good
+
+
+def _tried(trial: Trial, fault: Fault) -> TrialResult:
+    """A trial; made again where the robot stood before its fault, as on a busy machine."""
+    result = trial.run(fault)
+    for _ in range(_MORE_TRIES):
+        if result.drove or result.unauthorised:
+            break
+        result = trial.run(fault)
+    return result
 
 
 def _times(results: list[TrialResult]) -> str:

@@ -52,6 +52,11 @@ class Serve:
     the vehicle is at home if not given."""
     lens: tuple[str, ...] = ()
     """With --twin: what is wrong with the camera, such as night or dirt."""
+    gap: str = ""
+    """With --twin, for a finger: what the finger is drawn from, such as real-like; the nominal one
+    if not given."""
+    finger_seed: int | None = None
+    """With --gap: which finger of it this is, as finger_seed of Finger-v1."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
     given. A twin that runs there already is used as it is."""
@@ -65,6 +70,10 @@ class Serve:
     """Let `shapechanger robot find` find it."""
     ready_file: Path | None = None
     """File to write the port and the fingerprint into, as JSON, once the robot can be reached."""
+
+    recordings: Path | None = None
+    """Folder for what is recorded on the robot; ~/.local/share/shapechanger/recordings/NAME if not
+    given."""
 
     def run(self) -> None:
         """Become the robot's supervisor; this returns only with an error."""
@@ -88,6 +97,7 @@ class Serve:
                     arm_by_program=self.arm_by_program,
                     announce=self.announce,
                     ready_file=self.ready_file,
+                    recordings=self.recordings,
                 ),
                 board,
                 self.clock,
@@ -134,10 +144,15 @@ class Serve:
             "--seed": self.seed != 0,
             "--world": bool(self.world),
             "--lens": bool(self.lens),
+            "--gap": bool(self.gap),
         }
         for option, given in asked.items():
             if given and not self.twin:
                 raise RobotError(f"{option} means something with --twin only.")
+        if self.finger_seed is not None and not self.gap:
+            raise RobotError("--finger-seed says which finger of a --gap it is: give that, too.")
+        if self.gap and self.world:
+            raise RobotError("A finger of a --gap is in no --world: give one of them.")
         if not 0 <= self.port <= _LAST_PORT:
             raise RobotError(
                 f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}."
@@ -153,7 +168,7 @@ class Serve:
         Raises:
             RobotError: If it does not start, or runs on another clock.
         """
-        from shapechanger.cli.robot.serving import TwinOptions, place_of, start_twin
+        from shapechanger.cli.robot.serving import TwinOptions, finger_of, place_of, start_twin
         from shapechanger.twin.start import find_board
 
         folder = self.twin_folder
@@ -162,7 +177,8 @@ class Serve:
             undo.callback(shutil.rmtree, folder, ignore_errors=True)
         found = find_board(folder)
         if found is None:
-            place = place_of(profile, self.world, self.lens)
+            place = finger_of(profile, self.gap, self.finger_seed) if self.gap else None
+            place = place or place_of(profile, self.world, self.lens)
             options = TwinOptions(folder, self.clock, self.wired_as, self.seed, place=place)
             started = undo.enter_context(start_twin(profile, options))
             started.outlive_exec()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -26,7 +27,16 @@ from shapechanger.twin.place import Place
 from shapechanger.twin.start import BoardAt, RunningBoard, start_board
 from shapechanger.worlds.home import HOME, require_element
 
-__all__ = ["ServeOptions", "TwinOptions", "credentials_of", "place_of", "serve_plan", "start_twin"]
+__all__ = [
+    "ServeOptions",
+    "TwinOptions",
+    "credentials_of",
+    "finger_of",
+    "place_of",
+    "recordings_folder",
+    "serve_plan",
+    "start_twin",
+]
 
 _EVERYWHERE: Final = "0.0.0.0"
 _HERE: Final = "127.0.0.1"
@@ -69,6 +79,7 @@ class ServeOptions:
         arm_by_program: Whether programs may arm it; on a twin they always may.
         announce: Whether to let others find it on the network.
         ready_file: File to write the address into; None for none.
+        recordings: Folder for what is recorded; None for the robot's own.
     """
 
     host: str = ""
@@ -78,6 +89,19 @@ class ServeOptions:
     arm_by_program: bool = False
     announce: bool = True
     ready_file: Path | None = None
+    recordings: Path | None = None
+
+
+def recordings_folder(name: str) -> Path:
+    """Where a robot keeps what it records, if nobody says where; by its name.
+
+    Raises:
+        RobotError: If the name is no name of a folder.
+    """
+    data = os.environ.get("XDG_DATA_HOME", "")
+    # As for the credentials: a relative path must be ignored.
+    base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
+    return base / "shapechanger" / "recordings" / credentials_folder(name).name
 
 
 def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials:
@@ -89,6 +113,45 @@ def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials
     """
     folder = folder or credentials_folder(name)
     return make_credentials(folder, name) if make else load_credentials(folder)
+
+
+def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
+    """The finger on a rig, where its tendons are those of a finger and MuJoCo is there.
+
+    Args:
+        profile: The robot.
+        gap: Name of the gap that the finger is drawn from; "" for the nominal finger.
+        seed: Which finger of the gap it is.
+
+    Returns:
+        None for any other robot.
+
+    Raises:
+        RobotError: If a gap is asked for and there is no finger.
+        UnknownName: If there is no such gap.
+        MissingExtra: If a gap is asked for and MuJoCo is not installed.
+    """
+    tendons = {output.name for output in profile.outputs if output.driver == "dynamixel"}
+    if find_spec("mujoco") is None:
+        if gap:
+            raise MissingExtra("mujoco", "sim")
+        return None
+    from shapechanger.embodiments.finger import NOMINAL, TENDONS
+
+    if tendons != set(TENDONS):
+        if gap:
+            raise RobotError(
+                f"A --gap is between fingers, and {profile.name} has no servos for the tendons "
+                f"{', '.join(TENDONS)}."
+            )
+        return None
+    if not gap:
+        return Place(finger=NOMINAL.to_json())
+    import numpy as np
+
+    from shapechanger.envs.finger.gap import gap_as_asked
+
+    return Place(finger=gap_as_asked(gap).draw(np.random.default_rng(seed or 0)).to_json())
 
 
 def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
@@ -119,6 +182,8 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
 
     for lens in lenses:
         find_lens(lens)
+    if not world and not lenses and (finger := finger_of(profile, "", None)) is not None:
+        return finger
     if world and world not in WORLDS:
         raise UnknownName("world", world, (_ROOM, *WORLDS))
     parts = {output.part for output in profile.outputs if output.part}
@@ -199,6 +264,7 @@ def serve_plan(
         insecure=options.insecure,
         discovery=options.announce,
         ready_file=str(options.ready_file.absolute()) if options.ready_file else "",
+        recordings=str((options.recordings or recordings_folder(profile.name)).absolute()),
     )
     guard = profile.guard_plan()
     if board is None:

@@ -30,32 +30,26 @@ def plain(pictures: Tensor, index: Tensor) -> Tensor:
 
 
 def augmented(
-    pictures: Tensor,
-    actions: Tensor,
-    index: Tensor,
-    augmentation: Augmentation,
-    generator: torch.Generator,
+    pictures: Tensor, index: Tensor, augmentation: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
     """Pictures as another day, another camera or the mirror would show them.
 
     Args:
         pictures: uint8, shape (n, height, width, 3).
-        actions: Steering and throttle, shape (n, 2).
         index: Which of them, shape (batch,).
         augmentation: What to change, and how far.
         generator: The source of chance.
 
     Returns:
-        Pictures in [0, 1], shape (batch, 3, height, width), and their actions, shape (batch, 2).
+        Pictures in [0, 1], shape (batch, 3, height, width), and which of them are mirrored, so that
+        their actions have to be mirrored, too, shape (batch,).
     """
     mirrored = torch.rand(len(index), generator=generator) < augmentation.mirror
     seen = _moved(pictures, index, mirrored, augmentation.shift, generator)
     _relight(seen, augmentation, generator)
     _blur(seen, augmentation.blurred, generator)
     _sprinkle(seen, augmentation, generator)
-    sign = torch.where(mirrored, -1.0, 1.0)
-    wanted = actions[index]
-    return seen.clamp_(0.0, 1.0), torch.stack((sign * wanted[:, 0], wanted[:, 1]), dim=1)
+    return seen.clamp_(0.0, 1.0), mirrored
 
 
 def _moved(

@@ -1,15 +1,17 @@
-"""The network that drives: a few convolutions, and two numbers at the end."""
+"""The network that drives: a few convolutions, a few layers for a state, and what comes out."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, cast
 
 import torch
 from torch import Tensor, nn
 
+from shapechanger.demos.cloning.card import Card
+from shapechanger.demos.cloning.edges import EdgeEyes
 from shapechanger.demos.cloning.pictures import CHANNELS, Framing
 
-__all__ = ["ACTIONS", "CameraNetwork", "Eyes"]
+__all__ = ["ACTIONS", "CameraNetwork", "Eyes", "Nerves", "joined"]
 
 ACTIONS: Final = 2
 """Steering and throttle."""
@@ -17,6 +19,8 @@ ACTIONS: Final = 2
 # Keeps an even picture, such as a covered lens, from being blown up into its own noise: about the
 # noise of a camera, as a share of full brightness.
 _EVEN: Final = 0.02
+# A number of a state that lies farther out, in standard deviations, says no more than this.
+_FARTHEST: Final = 5.0
 
 
 class Eyes(nn.Module):
@@ -54,22 +58,115 @@ class Eyes(nn.Module):
         return torch.relu(self.boiled_down(found.flatten(1)))
 
 
-class CameraNetwork(nn.Module):
-    """From a picture to steering and throttle.
+class Nerves(nn.Module):
+    """From a state to features.
+
+    Each number is freed of the mean and spread that it had in the demonstrations. One that is
+    missing (NaN) counts as its mean, and a flag beside it says so; one that is far out counts as
+    five standard deviations.
 
     Args:
-        framing: Size of the pictures.
-        channels: Filters of each layer.
-        features: How many features lie between.
+        size: Numbers of the state.
+        widths: Of the layers; the last one's are the features.
     """
 
-    def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
+    def __init__(self, size: int, widths: tuple[int, ...]) -> None:
         super().__init__()
-        self.eyes = Eyes(framing, channels, features)
-        self.hands = nn.Linear(features, ACTIONS)
+        self.register_buffer("middle", torch.zeros(size))
+        self.register_buffer("spread", torch.ones(size))
+        layers: list[nn.Module] = []
+        before = 2 * size
+        for after in widths:
+            layers += [nn.Linear(before, after), nn.ReLU()]
+            before = after
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, states: Tensor) -> Tensor:
+        """Features, shape (n, widths[-1]), of states, shape (n, size)."""
+        missing = states.isnan()
+        known = (states - cast("Tensor", self.middle)) / cast("Tensor", self.spread)
+        known = torch.where(missing, 0.0, known.clamp(-_FARTHEST, _FARTHEST))
+        return self.layers(torch.cat((known, missing.float()), dim=1))
+
+
+class _Several(nn.ModuleList):
+    """Several of the same, side by side."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        return torch.cat([one(x) for one in self], dim=1)
+
+
+class CameraNetwork(nn.Module):
+    """From a picture, a state or both to what a policy decides by.
+
+    Args:
+        card: What the policy is like.
+    """
+
+    def __init__(self, card: Card) -> None:
+        super().__init__()
+        eyes = [_eyes(card) for _ in range(card.members if card.eyes != "none" else 0)]
+        nerves = [
+            Nerves(card.state_size, card.nerves) for _ in range(card.members if card.nerves else 0)
+        ]
+        self.eyes: nn.Module | None = _one_or_several(eyes)
+        self.nerves: nn.Module | None = _one_or_several(nerves)
+        features = len(eyes) * card.features + (len(nerves) * card.nerves[-1] if nerves else 0)
+        self.hands = nn.Linear(features, card.outputs)
         # With colours last in memory the convolutions of a single picture are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
-    def forward(self, pictures: Tensor) -> Tensor:
-        """Actions in [-1, 1], shape (n, 2), for pictures in [0, 1], shape (n, 3, height, width)."""
-        return torch.tanh(self.hands(self.eyes(pictures)))
+    def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
+        """Features of what is seen and felt, shape (n, features).
+
+        Args:
+            pictures: In [0, 1], shape (n, 3, height, width); None without eyes.
+            states: Shape (n, state size); None without nerves.
+        """
+        found: list[Tensor] = []
+        if self.eyes is not None:
+            found.append(self.eyes(pictures))
+        if self.nerves is not None:
+            found.append(self.nerves(states))
+        return found[0] if len(found) == 1 else torch.cat(found, dim=1)
+
+    def forward(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
+        """What comes out, shape (n, outputs): before the tanh, or logits of the classes."""
+        return self.hands(self.perceive(pictures, states))
+
+
+def joined(card: Card, members: list[CameraNetwork]) -> CameraNetwork:
+    """One network whose output is the mean of the outputs of several.
+
+    Args:
+        card: What the policy of all is like.
+        members: Networks of the same shape, each of a policy with one member.
+    """
+    network = CameraNetwork(card)
+    if len(members) == 1:
+        network.load_state_dict(members[0].state_dict())
+        return network
+    for name in ("eyes", "nerves"):
+        several = getattr(network, name)
+        if several is not None:
+            for one, member in zip(several, members, strict=True):
+                one.load_state_dict(getattr(member, name).state_dict())
+    seen = card.features if card.eyes != "none" else 0
+    weights = [member.hands.weight for member in members]
+    parts = [weight[:, :seen] for weight in weights] + [weight[:, seen:] for weight in weights]
+    with torch.no_grad():
+        network.hands.weight.copy_(torch.cat(parts, dim=1) / len(members))
+        network.hands.bias.copy_(torch.stack([member.hands.bias for member in members]).mean(dim=0))
+    return network
+
+
+def _eyes(card: Card) -> nn.Module:
+    if card.eyes == "edges":
+        return EdgeEyes(card.framing, card.channels, card.features)
+    return Eyes(card.framing, card.channels, card.features)
+
+
+def _one_or_several(parts: list[nn.Module] | list[Nerves]) -> nn.Module | None:
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return _Several(parts)

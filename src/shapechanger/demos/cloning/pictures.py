@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.errors import CloningError
 
-__all__ = ["CHANNELS", "Framing", "prepare"]
+__all__ = ["CHANNELS", "Framing", "area_shares", "prepare"]
 
 CHANNELS: Final = 3
 """Red, green and blue."""
 
 # Pictures at a time, so that the sums in 16 bits need some megabytes and not gigabytes.
 _AT_A_TIME: Final = 256
+# Means in single precision may miss a half by a rounding: it still goes up.
+_HALF: Final = 0.5 + 1e-4
 
 
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
@@ -55,8 +57,9 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
 def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
     """Pictures as a policy sees them.
 
-    Each pixel is the mean of a whole block of pixels, rounded half up. Pictures that already have
-    the size of the framing come back as they are.
+    Each pixel is the mean of the area that it covers, rounded half up: of a whole block of pixels
+    where the size divides, and with shares of the pixels at its edges elsewhere. Pictures that
+    already have the size of the framing come back as they are.
 
     Args:
         pictures: Red, green and blue, shape (n, H, W, 3).
@@ -66,7 +69,7 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
         Shape (n, height, width, 3).
 
     Raises:
-        CloningError: If they are no such pictures, or their size is no multiple of the framing's.
+        CloningError: If they are no such pictures.
     """
     if pictures.ndim != 4 or pictures.shape[3] != CHANNELS or pictures.dtype != np.uint8:
         raise CloningError(
@@ -75,7 +78,14 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
         )
     if pictures.shape[1:] == framing.shape:
         return pictures
-    first, rows, columns = _blocks(pictures.shape[1], pictures.shape[2], framing)
+    if not pictures.shape[1] or not pictures.shape[2]:
+        raise CloningError(f"Pictures of shape {pictures.shape} hold no pixel.")
+    # One row is left of however low a picture.
+    first = min(round(pictures.shape[1] * framing.top), pictures.shape[1] - 1)
+    rows, rest_of_rows = divmod(pictures.shape[1] - first, framing.height)
+    columns, rest_of_columns = divmod(pictures.shape[2], framing.width)
+    if rest_of_rows or rest_of_columns or not rows or not columns:
+        return _by_area(pictures[:, first:], framing)
     small = np.empty((len(pictures), *framing.shape), np.uint8)
     for start in range(0, len(pictures), _AT_A_TIME):
         part = pictures[start : start + _AT_A_TIME, first:]
@@ -88,19 +98,23 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
     return small
 
 
-def _blocks(height: int, width: int, framing: Framing) -> tuple[int, int, int]:
-    """The first row that is seen, and the rows and columns of one block.
+def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
+    """Pictures whose size does not divide: rows first, then columns."""
+    n, height, width, _ = pictures.shape
+    of_rows = area_shares(height, framing.height)
+    of_columns = area_shares(width, framing.width)
+    small = np.empty((n, *framing.shape), np.uint8)
+    for i, picture in enumerate(pictures):  # One at a time: they may be large.
+        low = of_rows @ picture.reshape(height, -1).astype(np.float32)
+        narrow = of_columns @ low.reshape(framing.height, width, CHANNELS)
+        small[i] = np.floor(narrow + _HALF)
+    return small
 
-    Raises:
-        CloningError: If they do not come out whole.
-    """
-    first = round(height * framing.top)
-    rows, rest_of_rows = divmod(height - first, framing.height)
-    columns, rest_of_columns = divmod(width, framing.width)
-    if rest_of_rows or rest_of_columns or not rows or not columns:
-        raise CloningError(
-            f"Pictures of {width} x {height} do not divide into the {framing.width} x "
-            f"{framing.height} blocks that the policy sees below a cut of {framing.top}: "
-            "record at 160 x 120 or a multiple of it, or choose another framing."
-        )
-    return first, rows, columns
+
+def area_shares(before: int, after: int) -> NDArray[np.float32]:
+    """What share of each new pixel each old one is, along one side, shape (after, before)."""
+    edges = np.linspace(0.0, before, after + 1)
+    old = np.arange(before)
+    overlap = np.minimum(edges[1:, None], old + 1) - np.maximum(edges[:-1, None], old)
+    shares = np.clip(overlap, 0.0, None)
+    return (shares / shares.sum(axis=1, keepdims=True)).astype(np.float32)

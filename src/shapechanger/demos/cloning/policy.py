@@ -1,4 +1,4 @@
-"""A policy that drives by what a camera sees, and the file that it is kept in.
+"""A policy that drives by what it sees, feels or both, and the file that it is kept in.
 
 The file is a zip of two entries: a card in JSON, which says where the policy comes from, and the
 weights. Nothing in it is run: the weights are read as numbers only.
@@ -11,7 +11,6 @@ import io
 import os
 import pickle
 import zipfile
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -19,8 +18,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.demos.cloning.card import FORMATS, Card
 from shapechanger.demos.cloning.errors import CloningError, PolicyError
-from shapechanger.demos.cloning.pictures import Framing, prepare
+from shapechanger.demos.cloning.pictures import prepare
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, OutputError
 
@@ -39,7 +39,6 @@ _CARD: Final = "card.json"
 WEIGHTS: Final = "weights.pt"
 """The entry of a policy's file that no other policy's has."""
 
-_FORMAT: Final = 1
 # A network of the default settings is half a megabyte; more than this is something else.
 _LARGEST_ENTRY: Final = 64 * 2**20
 # So that the same policy is the same file. The earliest date that a zip can hold.
@@ -59,48 +58,11 @@ _NOT_WHOLE: Final = (
 _AT_A_TIME: Final = 256
 
 
-class Card(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a policy comes from.
-
-    Attributes:
-        framing: What it sees.
-        channels: Filters of each of its layers.
-        features: Numbers between picture and actions.
-        seeds: Seeds of the trainings that made it, the last one last.
-        steps: Steps of the last training, up to the best policy.
-        settings: Settings of the last training.
-        data: What it was learned from, in the caller's words.
-        command: The command that made it.
-        version: Version of Shapechanger.
-        format: Of the file.
-    """
-
-    framing: Framing
-    channels: tuple[int, ...]
-    features: int
-    seeds: tuple[int, ...] = ()
-    steps: int = 0
-    settings: CloneSettings | None = None
-    data: dict[str, Any] = {}
-    command: str = ""
-    version: str = msgspec.field(default_factory=lambda: version("shapechanger"))
-    format: int = _FORMAT
-
-    def __post_init__(self) -> None:
-        """Refuse what describes no network.
-
-        Raises:
-            CloningError: If it has layers without filters, or no features.
-        """
-        if not self.channels or min(self.features, *self.channels) < 1:
-            raise CloningError("A network has layers, and each has at least one number.")
-
-
 class CameraPolicy:
-    """Steering and throttle from a picture.
+    """What to do on seeing a picture, on feeling a state, or both.
 
     Attributes:
-        network: What computes them.
+        network: What computes it.
         card: Where it comes from.
     """
 
@@ -110,68 +72,146 @@ class CameraPolicy:
 
     @classmethod
     def fresh(cls, settings: CloneSettings, seed: int) -> CameraPolicy:
-        """A policy that has learned nothing."""
+        """A policy for steering and throttle from a picture that has learned nothing."""
+        return cls.blank(
+            Card(
+                framing=settings.framing,
+                channels=settings.channels,
+                features=settings.features,
+                eyes=settings.eyes,
+                format=1 if settings.eyes == "colours" else 2,
+            ),
+            seed,
+        )
+
+    @classmethod
+    def blank(cls, card: Card, seed: int) -> CameraPolicy:
+        """The policy that a card describes, before it has learned anything."""
         with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
             torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
-            network = CameraNetwork(settings.framing, settings.channels, settings.features)
-        card = Card(
-            framing=settings.framing, channels=settings.channels, features=settings.features
-        )
-        return cls(network, card)
+            return cls(CameraNetwork(card), card)
 
-    def predict(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """What to do on seeing a picture.
+    @property
+    def n_features(self) -> int:
+        """How many features it decides by."""
+        return self.network.hands.in_features
+
+    def predict(
+        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """What to do on seeing a picture and feeling a state.
 
         Args:
-            picture: Red, green and blue, shape (H, W, 3), as recorded or prepared.
+            picture: Red, green and blue, shape (H, W, 3), as recorded or prepared; None for a
+                policy without eyes.
+            state: Shape (k,), NaN for what is not known; None for a policy without a state.
 
         Returns:
-            Steering (-1 is left) and throttle (1 is forward), each in [-1, 1], shape (2,).
+            An action in the order of its layout. For a vehicle: steering (-1 is left) and throttle
+            (1 is forward), each in [-1, 1], shape (2,).
 
         Raises:
-            CloningError: If it is no picture that the policy can see.
+            CloningError: If it is nothing that the policy can see or feel.
         """
-        return self.predict_many(picture[np.newaxis])[0]
+        return self.predict_many(
+            None if picture is None else picture[np.newaxis],
+            None if state is None else state[np.newaxis],
+        )[0]
 
-    def predict_many(self, pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """What to do on seeing each of some pictures.
+    def predict_many(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """What to do each time.
 
         Args:
-            pictures: Red, green and blue, shape (n, H, W, 3), as recorded or prepared.
+            pictures: Red, green and blue, shape (n, H, W, 3), as recorded or prepared; None for a
+                policy without eyes.
+            states: Shape (n, k); None for a policy without a state.
 
         Returns:
-            Steering and throttle, shape (n, 2).
+            Actions, shape (n, m).
 
         Raises:
-            CloningError: If they are no pictures that the policy can see.
+            CloningError: If it is nothing that the policy can see or feel.
+        """
+        out = self.outputs(pictures, states)
+        if self.card.classes:
+            return np.asarray(self.card.classes, np.float32)[out.argmax(axis=1)]
+        if not self.card.low:
+            return out
+        low, high = (np.asarray(x, np.float32) for x in (self.card.low, self.card.high))
+        return (low + 0.5 * (out + 1.0) * (high - low)).astype(np.float32)
+
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """What the network says: probabilities of the classes, or actions scaled to [-1, 1].
+
+        Args:
+            pictures: As in `predict_many`.
+            states: As in `predict_many`.
+
+        Returns:
+            Shape (n, classes), each row of sum 1; or shape (n, m).
         """
         with torch.inference_mode():
-            return torch.tanh(self.network.hands(self._seen(pictures))).numpy()
+            out = self.network.hands(self._perceived(pictures, states))
+            return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
 
-    def features(self, pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """What the eyes make of each of some pictures.
+    def features(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """What it makes of what it sees and feels, before it decides.
 
         Args:
-            pictures: Red, green and blue, shape (n, H, W, 3), as recorded or prepared.
+            pictures: As in `predict_many`.
+            states: As in `predict_many`.
 
         Returns:
-            Features, each at least 0, shape (n, features).
+            Features, each at least 0, shape (n, n_features).
 
         Raises:
-            CloningError: If they are no pictures that the policy can see.
+            CloningError: If it is nothing that the policy can see or feel.
         """
         with torch.inference_mode():
-            return self._seen(pictures).numpy()
+            return self._perceived(pictures, states).numpy()
 
-    def _seen(self, pictures: NDArray[np.uint8]) -> Tensor:
-        small = prepare(pictures, self.card.framing)
-        found = torch.empty(len(small), self.card.features)
-        for start in range(0, len(small), _AT_A_TIME):
-            part = torch.as_tensor(small[start : start + _AT_A_TIME].copy())
-            found[start : start + len(part)] = self.network.eyes(
-                plain(part, torch.arange(len(part)))
+    def _perceived(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
+    ) -> Tensor:
+        small = self._seen(pictures)
+        felt = self._felt(states)
+        n = len(small) if small is not None else len(felt) if felt is not None else 0
+        found = torch.empty(n, self.n_features)
+        for start in range(0, n, _AT_A_TIME):
+            some = slice(start, start + _AT_A_TIME)
+            part = None if small is None else torch.as_tensor(small[some].copy())
+            found[some] = self.network.perceive(
+                None if part is None else plain(part, torch.arange(len(part))),
+                None if felt is None else felt[some],
             )
         return found
+
+    def _seen(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
+        if self.card.eyes == "none":
+            return None
+        if pictures is None:
+            raise CloningError("This policy drives by pictures, and there is none.")
+        return prepare(pictures, self.card.framing)
+
+    def _felt(self, states: NDArray[np.floating] | None) -> Tensor | None:
+        layout = self.card.state_layout
+        if layout is None:
+            return None
+        if states is None or states.ndim != 2 or states.shape[1] != layout.size:
+            raise CloningError(
+                f"This policy feels {', '.join(layout.names)}: states of shape (n, {layout.size}), "
+                f"got {'none' if states is None else states.shape}."
+            )
+        felt = np.array(states, np.float32)
+        for name in self.card.unseen:
+            felt[:, layout.slices[name]] = np.nan
+        return torch.as_tensor(felt)
 
     def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
         """The same policy with more on its card.
@@ -235,9 +275,10 @@ def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
 
 
 def _require_format(card: Card) -> None:
-    if card.format != _FORMAT:
+    if card.format not in FORMATS:
         raise ValueError(
-            f"it has format {card.format} of Shapechanger {card.version}; this one reads {_FORMAT}."
+            f"it has format {card.format} of Shapechanger {card.version}; this one reads "
+            f"{' and '.join(map(str, FORMATS))}."
         )
 
 
@@ -253,7 +294,7 @@ def _network(card: Card, weights: bytes) -> CameraNetwork:
     state = cast("dict[str, Tensor]", loaded)
     # On the meta device a card that lies about its sizes takes no memory before it is found out.
     with torch.device("meta"):
-        network = CameraNetwork(card.framing, card.channels, card.features)
+        network = CameraNetwork(card)
     network.load_state_dict(state, assign=True)
     for name, value in state.items():
         if value.dtype != torch.float32 or not bool(torch.isfinite(value).all()):

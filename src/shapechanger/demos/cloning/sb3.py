@@ -27,11 +27,11 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["NormedReLU", "SeenByPolicy", "from_sb3", "to_sb3"]
+__all__ = ["LOG_STD", "NormedReLU", "SeenByPolicy", "from_sb3", "to_sb3"]
 
 # Logarithm of the first standard deviation of an action before it is squashed: a clone is sure of
 # what it does, and would otherwise begin by driving at random.
-_LOG_STD: Final = -2.0
+LOG_STD: Final = -2.0
 
 
 class SeenByPolicy(gym.ObservationWrapper[NDArray[np.float32], Any, NDArray[np.uint8]]):
@@ -54,7 +54,7 @@ class SeenByPolicy(gym.ObservationWrapper[NDArray[np.float32], Any, NDArray[np.u
             raise PolicyError(f"A policy that drives by pictures cannot see {space}.")
         super().__init__(env)
         self._policy = policy
-        self.observation_space = spaces.Box(0.0, np.inf, (policy.card.features,), np.float32)
+        self.observation_space = spaces.Box(0.0, np.inf, (policy.n_features,), np.float32)
         self.observation(np.zeros(shape, np.uint8))
 
     def observation(self, observation: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -119,7 +119,7 @@ def to_sb3(
     spread = cast("nn.Linear", model.actor.log_std)
     with torch.no_grad():
         spread.weight.zero_()
-        spread.bias.fill_(_LOG_STD)
+        spread.bias.fill_(LOG_STD)
     return model
 
 

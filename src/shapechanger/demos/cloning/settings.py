@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 
 from shapechanger.demos.cloning.errors import CloningError
@@ -70,6 +72,15 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         patience: How many checks in a row may bring no better policy before training ends.
         rehearsal: Share of each batch that comes from the rehearsed pictures, if there are any.
         augmentation: How pictures are changed.
+        eyes: What the first layer sees: "colours" as they are, or "edges": how strong the edges of
+            each direction are in each cell, which knows neither light nor colour.
+        nerves: Widths of the layers that a state goes through.
+        members: How many networks are averaged; each leaves out another stretch of time to choose
+            when to stop, so that together they learn from all of it.
+        dropout: Share of the features that are left out in each step.
+        smoothing: Share of certainty that is taken from the classes that were shown.
+        averaging: How much of the average of the weights of earlier steps is kept in each step;
+            0 for the weights of the last step.
     """
 
     framing: Framing = Framing()
@@ -91,6 +102,12 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     patience: int = 10
     rehearsal: float = 0.25
     augmentation: Augmentation = Augmentation()
+    eyes: Literal["colours", "edges"] = "colours"
+    nerves: tuple[int, ...] = (64, 64)
+    members: int = 1
+    dropout: float = 0.0
+    smoothing: float = 0.0
+    averaging: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict themselves.
@@ -113,6 +130,10 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
             raise CloningError("held_out and rehearsal are shares in [0, 1).")
         if min(self.warm_up, self.weight_decay, self.throttle_weight) < 0:
             raise CloningError("warm_up, weight_decay and throttle_weight are at least 0.")
+        if not self.nerves or min(self.members, *self.nerves) < 1:
+            raise CloningError("members is at least 1, and so is each of nerves.")
+        if not all(0.0 <= x < 1.0 for x in (self.dropout, self.smoothing, self.averaging)):
+            raise CloningError("dropout, smoothing and averaging are shares in [0, 1).")
 
     def steps(self, pictures: int) -> int:
         """Steps of training for so many pictures."""

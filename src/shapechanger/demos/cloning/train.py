@@ -12,8 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.batches import Batches
-from shapechanger.demos.cloning.demonstrations import Demonstrations, held_out
+from shapechanger.demos.cloning.demonstrations import Examples, held_out, steering_examples
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra
@@ -22,15 +21,18 @@ try:
     import torch
     from torch import Tensor
     from torch.nn import functional
+
+    from shapechanger.demos.cloning.batches import Batch, Batches
+    from shapechanger.demos.cloning.fit import fit
+    from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["Check", "History", "clone"]
+__all__ = ["HUBER_BETA", "Check", "History", "clone"]
 
 # Where the loss turns from a square into a straight line: an error of a tenth of the steering's
 # range is a mistake, and one mistake of the driver should not count as much as ten small ones.
-_HUBER_BETA: Final = 0.1
-_LARGEST_GRADIENT: Final = 1.0
+HUBER_BETA: Final = 0.1
 _MOST_CERTAIN: Final = 0.95
 
 
@@ -116,22 +118,33 @@ def clone(
     began = time.monotonic()
     settings = CloneSettings() if settings is None else settings
     framing = settings.framing if start is None else start.card.framing
-    shown = Demonstrations.checked(pictures, actions, framing)
-    kept_back = held_out(len(shown.actions), episodes, settings.held_out)
-    again = None if rehearsal is None else Demonstrations.checked(*rehearsal, framing)
+    shown = steering_examples(pictures, actions, framing)
+    kept_back = held_out(len(shown), episodes, settings.held_out)
+    again = None if rehearsal is None else steering_examples(*rehearsal, framing)
 
     policy = CameraPolicy.fresh(settings, seed) if start is None else start.copy()
     if start is None:
-        _begin_with(policy, shown.actions[~kept_back].mean(axis=0))
+        _begin_with(policy, shown.targets[~kept_back].mean(axis=0))
     batches = Batches(shown, ~kept_back, again, settings, seed)
-    exam = Demonstrations(shown.pictures[kept_back], shown.actions[kept_back])
+    exam = shown.part(kept_back)
     rate = settings.learning_rate if start is None else settings.further_rate
-    checks, best, taken = _learn(policy, batches, exam, settings, rate, on_check)
+    weights = torch.tensor([1.0, settings.throttle_weight])
+
+    def loss(network: CameraNetwork, batch: Batch) -> Tensor:
+        done = torch.tanh(network(batch.pictures))
+        errors = functional.smooth_l1_loss(done, batch.targets, reduction="none", beta=HUBER_BETA)
+        return (errors * weights).mean()
+
+    def judge(network: CameraNetwork, step: int, loss: float) -> Check:
+        return _check(CameraPolicy(network, policy.card), exam, step, loss)
+
+    checks, place, taken = fit(policy.network, batches, loss, judge, settings, rate, on_check)
+    best = checks[place]
 
     card = msgspec.structs.replace(
         policy.card, seeds=(*policy.card.seeds, seed), steps=best.step, settings=settings
     )
-    guess = _errors(np.median(shown.actions[~kept_back], axis=0), exam.actions)
+    guess = _errors(np.median(shown.targets[~kept_back], axis=0), exam.targets)
     history = History(
         checks=tuple(checks),
         best=best,
@@ -151,67 +164,8 @@ def _begin_with(policy: CameraPolicy, mean: NDArray[np.float32]) -> None:
         policy.network.hands.bias.copy_(torch.atanh(certain))
 
 
-def _learn(
-    policy: CameraPolicy,
-    batches: Batches,
-    exam: Demonstrations,
-    settings: CloneSettings,
-    rate: float,
-    on_check: Callable[[Check], None],
-) -> tuple[list[Check], Check, int]:
-    """Train a policy's network in place, and leave it as it was at its best."""
-    network = policy.network
-    optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
-    total = settings.steps(batches.size)
-    every = max(total // settings.checks, 1)
-    weights = torch.tensor([1.0, settings.throttle_weight])
-
-    best = _check(policy, exam, 0, math.nan)
-    on_check(best)
-    checks = [best]
-    best_state = _copied(network.state_dict())
-    losses: list[float] = []
-    step = worse = 0
-    while step < total and worse < settings.patience:
-        for group in optimizer.param_groups:
-            group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
-        network.train()
-        seen, wanted = batches.draw()
-        loss = _loss(network(seen), wanted, weights)
-        optimizer.zero_grad()
-        loss.backward()  # pyright: ignore[reportUnknownMemberType]
-        torch.nn.utils.clip_grad_norm_(network.parameters(), _LARGEST_GRADIENT)
-        optimizer.step()  # pyright: ignore[reportUnknownMemberType]
-        losses.append(loss.item())
-        step += 1
-        if step % every and step < total:
-            continue
-        check = _check(policy, exam, step, float(np.mean(losses)))
-        on_check(check)
-        checks.append(check)
-        losses.clear()
-        worse += 1
-        if not check.error >= best.error:  # Without held-out pictures the last is the best.
-            best, worse, best_state = check, 0, _copied(network.state_dict())
-    network.load_state_dict(best_state)
-    network.eval()
-    return checks, best, step
-
-
-def _loss(done: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    errors = functional.smooth_l1_loss(done, wanted, reduction="none", beta=_HUBER_BETA)
-    return (errors * weights).mean()
-
-
-def _share_of_rate(step: int, total: int, warm_up: int) -> float:
-    """Up along a line, down along half a cosine."""
-    rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
-    return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
-
-
-def _check(policy: CameraPolicy, exam: Demonstrations, step: int, loss: float) -> Check:
-    policy.network.eval()
-    return Check(step, loss, *_errors(policy.predict_many(exam.pictures), exam.actions))
+def _check(policy: CameraPolicy, exam: Examples, step: int, loss: float) -> Check:
+    return Check(step, loss, *_errors(policy.predict_many(exam.pictures), exam.targets))
 
 
 def _errors(done: NDArray[np.floating], wanted: NDArray[np.float32]) -> tuple[float, float]:
@@ -220,7 +174,3 @@ def _errors(done: NDArray[np.floating], wanted: NDArray[np.float32]) -> tuple[fl
         return math.nan, math.nan
     steering, throttle = np.abs(done - wanted).mean(axis=0).tolist()
     return steering, throttle
-
-
-def _copied(state: dict[str, Tensor]) -> dict[str, Tensor]:
-    return {name: value.clone() for name, value in state.items()}

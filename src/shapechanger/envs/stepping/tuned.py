@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, NamedTuple, cast
 from weakref import WeakValueDictionary
 
 import gymnasium as gym
@@ -14,15 +14,30 @@ from numpy.typing import NDArray
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.envs.stepping.twin import demand_for, find_twin, known_twin
 from shapechanger.envs.stepping.watch import ModelWatch
-from shapechanger.morphology import reshape
 from shapechanger.morphology.pose import StartRules
 
-__all__ = ["Binding", "Kind", "Outcome", "StepResult", "TunedStep"]
+__all__ = ["Binding", "Kind", "Outcomes", "StepResult", "TunedStep"]
 
 # What `step` gives; Gymnasium's own steps promise that they never truncate.
 StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any]]
-# The same of a step of many: reward, terminated and info.
-Outcome = tuple[Any, bool, dict[str, Any]]
+
+
+class Outcomes(NamedTuple):
+    """What n envs of one kind see and are given for a step.
+
+    Attributes:
+        observations: Shape (n, size of one).
+        rewards: (n,).
+        terminated: Whether the step ended the episode of each.
+        infos: For each key of an info the value of each env.
+        diverged: Places of the envs whose simulation MuJoCo found bad.
+    """
+
+    observations: NDArray[np.float64]
+    rewards: NDArray[Any]
+    terminated: NDArray[np.bool_]
+    infos: dict[str, NDArray[Any] | list[Any]]
+    diverged: Sequence[int]
 
 
 class Kind:
@@ -49,9 +64,9 @@ class Binding:
         demand: How much a twin would be used.
         shape: Shape of an action.
         dt: Time of a step as long as the model is unedited, s.
-        trouble: How often MuJoCo found the pose, the velocity or the acceleration bad, (3,).
-        gathered: What `_conclude` needs to know of the data after a step.
-        width: How many numbers that is.
+        trouble: Not 0 where MuJoCo found the pose, the velocity or the acceleration bad, (3,).
+        before: What `conclude` needs to know of the time before a step, in arrays of float64.
+        after: And of the time after it; items of 8 bytes.
         kind: Envs whose bindings have the same may be concluded together after `ready_together`;
             None for one that steps alone.
         kind_known: Whether the kind has been found out since the last reset.
@@ -73,23 +88,27 @@ class Binding:
         self.qpos = data.qpos
         self.qvel = data.qvel
         self.trouble = trouble(data)
-        self.gathered: list[NDArray[np.float64]] = []
-        self.width = 0
+        self.before: list[NDArray[np.float64]] = []
+        self.after: list[NDArray[Any]] = []
         self.kind: Kind | None = None
         self.kind_known = False
 
-    def move(self, action: NDArray[Any]) -> Any:
-        """Step the physics alone; what `_conclude` needs to know of the time before."""
-        self.ctrl[:] = action
+    def move(self) -> None:
+        """Step the physics alone."""
         mujoco.mj_step(self.stepping, self.data, self.frame_skip)
         mujoco.mj_rnePostConstraint(self.stepping, self.data)
 
 
-def trouble(data: mujoco.MjData) -> NDArray[np.int32]:
-    """A view of how often MuJoCo has found the pose, the velocity or the acceleration bad, (3,)."""
+def trouble(data: mujoco.MjData) -> NDArray[np.int64]:
+    """A view that is not 0 where MuJoCo has found pose, velocity or acceleration bad, (3,).
+
+    Each is the two numbers of an `mjWarningStat`: how often, and where the last time.
+    """
     first = int(mujoco.mjtWarning.mjWARN_BADQPOS)
     last = int(mujoco.mjtWarning.mjWARN_BADQACC)
-    return cast("Any", data.warning).number[first : last + 1]
+    wheres = cast("Any", data.warning).lastinfo[first : last + 1]
+    pairs = np.lib.stride_tricks.as_strided(wheres, (wheres.size, 2), (wheres.strides[0], 4))
+    return pairs.reshape(-1).view(np.int64)
 
 
 class TunedStep(Reshapable):
@@ -211,23 +230,20 @@ class TunedStep(Reshapable):
         return bound
 
     def _kind_of(self, bound: Any) -> Hashable:
-        """All that `conclude` takes from one env for all of them; None for one that steps alone."""
+        """All that `conclude` takes from one env for all of them; None for one that steps alone.
+
+        What it takes from each is brought up to date in the binding.
+        """
         return None
 
-    @classmethod
     def conclude(
-        cls,
-        envs: Sequence[Any],
-        befores: Sequence[Any],
-        gathered: NDArray[np.float64],
-        actions: NDArray[Any],
-    ) -> tuple[NDArray[np.float64], list[Outcome]]:
-        """What envs of one kind see and are given after their physics has stepped.
+        self, before: NDArray[np.float64], after: NDArray[np.float64], actions: NDArray[Any]
+    ) -> Outcomes:
+        """What envs of this one's kind see and are given after their physics has stepped.
 
         Args:
-            envs: The envs.
-            befores: What each `move` gave.
-            gathered: For each env what its binding has `gathered`, a row each.
+            before: For each env what its binding named under `before`, a row each.
+            after: And under `after`.
             actions: What each did, a row each.
         """
         raise NotImplementedError
@@ -260,10 +276,7 @@ class TunedStep(Reshapable):
                 return bound if self._fresh(bound) else None
             if not bound.unedited():
                 return None
-            self._take_twin(
-                bound,
-                find_twin(bound.watch, lambda: reshape(self.family.load(self.fullpath), self.body)),
-            )
+            self._take_twin(bound, find_twin(bound.watch, self.body_spec))
             return bound
         return bound if bound.unedited() else None
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from shapechanger.envs.vector.env import Restart, ThreadVectorEnv
+from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.envs.vector.make import make_vec
+from shapechanger.envs.vector.results import Restart
 
 __all__ = ["Restart", "ThreadVectorEnv", "make_vec"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import gymnasium as gym
@@ -41,7 +41,7 @@ class Access(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def render(self) -> tuple[Any, ...]:
         """One frame per env."""
         self._require_open()
-        return tuple(cast("Any", env).render() for env in self.envs)
+        return self._of_each(lambda i: cast("Any", self.envs[i]).render())
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Call a method of each env, or read an attribute.
@@ -51,8 +51,12 @@ class Access(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             *args: Arguments of the method.
             **kwargs: Named arguments of the method.
         """
-        found = [env.get_wrapper_attr(name) for env in self.envs]
-        return tuple(one(*args, **kwargs) if callable(one) else one for one in found)
+
+        def ask(i: int) -> Any:
+            found = self.envs[i].get_wrapper_attr(name)
+            return found(*args, **kwargs) if callable(found) else found
+
+        return self._of_each(ask)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of each env."""
@@ -71,8 +75,13 @@ class Access(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         each = cast("Sequence[Any]", values) if isinstance(values, list | tuple) else None
         if each is not None and len(each) != self.num_envs:
             raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
-        for i, env in enumerate(self.envs):
-            env.set_wrapper_attr(name, values if each is None else each[i])
+        self._of_each(
+            lambda i: self.envs[i].set_wrapper_attr(name, values if each is None else each[i])
+        )
+
+    def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
+        """What `work` gives for the number of each env, where that env is at home."""
+        raise NotImplementedError
 
     def _require_open(self) -> None:
         """Refuse to go on after `close`.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from shapechanger.errors import BadAction
 
 __all__ = ["checked"]
+
+_NUMBERS: Final = "iufc"  # Kinds of NumPy's types, as letters.
 
 
 def checked(
@@ -34,9 +36,9 @@ def checked(
     if not fits:
         _refuse_shape(actions, num_envs, shape)
     given = np.asarray(actions)
-    if not np.issubdtype(given.dtype, np.number):
+    if given.dtype.kind not in _NUMBERS:
         raise BadAction(f"Actions are numbers, not of the type {given.dtype}.")
-    if not np.isfinite(given).all():
+    if not np.logical_and.reduce(np.isfinite(given), axis=None):
         rows = np.isfinite(given).reshape(num_envs, -1).all(axis=1)
         bad = np.flatnonzero(~rows & ~ignored)
         if bad.size:

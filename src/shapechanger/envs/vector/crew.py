@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -24,10 +24,16 @@ class Crew:
 
     Args:
         threads: How many, with that of the caller.
+        num_envs: How many envs there are.
+
+    Attributes:
+        parts: The numbers of the envs of each thread, that of the caller first.
     """
 
-    def __init__(self, threads: int) -> None:
+    def __init__(self, threads: int, num_envs: int) -> None:
         self._pool = Pool(threads)
+        ends = [num_envs * part // threads for part in range(threads + 1)]
+        self.parts = [range(a, b) for a, b in pairwise(ends)]
 
     @property
     def threads(self) -> int:
@@ -39,8 +45,8 @@ class Crew:
         """Whether an interruption left threads at work; their envs are not to be touched."""
         return self._pool.lost
 
-    def do(self, work: _Work, numbers: Sequence[int], *, alone: bool = False) -> None:
-        """Do `work` for the envs `numbers`, and return when all of it is done.
+    def do(self, work: _Work, numbers: Iterable[int], *, alone: bool = False) -> None:
+        """Do `work` for the envs `numbers`, each in its thread; return when all of it is done.
 
         Args:
             work: What to do for the env of a number.
@@ -51,29 +57,18 @@ class Crew:
             Exception: What the work raised for the first env that failed, with the env's number as
                 a note; it was done for all others.
         """
-        self.share(partial(work_through, work), numbers, alone=alone)
+        chosen = list(numbers)
+        parts = [chosen] if alone else [[i for i in chosen if i in part] for part in self.parts]
+        self.share([partial(work_through, work, part) for part in parts])
 
-    def share(
-        self,
-        work: Callable[[Sequence[int], Failures], None],
-        numbers: Sequence[int],
-        *,
-        alone: bool = False,
-    ) -> None:
-        """Let each thread do `work` for its part of the envs `numbers`.
-
-        Args:
-            work: What to do for the envs of these numbers; appends what an env raises.
-            numbers: Numbers of the envs.
-            alone: Whether the caller's thread does it all.
+    def share(self, works: Sequence[Callable[[Failures], None]]) -> None:
+        """Let each thread do one of `works`, which appends what an env raises.
 
         Raises:
             Exception: As in `do`.
         """
         failures: Failures = []
-        parts = 1 if alone else min(self._pool.threads, len(numbers))
-        ends = [len(numbers) * part // parts for part in range(parts + 1)]
-        self._pool.run([partial(work, numbers[a:b], failures) for a, b in pairwise(ends)])
+        self._pool.run([partial(work, failures) for work in works])
         if failures:
             number, error = min(failures, key=lambda failure: failure[0])
             error.add_note(f"This was raised by env {number} of the vector env.")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 import weakref
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -14,30 +16,20 @@ from numpy.typing import NDArray
 
 from shapechanger.envs.vector.access import Access
 from shapechanger.envs.vector.actions import checked
+from shapechanger.envs.vector.alike import Alike
 from shapechanger.envs.vector.crew import Crew, Failures, work_through
-from shapechanger.envs.vector.infos import batched
-from shapechanger.envs.vector.member import Member, Step
+from shapechanger.envs.vector.infos import batched, in_columns
+from shapechanger.envs.vector.member import Member
 from shapechanger.envs.vector.resets import masked_options, one_seed_each
+from shapechanger.envs.vector.results import Restart, Results
 from shapechanger.envs.vector.spaces import require_boxes, require_same_spaces
-from shapechanger.envs.vector.stride import stride
+from shapechanger.envs.vector.stride import Stride
 from shapechanger.errors import VectorEnvError
 
-__all__ = ["Restart", "ThreadVectorEnv"]
+__all__ = ["ThreadVectorEnv"]
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
-
-
-class Restart(NamedTuple):
-    """A reset that followed the end of an episode within the same step.
-
-    Attributes:
-        final_observation: The last observation of the episode.
-        info: The info of the reset.
-    """
-
-    final_observation: NDArray[Any]
-    info: dict[str, Any]
 
 
 class ThreadVectorEnv(Access):
@@ -106,7 +98,8 @@ class ThreadVectorEnv(Access):
         self._nowhere = np.zeros(self.num_envs, np.bool_)
         self._awaits_reset = True
         threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
-        self._crew = Crew(threads)
+        self._crew = Crew(threads, self.num_envs)
+        self._alike = [Alike() for _ in range(threads)]
         # Ends the threads of a vector env that nobody closes, and at the end of the program.
         weakref.finalize(self, self._crew.stop)
 
@@ -145,7 +138,8 @@ class ThreadVectorEnv(Access):
             raise gym.error.ResetNeeded("No episode is under way: call `reset` without a mask.")
         chosen = range(self.num_envs) if mask is None else [int(i) for i in np.flatnonzero(mask)]
         observations, infos = self.reset_each(seeds, [options] * self.num_envs, chosen)
-        return observations, batched(infos)
+        everybody = range(self.num_envs)
+        return observations, batched(in_columns(everybody, infos), self.num_envs)
 
     def reset_each(
         self,
@@ -170,8 +164,17 @@ class ThreadVectorEnv(Access):
         def start(i: int) -> None:
             infos[i] = self._members[i].reset(seeds[i], options[i])
 
-        # Another body has to be compiled and its pictures drawn anew, which is for one thread.
-        self._guarded(lambda: self._crew.do(start, numbers, alone=any(options)))
+        if any(given and "body" in given for given in options):
+            # Another body is compiled by one thread at a time, and its pictures are drawn anew.
+            compiling = threading.Lock()
+
+            def start_in_turn(i: int) -> None:
+                with compiling:
+                    start(i)
+
+            self._guarded(lambda: self._at_home(start_in_turn, numbers))
+        else:
+            self._guarded(lambda: self._crew.do(start, numbers))
         self._ended[numbers] = False
         return self._present_observations(), infos
 
@@ -186,60 +189,76 @@ class ThreadVectorEnv(Access):
             ResetNeeded: If an env must be reset first.
             ClosedEnvironmentError: If the vector env is closed.
         """
-        observations, steps, restarts = self.step_each(actions)
-        rewards, terminated, truncated, infos = zip(*steps, strict=True)
-        if restarts:
-            infos = list(infos)
-            for i, (final, info) in restarts.items():
-                infos[i] = {"final_obs": final, "final_info": infos[i], **info}
+        observations, results = self.step_each(actions)
         return (
             observations,
-            np.array(rewards, np.float64),
-            np.array(terminated, np.bool_),
-            np.array(truncated, np.bool_),
-            batched(infos),
+            results.rewards,
+            results.terminated,
+            results.truncated,
+            results.batched(),
         )
 
-    def step_each(self, actions: Any) -> tuple[NDArray[Any], list[Step], dict[int, Restart]]:
-        """Take one step in each env, as `step`; what came of it is told env by env.
+    def step_each(self, actions: Any) -> tuple[NDArray[Any], Results]:
+        """Take one step in each env, as `step`; what came of it can be told env by env.
 
         Returns:
-            The observations of all envs; for each its reward, whether it terminated and was
-            truncated, and its info; and by number the envs that started again at once.
+            The observations of all envs, and all else.
         """
         self._require_open()
         waits = self._ended if self._mode is AutoresetMode.NEXT_STEP else self._nowhere
         given = checked(actions, self.num_envs, self._action_shape, waits)
         self._require_running()
-        steps: list[Step] = [(0.0, False, False, {})] * self.num_envs
-        restarts: dict[int, Restart] = {}
-        members, waiting = self._members, waits.tolist()
-        same_step = self._mode is AutoresetMode.SAME_STEP
+        results = Results(self.num_envs)
+        restart = partial(self._restart, results) if self._starts_at_once else None
+        stride = Stride(self._members, given, self._observations, results, restart, self._alike)
+        self._guarded(lambda: self._advance(waits.tolist(), stride, results))
+        self._ended = results.terminated | results.truncated
+        return self._present_observations(), results
+
+    def _advance(self, waiting: list[bool], stride: Stride, results: Results) -> None:
+        """Start again who waits for it, and step the others."""
 
         def start(i: int) -> None:
-            steps[i] = (0.0, False, False, members[i].reset())
+            results.tell(i, (0.0, False, False, self._members[i].reset()))
 
-        def done(i: int, step: Step) -> None:
-            steps[i] = step
-            if same_step and (step[1] or step[2]):
-                restarts[i] = self._restart(i, steps)
+        def work(thread: int, failures: Failures) -> None:
+            own = self._crew.parts[thread]
+            work_through(start, [i for i in own if waiting[i]], failures)
+            stride.advance(thread, [i for i in own if not waiting[i]], failures)
 
-        def advance(numbers: Sequence[int], failures: Failures) -> None:
-            work_through(start, [i for i in numbers if waiting[i]], failures)
-            rest = [i for i in numbers if not waiting[i]]
-            stride(members, given, self._observations, rest, done, failures)
-
-        self._guarded(lambda: self._crew.share(advance, range(self.num_envs)))
-        if not np.isfinite(self._observations).all():
-            self._end_diverged(steps, restarts)
-        self._ended = np.array([step[1] or step[2] for step in steps], np.bool_)
-        return self._present_observations(), steps, restarts
+        self._crew.share([partial(work, thread) for thread in range(self.threads)])
+        stride.conclude()
+        self._end_diverged(results)
+        if self._starts_at_once:
+            ends = np.flatnonzero(results.terminated | results.truncated).tolist()
+            ended = [i for i in ends if i not in results.restarts]
+            if ended:
+                self._crew.do(partial(self._restart, results), ended)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """End the threads and close each env."""
-        self._crew.stop()
-        for env in self.envs:
-            env.close()
+        """Close each env and end the threads."""
+        try:
+            self._at_home(lambda i: self.envs[i].close(), range(self.num_envs))
+        finally:
+            self._crew.stop()
+
+    def _at_home(self, work: Callable[[int], None], numbers: Iterable[int]) -> None:
+        """Do `work` for the envs `numbers`, where they draw.
+
+        Those that step their physics apart draw nothing by the way, so whoever asks them for a
+        picture draws it. Others may: what they draw with belongs to their thread.
+        """
+        drawn_here = self.closed or all(member.tuned is not None for member in self._members)
+        self._crew.do(work, numbers, alone=drawn_here)
+
+    def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
+        found: dict[int, Any] = {}
+
+        def ask(i: int) -> None:
+            found[i] = work(i)
+
+        self._at_home(ask, range(self.num_envs))
+        return tuple(found[i] for i in range(self.num_envs))
 
     def _require_running(self) -> None:
         """Refuse to step envs that are not under way.
@@ -266,21 +285,25 @@ class ThreadVectorEnv(Access):
             self.closed = self._crew.lost
         self._awaits_reset = False
 
-    def _restart(self, i: int, steps: list[Step]) -> Restart:
+    @property
+    def _starts_at_once(self) -> bool:
+        return self._mode is AutoresetMode.SAME_STEP
+
+    def _restart(self, results: Results, i: int) -> None:
         """Reset an env whose episode has ended; if its last observation is bad, say why."""
         member = self._members[i]
         if not np.isfinite(member.row).all():
-            steps[i] = member.diverged(*steps[i][2:])
-        return Restart(member.row.copy(), member.reset())
+            results.tell_diverged(i, member)
+        results.restarts[i] = Restart(member.row.copy(), member.reset())
 
-    def _end_diverged(self, steps: list[Step], restarts: dict[int, Restart]) -> None:
+    def _end_diverged(self, results: Results) -> None:
         """End the episodes whose observation is not finite, though nobody has noticed before."""
-        finite = np.isfinite(self._observations).reshape(self.num_envs, -1).all(axis=1)
-        for i in (int(number) for number in np.flatnonzero(~finite)):
-            if i not in restarts:
-                steps[i] = self._members[i].diverged(*steps[i][2:])
-                if self._mode is AutoresetMode.SAME_STEP:
-                    restarts[i] = self._restart(i, steps)
+        finite = np.isfinite(self._observations)
+        if not np.logical_and.reduce(finite, axis=None):
+            bad = ~finite.reshape(self.num_envs, -1).all(axis=1)
+            for i in np.flatnonzero(bad).tolist():
+                if i not in results.restarts:
+                    results.tell_diverged(i, self._members[i])
 
     def _present_observations(self) -> NDArray[Any]:
         return self._observations.copy() if self.copy else self._observations

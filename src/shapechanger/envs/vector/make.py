@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
-from shapechanger.envs.catalogue import CATALOGUE, find
+from shapechanger.envs.catalogue import CATALOGUE, find, find_task
 from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.errors import UnknownName, VectorEnvError
 
@@ -88,7 +88,7 @@ def _known_id(env_id: str) -> str:
     """The id, where its name alone was given."""
     if env_id in gym.registry or ":" in env_id or "/" in env_id:
         return env_id
-    return find(env_id).id
+    return find_task(env_id) or find(env_id).id
 
 
 def _cores() -> int:

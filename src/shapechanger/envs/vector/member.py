@@ -86,7 +86,7 @@ class Member:
             self.row[...] = observation
         else:
             reward, terminated, truncated, info = self._step_into(action, self.row)
-            truncated = self._ticked() or truncated
+            truncated = self.ticked() or truncated
         if "diverged" in info or (self._warnings is not None and self._warned()):
             return self.diverged(truncated, info)
         return reward, terminated, truncated, info
@@ -98,22 +98,8 @@ class Member:
         bound = self.tuned.ready_together()
         return None if bound is None or bound.kind is None else bound
 
-    def concluded(self, reward: Any, terminated: bool, info: dict[str, Any], bad: bool) -> Step:
-        """What `step` would give, of an env whose physics has stepped apart.
-
-        Args:
-            reward: What the step is worth.
-            terminated: Whether it ends the episode.
-            info: The info of the env.
-            bad: Whether the simulation has diverged.
-        """
-        truncated = self._ticked()
-        if bad:
-            return self.diverged(truncated, info)
-        return reward, terminated, truncated, info
-
-    def _ticked(self) -> bool:
-        """Whether the time of the episode is over with one more step."""
+    def ticked(self) -> bool:
+        """Count one more step; whether the time of the episode is over with it."""
         clock = self._clock
         if clock is None:
             return False

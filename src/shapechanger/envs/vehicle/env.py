@@ -65,7 +65,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     `progress`, metres along the course since the start; `collisions` since the start, of any part
     of the vehicle, also those that no bumper tells; `pose`, (x, y, heading) in m and rad; `course`,
     the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`,
-    `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`.
+    `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
@@ -95,6 +95,8 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         WorldError: If the vehicle cannot drive in the world.
     """
 
+    record_clock: Final = "twin"
+    """Where the nanoseconds in `info` come from."""
     metadata: dict[str, Any] = {"render_modes": [*_MODES], "render_fps": 20}  # noqa: RUF012
 
     def __init__(
@@ -161,6 +163,11 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def observation_layout(self) -> Layout:
         """What the numbers of an observation mean; a picture is the one block `camera/image`."""
         return self._senses.observation_layout
+
+    @property
+    def newest_jpeg(self) -> bytes | None:
+        """The picture in the newest observation, as the robot has it; None without one."""
+        return None if self._last is None or not self._senses.has_image else self._last.frame
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -293,4 +300,6 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             "collisions": self._world.collisions,
             "pose": (pose.x, pose.y, pose.heading),
             "course": self._world.seed,
+            "captured_ns": seen.captured_ns,
+            "decided_ns": seen.command_ns,
         }

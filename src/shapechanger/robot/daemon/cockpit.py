@@ -6,6 +6,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Final, Protocol
 
 from shapechanger.errors import RobotRefused
@@ -13,8 +14,11 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Command, Event, Lease, Refused, RobotMessage
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.lease import Holder, LeaseDesk
+from shapechanger.robot.daemon.library import Library
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.recorder import Recorder
+from shapechanger.robot.daemon.wishes import Wish, Wishes
 from shapechanger.robot.guard.wire import GuardState, Order
 
 __all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "Cockpit", "Member"]
@@ -52,10 +56,13 @@ class Cockpit:
         plan: What the robot is.
         now_ns: Gives the robot's time.
         order: Hands an order to the guard.
+        call: Runs a function in the thread of the connections, from any other one.
 
     Attributes:
         plan: What the robot is.
         lease: Who commands.
+        recorder: Records what is driven.
+        library: Knows what was recorded.
         reader: Reads the state.
         action_size: How many numbers a command has.
         state: What the guard said last; None for nothing yet.
@@ -65,7 +72,11 @@ class Cockpit:
     """
 
     def __init__(
-        self, plan: DaemonPlan, now_ns: Callable[[], int], order: Callable[[Order], None]
+        self,
+        plan: DaemonPlan,
+        now_ns: Callable[[], int],
+        order: Callable[[Order], None],
+        call: Callable[[Callable[[], None]], None] | None = None,
     ) -> None:
         self.plan = plan
         self.lease = LeaseDesk()
@@ -80,6 +91,10 @@ class Cockpit:
         self._order = order
         self._members: dict[int, Member] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
+        self._wishes = Wishes(plan.deadline_ms)
+        call = _at_once if call is None else call
+        self.recorder = Recorder(plan, self._tell, call)
+        self.library = Library(Path(plan.recordings) if plan.recordings else None, call)
 
     def now_ns(self) -> int:
         """The robot's time."""
@@ -103,8 +118,15 @@ class Cockpit:
     def leave(self, session: int) -> None:
         """A connection has ended; if it commanded, the robot stops and is disarmed."""
         member = self._members.pop(session, None)
-        if member is not None:
-            self.release(member.who, f"the connection to {member.who.name} has ended")
+        if member is None:
+            return
+        self._wishes.forget(session)
+        self.release(member.who, f"the connection to {member.who.name} has ended")
+        self.recorder.forget(session)
+        if self.recorder.on and not any(m.who.role == "person" for m in self._members.values()):
+            # Nobody is left who could end it.
+            self.recorder.end("The last person has left, and recording ended with that.")
+            self._tell(self.recorder.state())
 
     def take(self, who: Holder) -> None:
         """Give somebody the command, and tell everybody; or tell them why not."""
@@ -115,10 +137,12 @@ class Cockpit:
             self._members[who.session].tell(Lease(mine=False, holder=name, reason=refusal))
             return
         lost = self.lease.take(who)
+        self._wishes.forget(who.session)
         reason = f"{who.name} commands."
         if lost is not None:
             # What the other one said last must not act on: whoever took it wants that ended.
             self.give_order(Order(kind="halt"))
+            self._wishes.end_command()
             reason = f"{who.name}, a person, took the command from {lost.name}."
         self._tell_lease(reason)
 
@@ -127,6 +151,7 @@ class Cockpit:
         if not self.lease.give_up(who.session):
             return
         self.give_order(Order(kind="disarm", reason=why))
+        self._wishes.end_command()
         self._tell_lease(f"Nobody commands: {why}.")
 
     def command(self, command: Command, now_ns: int) -> None:
@@ -135,6 +160,11 @@ class Cockpit:
         self._arrivals[key] = now_ns
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
+        values = tuple(command.scale * value for value in command.values)
+        if (held := self.lease.holder) is not None:
+            self._wishes.command(held, values, command.ttl_ms, now_ns)
+            if self.state is not None and self.state.armed:
+                self.recorder.decided(held, command.answers, values, now_ns)
         self._order(
             Order(
                 kind="command",
@@ -143,19 +173,34 @@ class Cockpit:
                 issued_ns=now_ns,
                 ttl_ms=command.ttl_ms,
                 frame_ns=None if self.newest is None else self.newest.frame.captured_ns,
-                values=tuple(command.scale * value for value in command.values),
+                values=values,
             )
         )
 
     def halt(self) -> None:
         """Take back the newest command, because whoever commands said nonsense after it."""
         # Nobody has to wait until it takes effect: whoever said that waits for an observation.
+        self._wishes.end_command()
         self._order(Order(kind="halt", issued_ns=self._now_ns()))
 
     def give_order(self, order: Order) -> None:
         """Hand the guard an order that is no command, with the time of now."""
         self.unsettled = True
         self._order(replace(order, issued_ns=self._now_ns()))
+
+    def suggest(self, who: Holder, values: tuple[float, ...]) -> None:
+        """Take down what somebody who does not command would do."""
+        self._wishes.suggest(who, values, self._now_ns())
+
+    def commanded(self) -> tuple[float, ...]:
+        """The newest command that is in force; empty for none."""
+        if self.state is None or not self.state.armed:
+            return ()
+        return self._wishes.commanded(self._now_ns())
+
+    def suggested(self) -> Wish | None:
+        """What somebody who does not command would do; None for nothing."""
+        return self._wishes.suggested(self._now_ns())
 
     def command_ns(self) -> int | None:
         """When the command arrived that the outputs follow now."""
@@ -205,6 +250,11 @@ class Cockpit:
     def _notice(self) -> None:
         for member in self._members.values():
             member.notice()
+
+
+def _at_once(work: Callable[[], None]) -> None:
+    """For who has one thread only."""
+    work()
 
 
 def _happened(before: GuardState | None, now: GuardState) -> list[tuple[str, str]]:

@@ -11,10 +11,10 @@ from typing import Final, Protocol
 __all__ = ["PATIENCE_S", "Doorstep", "Visitor"]
 
 PATIENCE_S: Final = 3.0
-"""Seconds in which a socket must ask for the link."""
+"""Seconds in which a socket must ask for something, and after that for the next thing."""
 
-_MOST: Final = 32
-_MOST_OF_ONE: Final = 8  # A browser opens six.
+_MOST: Final = 48
+_MOST_OF_ONE: Final = 16  # A browser opens six, and somebody may have two pages open.
 
 
 class Visitor(Protocol):
@@ -81,6 +81,15 @@ class Doorstep:
             self.drop_one()
         timer = asyncio.get_running_loop().call_later(self._patience_s, self._drop, key)
         self._waiting[key] = _Waiting(visitor, timer)
+
+    def renew(self, key: Hashable) -> None:
+        """It was given a file of the console: it may wait anew, as the youngest."""
+        waiting = self._waiting.pop(key, None)
+        if waiting is None:
+            return
+        waiting.timer.cancel()
+        timer = asyncio.get_running_loop().call_later(self._patience_s, self._drop, key)
+        self._waiting[key] = _Waiting(waiting.visitor, timer)
 
     def keep(self, key: Hashable) -> None:
         """It asked for the link, which has a limit of its own for the hello."""

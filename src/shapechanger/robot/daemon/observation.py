@@ -10,6 +10,7 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.lease import Holder
+from shapechanger.robot.daemon.wishes import Wish
 from shapechanger.robot.guard.wire import GuardState
 
 __all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
@@ -75,6 +76,8 @@ def build_observation(
     command_ns: int | None,
     holder: Holder | None,
     mine: bool,
+    commanded: tuple[float, ...] = (),
+    suggested: Wish | None = None,
 ) -> Observation:
     """Put an observation together.
 
@@ -89,6 +92,8 @@ def build_observation(
         command_ns: When the command behind `state.applied` arrived.
         holder: Who commands.
         mine: Whether that is the client.
+        commanded: The newest command that is in force; empty for none.
+        suggested: What somebody who does not command would do; None for nothing.
     """
     state_ns = now_ns if state is None else state.at_ns
     is_new = newest is not None and frame_sent is not None and newest.seq != frame_sent
@@ -112,4 +117,8 @@ def build_observation(
         emergencies=0 if state is None else state.emergencies,
         holder="" if holder is None else holder.name,
         mine=mine,
+        holder_role="" if holder is None else holder.role,
+        commanded=commanded,
+        suggested=() if suggested is None else suggested.values,
+        suggested_by="" if suggested is None else suggested.who.name,
     )

@@ -6,7 +6,7 @@ from collections import deque
 from typing import Final
 
 from shapechanger.errors import LinkError
-from shapechanger.link.messages import Event, Lease, RobotMessage
+from shapechanger.link.messages import Event, Lease, RecorderState, RobotMessage
 
 __all__ = ["Outbox"]
 
@@ -17,8 +17,8 @@ _MOST_MESSAGES: Final = 256
 class Outbox:
     """Messages that wait to be sent to one client.
 
-    Of leases only the newest one waits, and of events the newest 32; of answers there may be 256,
-    and then the client does not read.
+    Of leases and of the recorder's states only the newest one waits, and of events the newest 32;
+    of answers there may be 256, and then the client does not read.
     """
 
     def __init__(self) -> None:
@@ -34,8 +34,8 @@ class Outbox:
         Raises:
             LinkError: If too many wait already.
         """
-        if isinstance(message, Lease):
-            self._drop(Lease, keep=0)
+        if isinstance(message, Lease | RecorderState):
+            self._drop(type(message), keep=0)
         elif isinstance(message, Event):
             self._drop(Event, keep=_MOST_EVENTS - 1)
         elif len(self._messages) >= _MOST_MESSAGES:
@@ -46,7 +46,11 @@ class Outbox:
         """The oldest message; None for none."""
         return self._messages.popleft() if self._messages else None
 
-    def _drop(self, kind: type[Lease] | type[Event], keep: int) -> None:
+    def holds(self, *kinds: type[RobotMessage]) -> bool:
+        """Whether a message of one of these kinds waits."""
+        return any(isinstance(message, kinds) for message in self._messages)
+
+    def _drop(self, kind: type[RobotMessage], keep: int) -> None:
         """Drop the oldest messages of a kind until so many are left."""
         surplus = sum(isinstance(message, kind) for message in self._messages) - keep
         if surplus <= 0:

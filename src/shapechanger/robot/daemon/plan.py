@@ -42,6 +42,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             or a key.
         discovery: Whether to announce the robot on the local network.
         ready_file: File that tells the port once it is known; "" for none.
+        recordings: Folder for what is recorded; "" for none.
     """
 
     robot: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -65,6 +66,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     insecure: bool = False
     discovery: bool = True
     ready_file: str = ""
+    recordings: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as what JSON can hold."""

@@ -40,6 +40,7 @@ __all__ = ["Daemon", "main"]
 _log = logging.getLogger(__name__)
 
 _BEAT_S: Final = 0.05  # The supervisor wants one each 100 ms.
+_RECORDER_S: Final = 1.0  # How often everybody is told how the recording goes.
 
 
 class Daemon:
@@ -70,7 +71,8 @@ class Daemon:
             on_state=self._on_state,
             on_lost=lambda: self.end("The guard is gone."),
         )
-        self._cockpit = Cockpit(plan, clock.now_ns, self._port.send)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._cockpit = Cockpit(plan, clock.now_ns, self._port.send, self._call)
         self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
 
@@ -83,7 +85,8 @@ class Daemon:
         Raises:
             RobotError: If it cannot begin.
         """
-        plan, loop = self._plan, asyncio.get_running_loop()
+        plan = self._plan
+        loop = self._loop = asyncio.get_running_loop()
         check_exposure(plan)
         key = read_key(Path(plan.key_file)) if plan.key_file else b""
         tls, fingerprint = None, b""
@@ -91,9 +94,9 @@ class Daemon:
             tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
         time = Timekeeper(self._clock, self._cockpit, self._port.drain)
         server = Server(self._cockpit, time, Door(key, fingerprint), tls)
-        beating = asyncio.create_task(self._beat())
+        tasks = [asyncio.create_task(work) for work in (self._beat(), self._tell_recording())]
         self._port.attach(loop)
-        camera = None if plan.camera is None else self._camera(plan.camera, loop)
+        camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
             port = await server.start()
@@ -109,13 +112,17 @@ class Daemon:
         finally:
             # The guard stops first: it sees the end of this socket.
             self._port.close()
+            self._cockpit.recorder.end()
             if camera is not None:
                 await asyncio.to_thread(camera.close)
             await server.close()
             if announcement is not None:
                 await announcement.close()
-            beating.cancel()
-            await asyncio.gather(beating, return_exceptions=True)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.to_thread(self._cockpit.recorder.close)
+            await asyncio.to_thread(self._cockpit.library.close)
         return self._why
 
     def end(self, why: str = "") -> None:
@@ -132,7 +139,18 @@ class Daemon:
             await beat(self._heartbeat_fd, _BEAT_S)
             self.end("The supervisor is gone.")
 
-    def _camera(self, plan: CameraPlan, loop: asyncio.AbstractEventLoop) -> FrameReader:
+    async def _tell_recording(self) -> None:
+        while True:
+            await asyncio.sleep(_RECORDER_S)
+            self._cockpit.recorder.tick()
+
+    def _call(self, work: Callable[[], None]) -> None:
+        """Run something in the thread of the event loop, from any other one."""
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):  # The loop has ended, and the thread not yet.
+                self._loop.call_soon_threadsafe(work)
+
+    def _camera(self, plan: CameraPlan) -> FrameReader:
         """Start to read the camera; of what piles up while the loop is busy, the newest counts."""
         newest: Latest[Frame] = Latest()
 
@@ -141,17 +159,13 @@ class Daemon:
             if frame is not None:
                 self._cockpit.on_frame(frame)
 
-        def call(work: Callable[[], None]) -> None:
-            with contextlib.suppress(RuntimeError):  # The loop has ended, and the thread not yet.
-                loop.call_soon_threadsafe(work)
-
         def deliver(frame: Frame) -> None:
             newest.put(frame)
-            call(collect)
+            self._call(collect)
 
         def report(text: str) -> None:
             _log.warning("Camera: %s", text)
-            call(lambda: self._cockpit.event("camera", text))
+            self._call(lambda: self._cockpit.event("camera", text))
 
         now_ns = self._clock.now_ns if self._plan.clock == "real" else None
         reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)

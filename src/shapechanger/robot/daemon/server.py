@@ -1,4 +1,4 @@
-"""The one port of the robot: the link for programs and people, and a page for browsers."""
+"""The one port of the robot: the link for programs and people, and the console for browsers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from shapechanger.robot.daemon.doorstep import Doorstep
 from shapechanger.robot.daemon.listener import Listener
 from shapechanger.robot.daemon.origin import origin_refusal
 from shapechanger.robot.daemon.pace import Pacer
-from shapechanger.robot.daemon.page import status_page
+from shapechanger.robot.daemon.page import SECURITY_POLICY, add_console
 from shapechanger.robot.daemon.session import Door, Session, WrongKey
 from shapechanger.robot.daemon.timekeeper import Timekeeper
 
@@ -36,7 +36,7 @@ _ALIVE_NS: Final = 1_000_000_000
 
 _HEADERS: Final = {
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'; form-action 'none'",
+    "Content-Security-Policy": SECURITY_POLICY,
     "Referrer-Policy": "no-referrer",
     "Server": "shapechanger",  # And not which versions of what.
     "X-Content-Type-Options": "nosniff",
@@ -88,8 +88,10 @@ class Server:
         await self._runner.cleanup()
 
     def _app(self) -> web.Application:
-        app = web.Application(middlewares=[_add_headers], client_max_size=1024)
-        app.router.add_get("/", self._page)
+        app = web.Application(
+            middlewares=[_add_headers, self._renew_patience], client_max_size=1024
+        )
+        add_console(app, self._cockpit, self._door)
         app.router.add_get("/healthz", self._health)
         app.router.add_get("/link", self._link)
         return app
@@ -100,8 +102,12 @@ class Server:
             raise RobotError("The server has not begun.")
         return server()
 
-    async def _page(self, request: web.Request) -> web.Response:
-        return web.Response(text=status_page(self._cockpit, request.host), content_type="text/html")
+    @web.middleware
+    async def _renew_patience(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+        response = await handler(request)
+        # A slow radio brings the files of the console one by one.
+        self._doorstep.renew(request.protocol)
+        return response
 
     async def _health(self, request: web.Request) -> web.Response:
         state = self._cockpit.state
@@ -170,7 +176,9 @@ def _tune(transport: asyncio.Transport | None) -> None:
     """Send at once, hold little back, and notice when the other side is gone."""
     if transport is None:
         raise LinkError("The connection has ended.")
-    transport.set_write_buffer_limits(high=0)
+    # Not 0: asyncio's TLS would then call an empty buffer full at every second look, and a message
+    # that has left would wait for the next one before it counts as sent.
+    transport.set_write_buffer_limits(high=1, low=0)
     accepted = transport.get_extra_info("socket")
     accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)

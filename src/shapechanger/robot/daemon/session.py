@@ -11,19 +11,26 @@ from shapechanger.link.messages import (
     VERSION,
     Acknowledge,
     Arm,
+    Browse,
     Challenge,
     Command,
     Disarm,
     EmergencyStop,
+    Fetch,
     Hello,
+    Judge,
+    Mark,
     Observation,
     Pace,
     Ping,
     Pong,
+    Record,
     Refused,
     Release,
     RobotMessage,
+    Suggest,
     Take,
+    Undo,
     Welcome,
     decode_client_message,
 )
@@ -34,6 +41,8 @@ from shapechanger.robot.daemon.lease import Holder
 from shapechanger.robot.daemon.limits import MESSAGES_PER_S, MessageRate
 from shapechanger.robot.daemon.observation import build_observation
 from shapechanger.robot.daemon.outbox import Outbox
+from shapechanger.robot.daemon.printable import printable
+from shapechanger.robot.daemon.recording_desk import RecordingDesk
 from shapechanger.robot.guard.wire import Order
 
 __all__ = ["Door", "Session", "WrongKey"]
@@ -56,6 +65,11 @@ class Door:
     def __init__(self, key: bytes = b"", certificate: bytes = b"") -> None:
         self._key = key
         self._certificate = certificate
+
+    @property
+    def certificate(self) -> bytes:
+        """Fingerprint of the certificate; empty without TLS."""
+        return self._certificate
 
     @property
     def is_open(self) -> bool:
@@ -101,6 +115,10 @@ class Session:
         self._who = Holder(number, "", "program")
         self._sent = Sent(cockpit.plan.max_observation_age_ms)
         self._command_seq = -1
+        self._suggestion_seq = -1
+        self._desk = RecordingDesk(
+            cockpit.recorder, cockpit.library, cockpit.lease, self.outbox, self.tell
+        )
         self._observation_seq = 0
         self._frame_seq = 0
         self._overflow = ""
@@ -146,10 +164,12 @@ class Session:
             raise WrongKey(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
-        name = _printable(hello.name) or f"{hello.role} {self._number}"
+        name = printable(hello.name) or f"{hello.role} {self._number}"
         self._who = Holder(self._number, name, hello.role)
         self._cockpit.join(self)
         self._hello = hello
+        if (recorded := self._cockpit.recorder.state()).episode:
+            self.tell(recorded)
         return self._welcome()
 
     def receive(self, data: bytes) -> None:
@@ -179,6 +199,10 @@ class Session:
                 self._emergency(message)
             case Ping():
                 self.tell(Pong(token=message.token, now_ns=self._cockpit.now_ns()))
+            case Suggest():
+                self._suggest(message)
+            case Record() | Mark() | Undo() | Browse() | Fetch() | Judge():
+                self._desk.hear(message, self._who)
             case Hello():
                 raise LinkError("You said hello already.")
         if self._overflow:
@@ -232,8 +256,11 @@ class Session:
             command_ns=cockpit.command_ns(),
             holder=cockpit.lease.holder,
             mine=cockpit.lease.holds(self._number),
+            commanded=cockpit.commanded(),
+            suggested=cockpit.suggested(),
         )
         self._sent.add(observation.seq, now_ns)
+        cockpit.recorder.observed(self._number, observation, cockpit.newest)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
@@ -245,7 +272,7 @@ class Session:
         now_ns = self._cockpit.now_ns()
         refusal = self._refusal_to_listen(command)
         if not refusal:
-            refusal = self._nonsense(command)
+            refusal = self._nonsense(command.values)
             if refusal:
                 # The one before is no longer what the client wants. What is refused for being late
                 # says nothing about that, and what is old must not stop what is newer.
@@ -259,6 +286,22 @@ class Session:
             self._cockpit.command(command, now_ns)
         self._give_credit()
 
+    def _suggest(self, suggestion: Suggest) -> None:
+        refusal = ""
+        if self._cockpit.lease.holds(self._number):
+            refusal = "You command: say what to do by a command."
+        elif suggestion.seq <= self._suggestion_seq:
+            refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
+        refusal = refusal or self._nonsense(suggestion.values)
+        if not refusal:
+            refusal = self._sent.refusal(suggestion.answers, self._cockpit.now_ns())
+        self._suggestion_seq = max(self._suggestion_seq, suggestion.seq)
+        if refusal:
+            self.tell(Refused(reason=refusal, seq=suggestion.seq))
+        else:
+            self._cockpit.suggest(self._who, suggestion.values)
+        self._give_credit()
+
     def _refusal_to_listen(self, command: Command) -> str:
         """Why a command does not count, whatever it says; empty when it does."""
         if not self._cockpit.lease.holds(self._number):
@@ -267,14 +310,14 @@ class Session:
             return f"Command {command.seq} is not newer than {self._command_seq}."
         return ""
 
-    def _nonsense(self, command: Command) -> str:
+    def _nonsense(self, values: tuple[float, ...]) -> str:
         """What is wrong with the values of a command, in words; empty for nothing."""
-        if len(command.values) != self._cockpit.action_size:
+        if len(values) != self._cockpit.action_size:
             return (
                 f"A command of this robot has {self._cockpit.action_size} values, "
-                f"this one has {len(command.values)}."
+                f"this one has {len(values)}."
             )
-        if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in command.values):
+        if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in values):
             return "A value is no finite number."
         return ""
 
@@ -320,7 +363,7 @@ class Session:
         self._cockpit.give_order(Order(kind="disarm", reason=f"{self._who.name} disarmed"))
 
     def _emergency(self, stop: EmergencyStop) -> None:
-        reason = f"{self._who.name}: {_printable(stop.reason) or 'stop'}"
+        reason = f"{self._who.name}: {printable(stop.reason) or 'stop'}"
         self._cockpit.give_order(Order(kind="emergency", reason=reason))
 
     def _welcome(self) -> Welcome:
@@ -339,9 +382,5 @@ class Session:
             arming=plan.arming,
             clock=plan.clock,
             session=self._number,
+            can_record=self._cockpit.recorder.can_record,
         )
-
-
-def _printable(text: str) -> str:
-    """Without what moves a terminal's cursor, and in one line."""
-    return "".join(c if c.isprintable() else " " for c in text).strip()

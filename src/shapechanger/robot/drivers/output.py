@@ -9,7 +9,7 @@ from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["OUTPUT_DRIVERS", "OutputDriver", "open_output"]
+__all__ = ["OUTPUT_DRIVERS", "OutputDriver", "SharedDevice", "open_output"]
 
 # Each module has `open_driver(plan, hardware)`. They are loaded when they are needed, so that the
 # guard holds only its own drivers.
@@ -18,6 +18,7 @@ OUTPUT_DRIVERS: Final = {
     "phase_enable": "shapechanger.robot.drivers.phase_enable",
     "servo": "shapechanger.robot.drivers.servo",
     "esc": "shapechanger.robot.drivers.esc",
+    "dynamixel": "shapechanger.robot.drivers.dynamixel.output",
 }
 """Module of each output driver, by its name in a profile."""
 
@@ -43,6 +44,40 @@ class OutputDriver(Protocol):
 
     def close(self) -> None:
         """Go to the safest level and let go of the pins."""
+        ...
+
+
+class SharedDevice(Protocol):
+    """What several outputs are on, where it acts on all of them at once: a servo bus.
+
+    Drivers on one have it as their attribute `device`.
+    """
+
+    def begin(self) -> None:
+        """Make it ready, once all of its outputs are open; nothing moves.
+
+        Raises:
+            RobotError: If it does not answer, or is not what it should be.
+        """
+        ...
+
+    def ready(self) -> None:
+        """Forget what was wrong, before the robot is armed; nothing moves.
+
+        Raises:
+            RobotError: If something still is.
+        """
+        ...
+
+    def flush(self, *, grip: bool) -> None:
+        """Do what was written to its outputs.
+
+        Args:
+            grip: Whether outputs that have let go take hold.
+
+        Raises:
+            RobotError: If they do not.
+        """
         ...
 
 

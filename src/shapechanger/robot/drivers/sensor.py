@@ -17,7 +17,9 @@ SENSOR_DRIVERS: Final = {
     "hcsr04": "shapechanger.robot.drivers.hcsr04",
     "mpu6050": "shapechanger.robot.drivers.mpu6050",
     "ina219": "shapechanger.robot.drivers.ina219",
+    "as5600": "shapechanger.robot.drivers.as5600",
     "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature",
+    "dynamixel": "shapechanger.robot.drivers.dynamixel.sensor",
 }
 """Module of each sensor driver, by name; each has `open_driver(plan, hardware)`."""
 

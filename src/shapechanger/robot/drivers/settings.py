@@ -7,7 +7,7 @@ from typing import TypeVar, cast
 
 from shapechanger.errors import RobotError
 
-__all__ = ["number", "text", "whole", "wholes"]
+__all__ = ["number", "numbers", "text", "texts", "whole", "wholes"]
 
 _T = TypeVar("_T")
 
@@ -33,6 +33,18 @@ def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
     """Several whole numbers, such as pins."""
     values = cast("list[object]", _of_type(settings, key, list, "a list of whole numbers"))
     return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
+
+
+def numbers(settings: Mapping[str, object], key: str) -> tuple[float, ...]:
+    """Several numbers, such as tensions."""
+    values = cast("list[object]", _of_type(settings, key, list, "a list of numbers"))
+    return tuple(number({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
+
+
+def texts(settings: Mapping[str, object], key: str) -> tuple[str, ...]:
+    """Several words, such as names of tendons."""
+    values = cast("list[object]", _of_type(settings, key, list, "a list of words"))
+    return tuple(text({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
 def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: str) -> _T:

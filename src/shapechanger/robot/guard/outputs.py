@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
-from shapechanger.robot.drivers.output import OutputDriver, open_output
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import OutputDriver, SharedDevice, open_output
 from shapechanger.robot.guard.mix import output_values
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.robot.guard.truth import Done, Truth
@@ -49,6 +50,9 @@ class Outputs:
                 driver = open_output(output, hardware)
                 undo.callback(driver.close)
                 self._drivers.append((output, driver))
+            self._devices = _devices(driver for _, driver in self._drivers)
+            for device in self._devices:
+                device.begin()
             undo.pop_all()
 
     def write(self, actions: Sequence[float], now_ns: int) -> Done:
@@ -60,8 +64,23 @@ class Outputs:
         values = output_values(self._plan, actions)
         for (output, driver), value in zip(self._drivers, values, strict=True):
             self.values[output.name] = driver.write(value, now_ns)
+        for device in self._devices:
+            device.flush(grip=True)
         self.released = False
         return self._truth.done(actions, values, tuple(self.values.values()))
+
+    def ready(self) -> str:
+        """Make ready for commands what has had a fault.
+
+        Returns:
+            Why it cannot be, in words; empty where all outputs can move.
+        """
+        try:
+            for device in self._devices:
+                device.ready()
+        except RobotError as error:
+            return str(error)
+        return ""
 
     def release(self) -> None:
         """Let all outputs go, once."""
@@ -85,6 +104,11 @@ class Outputs:
                 self.values[output.name] = driver.write(value, now_ns)
             except Exception as error:  # Whatever it is, the next output must rest too.
                 failures.append(_words(output, error))
+        for device in self._devices:
+            try:
+                device.flush(grip=False)
+            except Exception as error:  # As above.
+                failures.append(str(error) or type(error).__name__)
         self.released = False
         return failures
 
@@ -103,6 +127,16 @@ class Outputs:
                 failures.append(_words(output, error))
         self._drivers.clear()
         return failures
+
+
+def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
+    """The devices that these drivers are on, each once."""
+    found: list[SharedDevice] = []
+    for driver in drivers:
+        device: SharedDevice | None = getattr(driver, "device", None)
+        if device is not None and device not in found:
+            found.append(device)
+    return found
 
 
 def _words(output: OutputPlan, error: Exception) -> str:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 __all__ = ["ActionPlan", "GuardPlan", "LimitPlan", "OutputPlan", "SensorPlan", "StopPlan"]
 
-Setting = bool | int | float | str | list[int] | list[float]
+Setting = bool | int | float | str | list[int] | list[float] | list[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,8 @@ class SensorPlan:
     Attributes:
         name: Its name, such as "bumper".
         driver: Name of its driver, such as "switch".
-        measures: What it measures: "speed", "bump", "distance", "imu", "battery" or "temperature".
+        measures: What it measures: "speed", "bump", "distance", "imu", "battery",
+            "temperature", "tendons" or "joints".
         settings: What the driver needs; all of its keys, those with their default too.
     """
 

@@ -147,6 +147,9 @@ class Guard:
     def _obey(self) -> None:
         orders, malformed = self._daemon.orders()
         for order in orders:
+            if order.kind == "arm" and (why := self._outputs.ready()):
+                self._refused = (f"Not armed: {why}", None)
+                continue
             if refusal := self._rules.offer(order, self._clock.now_ns()):
                 self._refused = (refusal, order.seq if order.kind == "command" else None)
             if order.kind == "end":

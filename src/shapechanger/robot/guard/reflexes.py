@@ -100,6 +100,8 @@ class Health:
         self._limits = limits
         needed = {
             "bump": True,
+            "tendons": True,
+            "joints": True,
             "distance": limits.stop_distance_m > 0.0,
             "battery": limits.low_battery_v > 0.0,
             "temperature": limits.high_temperature_c > 0.0,

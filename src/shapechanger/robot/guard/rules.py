@@ -25,6 +25,8 @@ __all__ = ["ARM_WITHIN_NS", "Decision", "Rules"]
 ARM_WITHIN_NS = 1_000_000_000
 """Age from which on an order to arm is refused, ns: nobody looks at the robot any more."""
 
+# What the sensors measure whose failure takes the leave to move.
+_DISARMING = ("tendons", "joints")
 _CLIPPED = "Clipped by the robot's caps."
 
 
@@ -79,6 +81,7 @@ class Rules:
         self._bump = Bump(plan.limits.bump_hold_ms)
         self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
         self._health = Health(plan)
+        self._disarming = tuple(s.name for s in plan.sensors if s.measures in _DISARMING)
         self._is_near = False
         self._is_far = True
         self._is_pressed = False
@@ -165,6 +168,11 @@ class Rules:
         self._bump.sense(quantities, now_ns)
         self._stall.sense(quantities, self._propulsion.push(self._done), now_ns)
         self._health.sense(sensing, now_ns)
+        # Servos with a fault have let go, and a magnet that comes and goes is loose: they obey only
+        # after somebody has looked and armed afresh.
+        for name in self._disarming:
+            if name in sensing.failures and name not in sensing.slow and self.arming.armed:
+                self.disarm(sensing.failures[name])
         self.senses.complete(
             sensing,
             speed=self._propulsion.speed(self._done),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+from typing import Final
 
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS, OutputDriver, open_output
 from shapechanger.robot.guard.outputs import drives_first
@@ -15,6 +16,10 @@ from shapechanger.robot.guard.switches import enable_device
 from shapechanger.robot.hardware import REAL, Hardware
 
 __all__ = ["make_safe", "preload"]
+
+# Servos with a watchdog of their own let go when the bus is silent; whoever spoke to them now would
+# only keep them awake.
+_STOPS_ITSELF: Final = ("dynamixel",)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
@@ -28,6 +33,8 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []
     for output in drives_first(plan).outputs:
+        if output.driver in _STOPS_ITSELF:
+            continue
         try:
             opened.append((output.name, open_output(output, hardware)))
         except Exception as error:  # Whatever it is, the next output must be safe too.
@@ -54,7 +61,11 @@ def preload(plan: GuardPlan, source: str) -> None:
         source: Where its hardware comes from.
     """
     modules = [source.partition(":")[0]]
-    modules += [OUTPUT_DRIVERS[output.driver] for output in plan.outputs]
+    modules += [
+        OUTPUT_DRIVERS[output.driver]
+        for output in plan.outputs
+        if output.driver not in _STOPS_ITSELF
+    ]
     if plan.enable_pin is not None:
         modules.append("gpiozero")
     for module in modules:

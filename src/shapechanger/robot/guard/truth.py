@@ -16,6 +16,7 @@ _STEP: Final = 0.06
 
 _WHY: Final = {
     "esc": "its controller waits, brakes or changes direction",
+    "dynamixel": "its bus has a fault, and lets go",
     "servo": "it turns no faster than its profile allows",
 }
 

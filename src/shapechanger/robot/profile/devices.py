@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
+from shapechanger.robot.profile.joints import joints_in, read_joints
 from shapechanger.robot.profile.keys import Key
 from shapechanger.robot.profile.lines import Place
 from shapechanger.robot.profile.mistake import Source, called
@@ -63,8 +64,12 @@ def read_sensor(source: Source, name: str, table: _Table) -> SensorPlan:
     driver: str = read_keys(source, table, place, SENSOR_KEYS)["driver"]
     keys = SENSOR_SETTINGS[driver]
     known = [key.name for key in (*SENSOR_KEYS, *keys)]
-    refuse_unknown_keys(source, table, place, known, _SENSORS_ELSEWHERE)
-    settings = read_keys(source, table, place, keys)
+    joints = joints_in(table) if driver == "as5600" else {}
+    rest = {key: value for key, value in table.items() if key not in joints}
+    refuse_unknown_keys(source, rest, place, known, _SENSORS_ELSEWHERE)
+    settings = read_keys(source, rest, place, keys)
+    if driver == "as5600":
+        settings |= read_joints(source, place, joints)
     return SensorPlan(name=name, driver=driver, measures=MEASURES[driver], settings=settings)
 
 

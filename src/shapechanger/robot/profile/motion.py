@@ -71,6 +71,8 @@ def check_pulses(source: Source, output: OutputPlan) -> None:
             words = f"start of {called(place)} must be below full, which is {settings['full']:g}"
             raise source.mistake((*place, "start"), words)
         return
+    if output.driver not in _PULSES:
+        return
     names = _PULSES[output.driver]
     first, middle, last = (int(settings[name]) for name in names)
     low, high = sorted((first, last))

@@ -20,6 +20,7 @@ from shapechanger.robot.guard.plan import (
     StopPlan,
 )
 from shapechanger.robot.profile.quantities import APPLIED, state_features
+from shapechanger.robot.profile.servo_bus import tension_spans
 
 __all__ = ["EnablePlan", "Profile", "ResetStep", "RewardPlan"]
 
@@ -138,9 +139,14 @@ class Profile:
         """What each number of a command means.
 
         The range is the whole one of the action, whatever the caps of the robot are: these clip,
-        and `action_applied` says how much.
+        and `action_applied` says how much. That of a tendon has a gain in newtons: from its
+        pretension, at 0, to the most that it may pull, at 1, which is the highest tension of the
+        state.
         """
-        return Layout(tuple(_action_feature(action) for action in self.actions))
+        spans = tension_spans(self.outputs)
+        return Layout(
+            tuple(_action_feature(action, spans.get(action.name)) for action in self.actions)
+        )
 
     def state_layout(self) -> Layout:
         """What each number of a state means: what the sensors give, then what the actions do."""
@@ -165,8 +171,11 @@ class Profile:
         return tuple((step.values, step.seconds) for step in self.reset)
 
 
-def _action_feature(action: ActionPlan) -> Feature:
+def _action_feature(action: ActionPlan, span_n: float | None) -> Feature:
+    """What a number of a command means; `span_n` is that of the tendon which it alone pulls, N."""
     unit, factor = _SI.get(action.unit, (action.unit, 1.0))
+    if span_n is not None and unit == "1":
+        unit, factor = "N", span_n
     return Feature(
         action.name,
         "1",

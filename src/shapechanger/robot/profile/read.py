@@ -25,15 +25,21 @@ from shapechanger.robot.profile.schema import (
     RESET_KEYS,
     REWARD_KEYS,
     ROBOT_KEYS,
+    SERVO_BUS_KEYS,
     STOP_KEYS,
     TABLES,
 )
-from shapechanger.robot.profile.table import read_keys, refuse_unknown_keys, table_at
+from shapechanger.robot.profile.servo_bus import with_servo_bus
+from shapechanger.robot.profile.table import (
+    read_keys,
+    refuse_bad_name,
+    refuse_unknown_keys,
+    table_at,
+)
 from shapechanger.robot.profile.wiring import Wiring
 
 __all__ = ["read_profile"]
 
-_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 _MOST_NAMED: Final = 64  # As values on the wire, see `shapechanger.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")
@@ -78,6 +84,7 @@ class _Reader:
         camera = self._camera()
         stop = StopPlan(**self._only_table("stop", STOP_KEYS))
         check_stop(self._source, stop, named, outputs)
+        outputs, sensors = self._servo_bus(outputs, sensors, stop)
         table = table_at(self._source, self._data, ("limits",))
         limits = read_limits(self._source, table, robot["control_hz"], camera, sensors)
         actions = tuple(named.values())
@@ -110,6 +117,13 @@ class _Reader:
         for sensor in sensors:
             self._wiring.take_sensor(sensor)
         return sensors
+
+    def _servo_bus(
+        self, outputs: tuple[OutputPlan, ...], sensors: tuple[SensorPlan, ...], stop: StopPlan
+    ) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
+        settings = self._only_table("servo_bus", SERVO_BUS_KEYS)
+        asked = "servo_bus" in self._data
+        return with_servo_bus(self._source, settings if asked else None, outputs, sensors, stop)
 
     def _camera(self) -> CameraPlan | None:
         if "camera" not in self._data:
@@ -170,12 +184,7 @@ class _Reader:
         """The tables of one kind, by name, in the order of the file."""
         tables = table_at(self._source, self._data, (kind,))
         for name in tables:
-            if _NAME.fullmatch(name) is None:
-                words = (
-                    f"the name {name!r} must begin with a letter and have at most 32 letters, "
-                    "digits, '_' and '-'"
-                )
-                raise self._source.mistake((kind, name), words)
+            refuse_bad_name(self._source, (kind, name))
         if len(tables) > _MOST_NAMED:
             words = f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}"
             raise self._source.mistake((kind,), words)

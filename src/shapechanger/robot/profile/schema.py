@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 from shapechanger.robot.cameras.camera import CAMERA_DRIVERS
+from shapechanger.robot.drivers.dynamixel.models import MODELS
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
 from shapechanger.robot.profile.keys import NO_PIN, Key
@@ -17,6 +18,7 @@ __all__ = [
     "DRIVING_PARTS",
     "EMERGENCY_BUTTON_KEYS",
     "ENABLE_KEYS",
+    "JOINT_KEYS",
     "LIMIT_KEYS",
     "MEASURES",
     "OUTPUT_KEYS",
@@ -29,6 +31,7 @@ __all__ = [
     "ROBOT_KEYS",
     "SENSOR_KEYS",
     "SENSOR_SETTINGS",
+    "SERVO_BUS_KEYS",
     "STOP_KEYS",
     "TABLES",
 ]
@@ -45,6 +48,7 @@ TABLES: Final = (
     "reset",
     "enable",
     "emergency_button",
+    "servo_bus",
 )
 """The tables of a profile; `action`, `output` and `sensor` hold one table for each name."""
 
@@ -71,6 +75,8 @@ MEASURES: Final = {
     "mpu6050": "imu",
     "ina219": "battery",
     "cpu_temperature": "temperature",
+    "dynamixel": "tendons",
+    "as5600": "joints",
 }
 """What each sensor driver measures, as in `SensorPlan.measures`."""
 
@@ -143,6 +149,17 @@ OUTPUT_SETTINGS: Final = {
         Key("reverse", "choice", "direct", names=("direct", "double", "none")),
         Key("brake_ms", "whole", 200, low=0, high=2000),
     ),
+    "dynamixel": (
+        Key("id", "whole", low=0, high=252),
+        Key("model", "choice", names=tuple(MODELS)),
+        Key("spool_radius_m", "number", low=0.0, high=0.1, above=True),
+        Key("direction", "whole", 1, low=-1, high=1),
+        Key("most_tension_n", "number", low=0.0, high=1000.0, above=True),
+        Key("pretension_n", "number", low=0.0, high=1000.0, above=True),
+        Key("homing_n", "number", 3.0, low=0.0, high=1000.0, above=True),
+        # Where the servo stands while the finger is straight, in counts of 1/4096 turn.
+        Key("zero", "whole", 0, low=-1_000_000, high=1_000_000),
+    ),
 }
 """Keys of each output driver, besides those of what it goes `over`."""
 
@@ -184,8 +201,18 @@ SENSOR_SETTINGS: Final = {
     "cpu_temperature": (
         Key("path", "text", "/sys/class/thermal/thermal_zone0/temp", longest=4096),
     ),
+    "dynamixel": (),
+    "as5600": (_BUS, Key("mux", "whole", 0x70, low=0x70, high=0x77)),
 }
 """Keys of each sensor driver."""
+
+JOINT_KEYS: Final = (
+    Key("channel", "whole", low=0, high=7),
+    # Counts of 1/4096 turn while the joint is straight.
+    Key("zero", "whole", 0, low=0, high=4095),
+    Key("direction", "whole", 1, low=-1, high=1),
+)
+"""Keys of each joint of a sensor with the driver as5600; each is a table of its own in it."""
 
 CAMERA_KEYS: Final = (
     Key("driver", "choice", names=tuple(CAMERA_DRIVERS)),
@@ -240,5 +267,16 @@ ENABLE_KEYS: Final = (
     # The guard toggles the pin at each of its ticks, 10 ms apart; it may be late by some.
     Key("hold_ms", "whole", 100, low=30, high=1000),
 )
+
+SERVO_BUS_KEYS: Final = (
+    Key("device", "text", "/dev/ttyUSB0", longest=4096),
+    Key("baud", "whole", 1_000_000, low=9600, high=4_500_000),
+    # The watchdog of the servos counts in steps of 20 ms.
+    Key("watchdog_ms", "whole", 100, low=20, high=2540),
+    Key("ramp_ms", "whole", 300, low=0, high=10_000),
+    # So that one servo that is silent keeps the guard for less than it lets a sensor take.
+    Key("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
+)
+"""What the outputs with the driver dynamixel are on."""
 
 EMERGENCY_BUTTON_KEYS: Final = (Key("pin", "pin"),)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from shapechanger.robot.profile.keys import REQUIRED, Key
 from shapechanger.robot.profile.lines import Place
 from shapechanger.robot.profile.mistake import Source, called, choice, shown
 from shapechanger.robot.profile.units import unit_of, with_unit
 
-__all__ = ["read_key", "read_keys", "refuse_unknown_keys", "table_at"]
+__all__ = ["read_key", "read_keys", "refuse_bad_name", "refuse_unknown_keys", "table_at"]
+
+
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
 def table_at(source: Source, data: Mapping[str, Any], place: Place) -> dict[str, Any]:
@@ -54,6 +58,21 @@ def read_key(source: Source, table: Mapping[str, Any], place: Place, key: Key) -
     except ValueError as error:
         words = f"{key.name} of {called(place)} must be {key.wanted}, {error}"
         raise source.mistake((*place, key.name), words) from None
+
+
+def refuse_bad_name(source: Source, place: Place) -> None:
+    """Refuse a table whose own name, the last of its place, is none for a part of a robot.
+
+    Raises:
+        ProfileError: If it is none.
+    """
+    name = str(place[-1])
+    if _NAME.fullmatch(name) is None:
+        words = (
+            f"the name {name!r} must begin with a letter and have at most 32 letters, digits, "
+            "'_' and '-'"
+        )
+        raise source.mistake(place, words)
 
 
 def refuse_unknown_keys(

@@ -16,6 +16,8 @@ from shapechanger.robot.profile.schema import OUTPUT_SETTINGS, OVER_SETTINGS, SE
 __all__ = ["Wiring"]
 
 _Settings = Mapping[str, Any]
+# Address of every AS5600: ams, data sheet v1-06, "Register Description".
+_AS5600: Final = 0x36
 _OF_A_CHIP: Final = ("hz", "output_enable")  # A PCA9685 has one of each for its 16 channels.
 
 
@@ -83,8 +85,12 @@ class Wiring:
         """
         place: Place = ("sensor", sensor.name)
         self._take_pins(sensor.settings, place, SENSOR_SETTINGS[sensor.driver])
-        if "bus" in sensor.settings:
-            self._take_bus(sensor.settings, (*place, "address"), group="")
+        for key in ("address", "mux"):
+            if key in sensor.settings:
+                self._take_bus(sensor.settings, (*place, key), group="")
+        if sensor.driver == "as5600":
+            # They all have one address, and answer together where two multiplexers open to them.
+            self._take_address(sensor.settings["bus"], _AS5600, _User((*place, "driver")))
 
     def _take_output(self, output: OutputPlan, chips: dict[str, dict[str, Any]]) -> None:
         settings: dict[str, Any] = {**output.settings}
@@ -114,11 +120,14 @@ class Wiring:
                 raise self._source.mistake((*place, name), words)
 
     def _take_bus(self, settings: _Settings, place: Place, group: str) -> None:
-        bus, address = settings["bus"], settings["address"]
-        self._take(f"address {address:#x} of I2C bus {bus}", _User(place, group))
+        bus = settings["bus"]
+        self._take_address(bus, settings[str(place[-1])], _User(place, group))
         for pin in I2C_PINS.get(bus, ()):
             user = _User((*place[:-1], "bus"), group=f"I2C bus {bus}")
             self._take(f"GPIO{pin}, a wire of I2C bus {bus},", user, key=f"GPIO{pin}")
+
+    def _take_address(self, bus: Any, address: Any, user: _User) -> None:
+        self._take(f"address {address:#x} of I2C bus {bus}", user)
 
     def _take_pins(self, settings: _Settings, place: Place, keys: Iterable[Key]) -> None:
         for key in keys:

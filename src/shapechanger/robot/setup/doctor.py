@@ -12,13 +12,16 @@ import re
 import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
+from shapechanger.robot.setup.finding import Finding
+
+if TYPE_CHECKING:  # The drivers need gpiozero, and whether it is there is looked at first.
+    from shapechanger.robot.drivers.as5600 import As5600
 
 __all__ = ["Finding", "examine_robot", "unit_name", "uses_pins"]
 
@@ -28,21 +31,6 @@ _CAMERA_S: Final = 5.0
 _STRICT: Final = re.compile(r"^\s*dtparam\s*=\s*([^#]*,)?strict_gpiod(=(on|1|true))?\s*(,|#|$)")
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What one check came to.
-
-    Attributes:
-        check: What was looked at.
-        level: "good", "missing" for something to mend, "unknown" for what cannot be told here.
-        sentence: What was found, and what to do.
-    """
-
-    check: str
-    level: Literal["good", "missing", "unknown"]
-    sentence: str
-
-
 def examine_robot(
     guard: GuardPlan,
     camera: CameraPlan | None,
@@ -50,6 +38,7 @@ def examine_robot(
     root: Path = Path("/"),
     look: Callable[[CameraPlan], Camera] = open_camera,
     profile: Path | None = None,
+    encoders: Callable[[SensorPlan], As5600] | None = None,
 ) -> Iterator[Finding]:
     """Look at everything that the robot's safety and work depend on.
 
@@ -60,6 +49,7 @@ def examine_robot(
         root: Root of the file system, for tests.
         look: Opens the camera.
         profile: The robot's profile, which the systemd unit must name; None to leave that out.
+        encoders: Reaches the encoders of its joints; None for this machine's bus.
     """
     yield _computer(root)
     yield _strict_gpiod(root)
@@ -70,7 +60,9 @@ def examine_robot(
     yield from _packages(guard, camera)
     if camera is not None:
         yield _camera(camera, look)
-    yield _port(port)
+    free = _port(port)
+    yield from _encoders(guard, root, encoders, served=free.level != "good")
+    yield free
 
 
 def unit_name(robot: str) -> str:
@@ -90,18 +82,23 @@ def _computer(root: Path) -> Finding:
 
 
 def _strict_gpiod(root: Path) -> Finding:
-    for name in _CONFIGS:
-        path = root / name
-        if path.exists():
-            if any(_STRICT.match(line) for line in path.read_text().splitlines()):
-                return Finding("strict_gpiod", "good", f"{path} sets it: pins of the dead go low.")
-            return Finding(
-                "strict_gpiod",
-                "missing",
-                f"A pin keeps its level when the process that set it dies: add "
-                f"`dtparam=strict_gpiod` to {path} and restart the computer.",
-            )
-    return Finding("strict_gpiod", "unknown", "There is no config.txt of a Raspberry Pi here.")
+    path = _config(root)
+    if path is None:
+        return Finding("strict_gpiod", "unknown", "There is no config.txt of a Raspberry Pi here.")
+    if any(_STRICT.match(line) for line in path.read_text().splitlines()):
+        return Finding("strict_gpiod", "good", f"{path} sets it: pins of the dead go low.")
+    return Finding(
+        "strict_gpiod",
+        "missing",
+        f"A pin keeps its level when the process that set it dies: add "
+        f"`dtparam=strict_gpiod` to {path} and restart the computer.",
+    )
+
+
+def _config(root: Path) -> Path | None:
+    """The config.txt of a Raspberry Pi."""
+    paths = [root / name for name in _CONFIGS]
+    return next((path for path in paths if path.exists()), None)
 
 
 def _unit(robot: str, profile: Path | None, root: Path) -> Finding:
@@ -133,6 +130,9 @@ def _unit(robot: str, profile: Path | None, root: Path) -> Finding:
 
 
 def _one_shot(guard: GuardPlan) -> Finding:
+    if all(output.driver == "dynamixel" for output in guard.outputs):
+        sentence = "Each servo has a watchdog of its own, and lets go when its bus is silent."
+        return Finding("enable line", "good", sentence)
     if guard.enable_pin is None:
         return Finding(
             "enable line",
@@ -169,13 +169,19 @@ def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
     for plan in plans:
         if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
             wanted[f"dev/i2c-{plan.settings['bus']}"] = "i2c"
+    for plan in guard.outputs:
+        if plan.driver == "dynamixel":
+            wanted[str(plan.settings["device"]).lstrip("/")] = "dialout"
+    yield from _latency_timers(guard, root)
     for name, group in wanted.items():
         path = root / name
         if not path.exists():
             yield Finding(
                 "devices",
                 "missing",
-                f"{path} is not there: enable it with `sudo raspi-config` (Interface Options).",
+                f"{path} is not there: enable it with `sudo raspi-config` (Interface Options)."
+                if group != "dialout"
+                else f"{path} is not there: plug in the adapter of the servo bus.",
             )
         elif not os.access(path, os.R_OK | os.W_OK):
             yield Finding(
@@ -185,6 +191,45 @@ def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
             )
         else:
             yield Finding("devices", "good", f"{path} can be opened.")
+
+
+def _latency_timers(guard: GuardPlan, root: Path) -> Iterator[Finding]:
+    """Whether adapters hand on at once what servos say."""
+    for device in {str(o.settings["device"]) for o in guard.outputs if o.driver == "dynamixel"}:
+        path = root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
+        if not path.exists():
+            sentence = (
+                f"{device} says nothing of a latency timer; it must be 1 ms where it has one."
+            )
+            yield Finding("latency timer", "unknown", sentence)
+        elif (ms := path.read_text().strip()) != "1":
+            yield Finding(
+                "latency timer",
+                "missing",
+                f"The adapter at {device} waits for {ms} ms before it hands on what the servos "
+                f"say: `echo 1 | sudo tee {path}`.",
+            )
+        else:
+            yield Finding("latency timer", "good", f"That of {device} is 1 ms.")
+
+
+def _encoders(
+    guard: GuardPlan,
+    root: Path,
+    connect: Callable[[SensorPlan], As5600] | None,
+    *,
+    served: bool,
+) -> Iterator[Finding]:
+    """How the encoders at the joints are, where their bus can be opened."""
+    sensors = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
+    if not sensors or importlib.util.find_spec("gpiozero") is None:
+        return
+    from shapechanger.robot.setup.joints import bus_speed, examine_encoders, real_encoders
+
+    yield bus_speed(_config(root))
+    for sensor in sensors:
+        if os.access(root / f"dev/i2c-{sensor.settings['bus']}", os.R_OK | os.W_OK):
+            yield from examine_encoders(sensor, connect or real_encoders, served=served)
 
 
 def uses_pins(output: OutputPlan) -> bool:
@@ -197,6 +242,8 @@ def _packages(guard: GuardPlan, camera: CameraPlan | None) -> Iterator[Finding]:
     wanted["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
     if any("bus" in plan.settings for plan in [*guard.outputs, *guard.sensors]):
         wanted["smbus2"] = "pip install 'shapechanger[robot]'"
+    if any(output.driver == "dynamixel" for output in guard.outputs):
+        wanted["dynamixel_sdk"] = "pip install 'shapechanger[robot,finger]'"
     if camera is not None and camera.driver == "picamera2":
         wanted["picamera2"] = (
             "sudo apt install python3-picamera2, and make the virtual environment with "

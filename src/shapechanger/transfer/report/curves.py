@@ -5,19 +5,18 @@
 
 from __future__ import annotations
 
-import io
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra
-from shapechanger.transfer.plan import RunKind
+from shapechanger.pages.drawing import BLUE, GREEN, GREY, ORANGE, PINK, PURPLE, drawn
+from shapechanger.transfer.plan import LIKENED, RunKind
 from shapechanger.transfer.report.spread import t_interval
 from shapechanger.transfer.study import Study
 
 try:
-    import matplotlib.style
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
@@ -33,31 +32,20 @@ class _Look(NamedTuple):
     """How the curves of one kind are drawn; no two kinds differ by colour alone."""
 
     colour: str
-    line: str
+    line: str | tuple[int, tuple[int, ...]]
     marker: str
 
 
-# Colours of Okabe & Ito (2008), which people tell apart however they see colours.
 _LOOKS: Final[dict[RunKind, _Look]] = {
-    "scratch": _Look("#0072B2", "-", "o"),
-    "fine-tune": _Look("#D55E00", "-", "s"),
-    "zero-shot": _Look("#007A5A", "--", ""),
-    "random": _Look("#555555", ":", ""),
+    "scratch": _Look(BLUE, "-", "o"),
+    "fine-tune": _Look(ORANGE, "-", "s"),
+    "zero-shot": _Look(GREEN, "--", ""),
+    "randomised": _Look(PINK, "-.", ""),
+    "identified": _Look(PURPLE, (0, (6, 2)), ""),
+    "random": _Look(GREY, ":", ""),
 }
 # Two panels side by side fill a page, and one below the other a telephone, at sizes one can read.
 _SIZE_IN: Final = (4.7, 4.1)
-_STYLE: Final = {
-    "font.size": 10.0,
-    "font.family": "DejaVu Sans",  # Comes with matplotlib, so that all machines draw the same.
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "legend.frameon": False,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "shapechanger",
-}
-_NO_METADATA: Final = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
 def learning_curves(study: Study, counting: Counting) -> str:
@@ -72,9 +60,8 @@ def learning_curves(study: Study, counting: Counting) -> str:
         counting: "target" counts target steps; "total" moves what comes from the source to the
             right by its source steps.
     """
-    with matplotlib.style.context(["default", _STYLE]):
-        figure = Figure(figsize=_SIZE_IN, layout="constrained")
-        axes = figure.add_subplot()
+
+    def draw(figure: Figure, axes: Axes) -> None:
         _draw(axes, study, float(study.plan.source_steps) if counting == "total" else 0.0)
         axes.set_xlabel("Target steps" if counting == "target" else "Source and target steps")
         axes.set_ylabel("Mean return on the target")
@@ -83,9 +70,8 @@ def learning_curves(study: Study, counting: Counting) -> str:
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.yaxis.set_major_formatter(FuncFormatter(_return_text))
         figure.legend(loc="outside lower center", ncols=2, handlelength=2.5)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", metadata=_NO_METADATA)
-    return text.getvalue()
+
+    return drawn(_SIZE_IN, draw)
 
 
 def _draw(axes: Axes, study: Study, source_steps: float) -> None:
@@ -107,7 +93,7 @@ def _draw(axes: Axes, study: Study, source_steps: float) -> None:
         )
     for arm in study.plan.arms:
         start = 0.0 if arm == "scratch" else source_steps
-        if arm == "zero-shot":
+        if arm == "zero-shot" or arm in LIKENED:
             _level(axes, study, arm, start, start + last)
         else:
             _curve(axes, study, arm, start)

@@ -6,10 +6,7 @@ from typing import Any, Final, cast
 
 import msgspec
 
-from shapechanger.transfer.body_map import BodyMap, Row, Take
-from shapechanger.transfer.body_map.entries import SAME_NAME
-from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.report.markup import (
+from shapechanger.pages.markup import (
     Html,
     details,
     joined,
@@ -19,6 +16,9 @@ from shapechanger.transfer.report.markup import (
     table,
     text,
 )
+from shapechanger.transfer.body_map import BodyMap, Row, Take
+from shapechanger.transfer.body_map.entries import SAME_NAME
+from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.report.numbers import count, number
 from shapechanger.transfer.settings import CloningSettings, SacSettings, Settings
 from shapechanger.transfer.study import Study

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.pages.markup import Html, element, joined, paragraph, text
+from shapechanger.pages.page import page_text
+from shapechanger.pages.pictures import png_uri, svg_uri
 from shapechanger.transfer.files import write_whole
 from shapechanger.transfer.report import evidence, results
-from shapechanger.transfer.report.markup import Html, element, joined, paragraph, text
-from shapechanger.transfer.report.pictures import png_uri, svg_uri
 from shapechanger.transfer.report.verdict import verdict
 from shapechanger.transfer.study import Study
 
@@ -22,21 +22,6 @@ __all__ = ["Pictures", "report_html", "write_report"]
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
-_PAGE: Final = """\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-{body}
-</body>
-</html>
-"""
 
 _CURVES_NOTE: Final = (
     "A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over "
@@ -93,8 +78,7 @@ def report_html(study: Study, pictures: Pictures | None = None, picture_note: st
             ),
         )
     )
-    style = files("shapechanger.transfer.report").joinpath("page.css").read_text("utf-8")
-    return _PAGE.format(title=text(title), style=style, body=body)
+    return page_text(title, body)
 
 
 def _section(name: str, heading: str, content: Html) -> Html:

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from shapechanger.transfer.metrics import Summary
-from shapechanger.transfer.plan import Arm
-from shapechanger.transfer.report.arms import GOOD, ArmRow, arm_rows
-from shapechanger.transfer.report.markup import (
+from shapechanger.pages.markup import (
     Html,
     element,
     joined,
@@ -16,9 +13,12 @@ from shapechanger.transfer.report.markup import (
     table,
     text,
 )
+from shapechanger.transfer.metrics import Summary
+from shapechanger.transfer.plan import Arm
+from shapechanger.transfer.report.arms import GOOD, ArmRow, arm_rows
 from shapechanger.transfer.report.numbers import UNDEFINED, count, number
 from shapechanger.transfer.report.table import Row, measure_rows
-from shapechanger.transfer.report.verdict import caveats
+from shapechanger.transfer.report.verdict import caveats, judged_arm
 from shapechanger.transfer.report.words import (
     ASYMPTOTIC_GAIN,
     EXPLANATIONS,
@@ -43,7 +43,7 @@ _INTERVALS: Final = (
 
 def headline(study: Study) -> Html:
     """The numbers that the verdict rests on, in target steps with those in total steps below."""
-    arm: Arm = "fine-tune" if "fine-tune" in study.summaries else "zero-shot"
+    arm = judged_arm(study)
     rows = [row for row in measure_rows(study) if row.arm == arm]
     wanted = [row for name in _HEADLINE for row in rows if row.measure == name]
     wanted += [row for row in rows if row.measure.startswith(TIME_TO_THRESHOLD)][-1:]
@@ -92,6 +92,7 @@ def arms(study: Study) -> Html:
         "First return",
         "Final return",
         "Episode length",
+        "Success",
         f"Reached {GOOD:.0%} of best".replace("%", " %"),
         "Final return of each seed",
     )
@@ -186,6 +187,7 @@ def _arm_cells(row: ArmRow) -> tuple[Html, ...]:
         _estimate(row.first_return),
         _estimate(row.final_return),
         text(row.length),
+        text(row.success or "not told"),
         text(row.good or "not measured"),
         text(row.per_seed),
     )

@@ -10,7 +10,7 @@ from scipy import stats
 
 from shapechanger.transfer.report.numbers import interval_text, number
 
-__all__ = ["CONFIDENCE", "Spread", "spread_text", "t_interval"]
+__all__ = ["CONFIDENCE", "Spread", "share_text", "spread_text", "t_interval"]
 
 CONFIDENCE: Final = 0.95
 
@@ -55,3 +55,24 @@ def spread_text(values: NDArray[np.float64]) -> str:
         return f"{number(float(values[0]))} (no interval)"
     mean, low, high = (float(x[0]) for x in t_interval(values[:, np.newaxis]))
     return interval_text(mean, low, high)
+
+
+def share_text(shares: NDArray[np.float64]) -> str:
+    """The mean of one share for each seed with its t-interval, as in `85 % [71 %, 99 %]`.
+
+    The interval is cut off at 0 and 1, where no share can be beyond.
+
+    Args:
+        shares: 0 to 1, shape (n_seeds,); empty for an empty text.
+    """
+    if shares.size == 0:
+        return ""
+    if shares.size == 1:
+        return f"{_percent(float(shares[0]))} (no interval)"
+    spread = np.clip(np.concatenate(t_interval(shares[:, np.newaxis])), 0.0, 1.0)
+    mean, low, high = (_percent(float(x)) for x in spread)
+    return f"{mean} [{low}, {high}]"
+
+
+def _percent(share: float) -> str:
+    return f"{number(100.0 * share, 0)} %"

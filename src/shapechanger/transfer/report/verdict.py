@@ -5,12 +5,21 @@ from __future__ import annotations
 from typing import Final, Literal, NamedTuple
 
 from shapechanger.transfer.metrics import Estimate, Measures, Summary, estimate_difference
-from shapechanger.transfer.report.arms import finals
+from shapechanger.transfer.plan import Arm, RunKind
+from shapechanger.transfer.report.arms import finals, successes
 from shapechanger.transfer.report.numbers import count, estimate_text
-from shapechanger.transfer.report.spread import spread_text
+from shapechanger.transfer.report.spread import share_text, spread_text
 from shapechanger.transfer.study import Study
 
-__all__ = ["Direction", "caveats", "direction", "scratch_gain", "source_takes_all", "verdict"]
+__all__ = [
+    "Direction",
+    "caveats",
+    "direction",
+    "judged_arm",
+    "scratch_gain",
+    "source_takes_all",
+    "verdict",
+]
 
 Direction = Literal["up", "down", "unclear"]
 
@@ -48,13 +57,16 @@ def verdict(study: Study) -> str:
 
     Fine-tune is judged by its total reward gain, which is chosen in advance, so that nobody can
     pick the measure that pleases; the asymptotic gain and the time to the highest threshold are
-    told beside it. A study without fine-tune is judged by the jumpstart of zero-shot.
+    told beside it. A study without fine-tune is judged by the jumpstart of its first other arm.
+    Where the envs say what success is, a sentence tells how often each arm succeeds.
     """
-    if "fine-tune" in study.summaries:
-        summary = study.summaries["fine-tune"]
+    arm = judged_arm(study)
+    summary = study.summaries[arm]
+    if arm == "fine-tune":
         sentences = [_in_target_steps(summary), _in_total_steps(summary)]
     else:
-        sentences = _untrained(study.summaries["zero-shot"])
+        sentences = _untrained(summary)
+    sentences += _successes(study)
     if direction(scratch_gain(study)) != "up":
         sentences.append(
             f"Scratch itself did not clearly learn: it ended at {_end(study, 'scratch')}, and the "
@@ -62,6 +74,20 @@ def verdict(study: Study) -> str:
             "try more target steps."
         )
     return " ".join(sentences)
+
+
+def judged_arm(study: Study) -> Arm:
+    """The arm that a study is judged by."""
+    return "fine-tune" if "fine-tune" in study.summaries else next(iter(study.summaries))
+
+
+def _successes(study: Study) -> list[str]:
+    """How often each arm succeeds at the end; nothing where the envs do not say what success is."""
+    kinds: list[RunKind] = ["source", *study.plan.arms]
+    told = {kind: share_text(successes(study, kind)) for kind in kinds}
+    names = {"source": "the source policy in the source"}
+    parts = [f"{names.get(kind, kind)} {share}" for kind, share in told.items() if share]
+    return [f"Success at the end: {'; '.join(parts)}."] if parts else []
 
 
 def scratch_gain(study: Study) -> Estimate:
@@ -97,6 +123,11 @@ def caveats(study: Study) -> tuple[str, ...]:
         told.append(
             "All runs of zero-shot and fine-tune start from the one source policy that was brought "
             "along: the intervals say nothing about another policy of the same source."
+        )
+    if study.plan.individual:
+        told.append(
+            f"Each seed meets another target, whose {study.plan.individual} is the number of the "
+            "seed from 0 on: the intervals are over these, too."
         )
     if study.plan.seeds < _FEW_SEEDS:
         told.append(

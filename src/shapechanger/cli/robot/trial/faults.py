@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from shapechanger.cli.robot.running import RunningRobot
 from shapechanger.cli.robot.trial.driver import Driver
 from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
@@ -22,6 +21,7 @@ from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.network import BadNetwork
 from shapechanger.twin.operator import Operator
+from shapechanger.twin.running import RunningRobot
 
 __all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -42,14 +43,22 @@ class _Ready:
 class RunningRobot:
     """A robot that is served on this machine; it ends with `close`.
 
+    Args:
+        folder: Where its files are.
+        supervisor: Its supervisor.
+        temporary: Whether the folder goes away with it.
+
     Attributes:
         folder: Where its files are: the twin's ledger and socket, the key and what it said.
         supervisor: Its supervisor.
     """
 
-    def __init__(self, folder: Path, supervisor: subprocess.Popen[bytes]) -> None:
+    def __init__(
+        self, folder: Path, supervisor: subprocess.Popen[bytes], *, temporary: bool = False
+    ) -> None:
         self.folder = folder
         self.supervisor = supervisor
+        self._temporary = temporary
         self._ready = self._await_ready()
 
     def __enter__(self) -> Self:
@@ -123,6 +132,12 @@ class RunningRobot:
 
     def close(self) -> None:
         """End it; its outputs are at rest then."""
+        self._end()
+        if self._temporary:
+            # Its board may still write the last lines of its ledger there.
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _end(self) -> None:
         if self.supervisor.poll() is None:
             self.supervisor.send_signal(signal.SIGCONT)
             self.supervisor.terminate()
@@ -137,8 +152,10 @@ class RunningRobot:
         until_s = time.monotonic() + timeout_s
         while not path.exists():
             if self.supervisor.poll() is not None or time.monotonic() > until_s:
+                self._end()
+                said = self.said().strip()
                 self.close()
-                raise RobotError(f"The robot did not start: {self.said().strip()}")
+                raise RobotError(f"The robot did not start: {said}")
             time.sleep(_LOOK_S)
         return _Ready(**json.loads(path.read_text()))
 
@@ -160,7 +177,8 @@ def run_robot(
         twin: Whether on its twin.
         clock: Where a twin's time comes from.
         seed: Seed of a twin's world.
-        folder: Folder for its files; a new one if not given. A twin that runs there is used.
+        folder: Folder for its files; one that goes away with it if not given. A twin that runs
+            there is used.
         log: Where its processes say what happens; a file in the folder if not given.
         arguments: More arguments of `serve`.
 
@@ -169,12 +187,14 @@ def run_robot(
     """
     if not isinstance(profile, Profile):
         profile = load_profile(profile)
+    temporary = folder is None
     folder = folder or Path(tempfile.mkdtemp(prefix="shapechanger-robot-"))
     make_credentials(folder / "credentials", profile.name)
     command = [sys.executable, "-c", "from shapechanger.cli import main; main()"]
     command += ["robot", "serve", str(profile.path), "--port", "0", "--no-announce"]
     command += ["--credentials", str(folder / "credentials")]
-    command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json"), *arguments]
+    command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json")]
+    command += ["--recordings", str(folder / "recordings"), *arguments]
     if twin:
         command += ["--twin", "--clock", clock, "--seed", str(seed)]
         command += ["--twin-folder", str(folder)]
@@ -189,7 +209,7 @@ def run_robot(
             process_group=0,
             preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
-    return RunningRobot(folder, supervisor)
+    return RunningRobot(folder, supervisor, temporary=temporary)
 
 
 def _end_with_parent() -> None:

@@ -1,0 +1,96 @@
+"""What is left of a policy of the nominal finger in fingers that are not like it, and on rigs.
+
+The study is that of `shapechanger transfer Finger Finger --target-options '{"gap": "real-like"}'
+--source-policy ...`, with the policy that ships: each seed meets another finger. It lies in
+`results/finger-gap`, and what has ended there is not done again. The same to `RemoteFinger-v1`, on
+twins of a rig that the env serves for itself, lies in `results/finger-rig`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from benchmarks.row import Row
+from shapechanger.cli.transfer import write_study_report
+from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Processes
+from shapechanger.transfer.plan import EVERY_ARM, Arm, TransferTask
+from shapechanger.transfer.report.arms import successes
+from shapechanger.transfer.report.spread import share_text
+from shapechanger.transfer.settings import learner_settings
+from shapechanger.transfer.study import Study, make_plan, run_study
+
+__all__ = ["gap", "rig"]
+
+SEEDS: Final = 3
+# What a finger on a bench moves for ten minutes.
+STEPS: Final = 30_720
+RIGS: Final = 2
+RIG_STEPS: Final = 6144
+_FINGER: Final = EnvRef("shapechanger/Finger-v1")
+# Fewer of what is left is a gap; more of it is one that nobody needs to cross.
+_MILD: Final = 0.5
+_RECOVERED: Final = 0.8
+
+
+def gap() -> list[Row]:
+    """Success of each arm, on fingers of the gap "real-like"."""
+    target = _FINGER.having({"gap": "real-like"})
+    study = _study(target, "ppo-finger", EVERY_ARM, SEEDS, STEPS, Path("results", "finger-gap"))
+    return rows_of(study, "fingers of the gap real-like")
+
+
+def rig() -> list[Row]:
+    """The same through link, daemon, guard and servo bus, on two minutes of each rig."""
+    target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
+    arms: tuple[Arm, ...] = ("scratch", "zero-shot", "randomised", "identified")
+    study = _study(target, "ppo-rig", arms, RIGS, RIG_STEPS, Path("results", "finger-rig"))
+    return rows_of(study, "twins of a rig, real-like")
+
+
+def _study(
+    target: EnvRef, learner: str, arms: tuple[Arm, ...], seeds: int, steps: int, out: Path
+) -> Study:
+    """A study of what ships, and its report."""
+    plan = make_plan(
+        TransferTask(_FINGER, target),
+        learner,
+        learner_settings(learner),
+        seeds=int(os.environ.get("SEEDS", seeds)),
+        steps=steps,
+        source_policy=POLICIES["reach"],
+        arms=arms,
+    )
+    study = run_study(
+        plan,
+        out,
+        source_policy=POLICIES["reach"],
+        executor=Processes(int(os.environ.get("WORKERS", os.cpu_count() or 1))),
+        command=f"python -m benchmarks.run {out.name}",
+    )
+    write_study_report(study, out)
+    return study
+
+
+def rows_of(study: Study, where: str) -> list[Row]:
+    """What each arm reaches, beside what was asked; the nominal finger reaches all."""
+    shares = {arm: successes(study, arm) for arm in study.plan.arms}
+    best = max(("randomised", "identified"), key=lambda arm: float(shares[arm].mean()))
+    limits = {"zero-shot": ("< 50 %", float(shares["zero-shot"].mean()) < _MILD)}
+    limits[best] = (">= 80 %, this or the other", float(shares[best].mean()) >= _RECOVERED)
+    seeds = study.plan.seeds
+    return [
+        Row(
+            f"{where}, {arm}: targets reached within 5 mm",
+            f"{np.mean(share):.0%}",
+            f"{share_text(share)} over {seeds} fingers: "
+            f"{', '.join(f'{each:.0%}' for each in share)}",
+            *limits.get(arm, ("none", True)),
+        )
+        for arm, share in shares.items()
+    ]

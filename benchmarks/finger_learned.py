@@ -1,0 +1,145 @@
+"""How well the finger learns to reach and to follow: five seeds each, with their learning curves.
+
+Each training is done once; policies and curves lie in `results/finger`, and what is there already
+is not trained again. The curves are published with the rows, in `finger-curves.json`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+
+from benchmarks.finger_oracle import FIRST_SEED, tracked_mm
+from benchmarks.row import Row
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.evaluation import Evaluation
+from shapechanger.transfer.files import write_whole
+from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.settings import LearnerSettings, learner_settings
+from shapechanger.transfer.training import train, use_one_thread
+
+__all__ = ["FOLDER", "TASKS", "learned", "trained"]
+
+SEEDS: Final = 5
+TARGETS: Final = 200
+TRACKS: Final = 5
+FOLDER: Final = Path("results", "finger")
+CURVES: Final = Path(__file__).parent / "results" / "finger-curves.json"
+_CIRCLE: Final = {"kind": "circle", "radius": 0.012, "hz": 0.5}
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is learned.
+
+    Attributes:
+        env: The env.
+        learner: Name of the learner's settings.
+        steps: Env steps.
+    """
+
+    env: EnvRef
+    learner: str
+    steps: int
+
+
+TASKS: Final = {
+    "reach": Task(EnvRef("shapechanger/Finger-v1"), "ppo-finger", 307_200),
+    # On many paths, so that what is learned follows others too.
+    "track": Task(EnvRef("shapechanger/FingerTrack-v1", {"path": "random"}), "ppo-finger", 307_200),
+}
+
+
+def learned() -> list[Row]:
+    """Train what is not there yet, and judge it on targets that nothing was tried on."""
+    seeds = range(int(os.environ.get("SEEDS", SEEDS)))
+    wanted = [(name, seed) for name in TASKS for seed in seeds]
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        list(pool.map(trained, *zip(*wanted, strict=True)))
+    curves = {f"{name}-{seed}": json.loads(_curve(name, seed).read_text()) for name, seed in wanted}
+    write_whole(CURVES, (json.dumps(curves, indent=1) + "\n").encode())
+    return [_reach_row(seeds), _track_row(seeds)]
+
+
+def trained(name: str, seed: int) -> Path:
+    """Train a policy, unless it was; its file."""
+    out = FOLDER / f"{name}-{seed}.zip"
+    if out.exists():
+        return out
+    task = TASKS[name]
+    settings = learner_settings(task.learner)
+    assert isinstance(settings, LearnerSettings)
+    use_one_thread()
+    curve: list[Evaluation] = []
+    policy = train(task.env, task.learner, settings, task.steps, seed, on_evaluation=curve.append)
+    write_whole(_curve(name, seed), msgspec.json.encode(curve))
+    save_policy(policy, out)
+    return out
+
+
+def _curve(name: str, seed: int) -> Path:
+    return FOLDER / f"{name}-{seed}.json"
+
+
+def _reach_row(seeds: range) -> Row:
+    shares: list[float] = []
+    errors: list[float] = []
+    for seed in seeds:
+        infos = _played(load_policy(FOLDER / f"reach-{seed}.zip"), TASKS["reach"].env, TARGETS)
+        shares.append(float(np.mean([info["is_success"] for info in infos])))
+        errors.append(1e3 * float(np.median([info["distance"] for info in infos])))
+    return Row(
+        f"learned reaching, {len(shares)} seeds: targets reached within 5 mm",
+        f"{np.mean(shares):.1%}",
+        f"{min(shares):.1%} to {max(shares):.1%} of {TARGETS}, median errors "
+        f"{min(errors):.2f} to {max(errors):.2f} mm, {TASKS['reach'].steps:,} steps",
+        "90 %",
+        min(shares) >= 0.9,
+    )
+
+
+def _track_row(seeds: range) -> Row:
+    env = EnvRef("shapechanger/FingerTrack-v1", {"path": _CIRCLE})
+    errors = [
+        1e3 * float(np.mean([info["rms"] for info in _played(_tracker(seed), env, TRACKS)]))
+        for seed in seeds
+    ]
+    knows = float(np.mean([tracked_mm(0.5, FIRST_SEED + i) for i in range(TRACKS)]))
+    ratios = [error / knows for error in errors]
+    return Row(
+        f"learned following, {len(errors)} seeds: circle of 12 mm at 0.5 Hz",
+        f"{np.mean(errors):.2f} mm RMS, {np.mean(ratios):.2f}x",
+        f"{min(ratios):.2f}x to {max(ratios):.2f}x of {knows:.2f} mm, "
+        f"{TASKS['track'].steps:,} steps on other paths",
+        "2x of the controller that knows the finger",
+        max(ratios) <= 2.0,
+    )
+
+
+def _tracker(seed: int) -> TrainedPolicy:
+    return load_policy(FOLDER / f"track-{seed}.zip")
+
+
+def _played(policy: TrainedPolicy, env: EnvRef, episodes: int) -> list[dict[str, Any]]:
+    """The last info of each episode."""
+    infos: list[dict[str, Any]] = []
+    with gym.make(env.id, **env.kwargs) as made:
+        for i in range(episodes):
+            observation, info = made.reset(seed=FIRST_SEED + i)
+            ended = False
+            while not ended:
+                action = policy.act(observation[None])[0]
+                observation, _, terminated, truncated, info = made.step(action)
+                ended = terminated or truncated
+            infos.append(info)
+    return infos

@@ -1,0 +1,222 @@
+"""`shapechanger demos train`: a policy from demonstrations."""
+
+from __future__ import annotations
+
+import io
+import shlex
+import sys
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import require_seed
+from shapechanger.cli.progress import StudyProgress
+from shapechanger.cli.stopping import Interrupted
+from shapechanger.errors import OutputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from rich.console import Console
+
+    from shapechanger.demos.cloning.judge import Judgement
+    from shapechanger.demos.cloning.learn import MemberCheck
+    from shapechanger.demos.cloning.pictures import Framing
+    from shapechanger.demos.cloning.policy import CameraPolicy
+
+__all__ = ["Shrinking", "Train", "print_judgement"]
+
+
+@dataclass(frozen=True)
+class Train:
+    """Learn to do what a driver did, and write the policy and a report beside it."""
+
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """A recording, one episode of it, or anything that `demos import` reads."""
+    out: Path
+    """The file to write, such as policy.zip; policy.html and policy.json come beside it."""
+    head: Literal["auto", "class", "regression"] = "auto"
+    """What comes out: one of the actions that were shown (at most 16), or numbers."""
+    inputs: Literal["auto", "picture", "state", "both"] = "auto"
+    """What goes in; pictures where there are any, and the state elsewhere, if not given."""
+    split: Literal["time", "episode"] = "time"
+    """What judges the policy: the last stretch of time, or the last whole episodes."""
+    held_out: float = 0.2
+    """Share of the steps that judges the policy and is not learned from; 0 to learn from all."""
+    seed: int = 0
+    """Seed of everything random."""
+    sac: Path | None = None
+    """Also write it as a file that `stable_baselines3.SAC.load` reads, to go on from by reward."""
+    ppo: Path | None = None
+    """Also write it as a file that `stable_baselines3.PPO.load` reads."""
+
+    def run(self) -> None:
+        """Train, judge, and write."""
+        self._require_files()
+        # The report comes last; if what draws it is missing, say so before the work.
+        import_module("shapechanger.cli.demos.clone_report")
+        from shapechanger.cli.demos.clone_report import write_clone_report, write_numbers
+        from shapechanger.demos.cloning.judge import judge
+        from shapechanger.demos.cloning.learn import learn, settings_for
+        from shapechanger.demos.cloning.split import judged_steps
+        from shapechanger.demos.dataset import count_steps, load_dataset
+        from shapechanger.transfer.training import use_one_thread
+
+        console = plain_console()
+        settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
+        if settings.members > 1:
+            use_one_thread()  # Networks this small lose by more, and on a busy machine a lot.
+        shrinking = Shrinking(settings.framing)
+        data = load_dataset(self.data, shrink=shrinking)
+        judged = judged_steps(data.episodes, self.split, self.held_out)
+        learned = ~judged
+        n = int(learned.sum())
+        console.print(f"{n} steps to learn from, {len(data) - n} to judge by", soft_wrap=True)
+        try:
+            with _Progress(settings.members, settings.steps(n)) as progress:
+                policy, training = learn(
+                    data,
+                    learned,
+                    settings=settings,
+                    head=self.head,
+                    inputs=self.inputs,
+                    seed=self.seed,
+                    on_check=progress,
+                )
+        except KeyboardInterrupt:
+            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+        console.print(training.mirror_note, soft_wrap=True)
+        policy = policy.described(
+            command=shlex.join(["shapechanger", *sys.argv[1:]]),
+            data=str(self.data),
+            digest=shrinking.digest(data.actions),
+            learned=n,
+            steps=len(data),
+        )
+        told = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
+        if not judged.any():
+            judged = learned
+            told = "These are the steps that it learned from, so others will come out worse."
+        judgement = judge(policy, data, judged)
+        policy.save(self.out)
+        for path in self._write_for_sb3(policy, shrinking.size):
+            console.print(f"wrote {path}", soft_wrap=True)
+        page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
+        write_clone_report(page, self.out.name, policy, data, judgement, training, told)
+        write_numbers(numbers, policy, judgement, training)
+        console.print(f"wrote {self.out}, {page} and {numbers}", soft_wrap=True)
+        console.print(told, soft_wrap=True)
+        print_judgement(console, judgement)
+
+    def _require_files(self) -> None:
+        """Refuse what would keep the files from being written before the work, not after.
+
+        Raises:
+            OutputError: If a file cannot be written, or two have one name.
+            StudyError: If there is no such seed.
+        """
+        from shapechanger.transfer.files import make_folder
+
+        require_seed(self.seed)
+        written = [self.out, self.out.with_suffix(".html"), self.out.with_suffix(".json")]
+        written += [path for path in (self.sac, self.ppo) if path is not None]
+        for path in written:
+            if path.is_dir():
+                raise OutputError(f"Cannot write {path}: it is a folder.")
+            if written.count(path) > 1:
+                raise OutputError(f"Cannot write two files to {path}: give each a name of its own.")
+            make_folder(path.parent)
+
+    def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> list[Path]:
+        """Write what Stable-Baselines3 reads, if it is asked for."""
+        written: list[Path] = []
+        if self.sac is None and self.ppo is None:
+            return written
+        from shapechanger.demos.cloning.sb3_file import as_ppo, as_sac
+        from shapechanger.transfer.files import write_whole
+
+        for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
+            if path is not None:
+                whole = io.BytesIO()  # Stable-Baselines3 would write it bit by bit, to FILE.zip.
+                make(policy, size, seed=self.seed).save(whole)
+                write_whole(path, whole.getvalue())
+                written.append(path)
+        return written
+
+
+@dataclass
+class Shrinking:
+    """Makes pictures as a policy sees them while they are read, and remembers what they were.
+
+    Attributes:
+        framing: What the policy sees.
+        size: Rows and columns of the raw pictures; None before the first.
+        seen: Digest of each picture.
+    """
+
+    framing: Framing
+    size: tuple[int, int] | None = None
+    seen: list[bytes] = field(default_factory=list[bytes])
+
+    def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """What is seen of a picture."""
+        import hashlib
+
+        from shapechanger.demos.cloning.pictures import prepare
+
+        self.size = picture.shape[0], picture.shape[1]
+        small = prepare(picture[None], self.framing)[0]
+        self.seen.append(hashlib.sha256(picture.tobytes()).digest())
+        return small
+
+    def digest(self, actions: NDArray[np.float32]) -> str:
+        """What tells these demonstrations from others."""
+        import hashlib
+
+        return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
+
+
+class _Progress(StudyProgress):
+    """Shows how far each network is."""
+
+    def __init__(self, members: int, steps: int) -> None:
+        super().__init__({self._name(member): steps for member in range(members)})
+        self._at = 0
+
+    def __call__(self, check: MemberCheck) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Take in a check."""
+        if check.member > self._at:
+            super().__call__(self._name(self._at), check.step, True)
+            self._at = check.member
+        super().__call__(self._name(check.member), check.step, False)
+
+    @staticmethod
+    def _name(member: int) -> str:
+        return f"network {member + 1}"
+
+
+def print_judgement(console: Console, judgement: Judgement) -> None:
+    """Print how good a policy was; the last line is its accuracy."""
+    always = f"always the same: {judgement.always:.3f}"
+    console.print(f"{judgement.steps} steps; {always}", soft_wrap=True)
+    if judgement.head == "class":
+        for name, row in zip(judgement.classes, judgement.confusion, strict=True):
+            if sum(row):
+                right = row[judgement.classes.index(name)]
+                console.print(f"  {name}: {right} of {sum(row)} right", soft_wrap=True)
+        console.print(f"calibration error {judgement.ece or 0.0:.3f}")
+    else:
+        for name, error in zip(judgement.numbers, judgement.errors, strict=False):
+            console.print(f"  {name}: mean absolute error {error:.3f}", soft_wrap=True)
+        console.print(f"within {judgement.tolerance:g} of half the range {judgement.within:.3f}")
+        console.print(
+            "accuracy counts steps whose numbers all fall in the driver's third of their range, "
+            "such as left, straight or right",
+            soft_wrap=True,
+        )
+    console.print(f"macro-F1 {judgement.macro_f1:.3f}")
+    console.print(f"accuracy {judgement.accuracy:.3f}")

@@ -1,0 +1,102 @@
+"""The files of an episode: their names, and how they are locked and written."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from pathlib import Path
+from typing import Any, Final
+
+from shapechanger.errors import DemosError, OutputError
+
+__all__ = [
+    "FRAMES",
+    "HEADER",
+    "LOST",
+    "STEPS",
+    "cannot_write",
+    "is_episode",
+    "lock",
+    "write_all",
+    "write_header",
+]
+
+HEADER: Final = "episode.json"
+STEPS: Final = "steps.jsonl"
+FRAMES: Final = "frames"
+LOST: Final = "lost"
+
+
+def is_episode(folder: Path) -> bool:
+    """Whether a folder is that of an episode."""
+    return (folder / HEADER).is_file() or (folder / STEPS).is_file()
+
+
+def lock(path: Path, busy: str) -> int:
+    """Lock a file until it is closed; it is made where it is missing.
+
+    Args:
+        path: The file.
+        busy: What to say when somebody else has locked it.
+
+    Returns:
+        Its file descriptor, open for appending.
+
+    Raises:
+        DemosError: If somebody else has locked it.
+        OutputError: If it cannot be written to.
+    """
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(fd)
+        raise DemosError(busy) from None
+    except OSError as error:
+        os.close(fd)
+        raise cannot_write(path, error) from error
+    return fd
+
+
+def write_all(fd: int, data: bytes) -> None:
+    """Append bytes to a file, all of them or none.
+
+    Raises:
+        OSError: If they cannot be written; what was there is as it was.
+    """
+    before = os.fstat(fd).st_size
+    try:
+        written = 0
+        while written < len(data):
+            written += os.write(fd, data[written:])
+    except OSError:
+        os.ftruncate(fd, before)
+        raise
+
+
+def write_header(folder: Path, content: dict[str, Any]) -> None:
+    """Write the header of an episode, whole or not at all.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    part = folder / f".{HEADER}.part"
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            json.dump(content, file, indent=1, ensure_ascii=False)
+            file.write("\n")
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(folder / HEADER)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise cannot_write(folder / HEADER, error) from error
+
+
+def cannot_write(path: Path, error: OSError) -> OutputError:
+    """What to say when a file cannot be written."""
+    return OutputError(f"Cannot write {path}: {error.strerror or error}.")

@@ -1,0 +1,302 @@
+"""Records an episode, so that a crash at any moment costs at most the step of that moment."""
+
+from __future__ import annotations
+
+import binascii
+import contextlib
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final, Self
+
+from shapechanger.demos.episodes.files import (
+    FRAMES,
+    STEPS,
+    cannot_write,
+    lock,
+    write_all,
+    write_header,
+)
+from shapechanger.demos.episodes.header import EpisodeHeader
+from shapechanger.demos.episodes.lines import encode_line
+from shapechanger.demos.episodes.step import Step
+from shapechanger.demos.episodes.sync import Syncer
+from shapechanger.errors import DemosError, OutputError
+
+__all__ = ["EpisodeWriter"]
+
+_LOCK: Final = ".recording"
+_JPEG: Final = b"\xff\xd8"
+_LARGEST_PICTURE: Final = 16 << 20
+_SPARE_BYTES: Final = 64 << 20
+_LOOK_EVERY: Final = 20  # Steps. How full the disk is does not change faster.
+_MOST_IN_ONE_SECOND: Final = 10_000
+_NS_PER_S: Final = 1e9
+
+
+class EpisodeWriter:
+    """Writes one episode; `create` makes one.
+
+    Attributes:
+        path: Folder of the episode.
+        steps: How many steps were written.
+        dropped: How many of them were undone.
+        marks: How many marks were set.
+    """
+
+    def __init__(
+        self, path: Path, header: EpisodeHeader, locks: tuple[int, int], spare_bytes: int
+    ) -> None:
+        self.path = path
+        self.steps = 0
+        self.dropped = 0
+        self.marks = 0
+        self._header = header
+        self._sizes = header.action_size, header.state_size
+        self._lock, self._fd = locks
+        self._spare_bytes = spare_bytes
+        self._before: Step | None = None
+        # When each step that still counts was, s, to know how many an `undo` takes.
+        self._times: list[tuple[int, float]] = []
+        self._syncer: Syncer | None = Syncer(self._fd)
+
+    @classmethod
+    def create(
+        cls,
+        recording: Path,
+        header: EpisodeHeader,
+        *,
+        spare_bytes: int = _SPARE_BYTES,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> EpisodeWriter:
+        """Begin an episode in a recording, which is made where it is missing.
+
+        Args:
+            recording: Folder of the recording.
+            header: What the episode is of.
+            spare_bytes: How much of the disk stays free. A full disk would harm the robot.
+            now: Gives the time, UTC.
+
+        Raises:
+            DemosError: If somebody else records there.
+            OutputError: If nothing can be written there, or the disk is full.
+        """
+        began = now()
+        header = replace(
+            header,
+            created=began.isoformat(timespec="milliseconds"),
+            version=version("shapechanger"),
+        )
+        try:
+            recording.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(recording, error) from error
+        _require_space(recording, spare_bytes)
+        held = lock(recording / _LOCK, f"Somebody records in {recording} already: choose another.")
+        try:
+            path = _new_folder(recording, header, f"{began:%Y%m%dT%H%M%SZ}")
+            fd = lock(path / STEPS, f"Somebody writes to {path} already.")
+        except BaseException:
+            os.close(held)
+            raise
+        return cls(path, header, (held, fd), spare_bytes)
+
+    def __enter__(self) -> Self:
+        """The writer itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the episode."""
+        self.close()
+
+    @property
+    def seconds(self) -> float:
+        """How long it is, s."""
+        return self._times[-1][1] - self._times[0][1] if self._times else 0.0
+
+    def add(self, step: Step, jpeg: bytes | None = None) -> int:
+        """Write a step.
+
+        Args:
+            step: The step; what it says of its index and its frame is filled in here.
+            jpeg: Its picture; None for the picture of the step before, or without a camera.
+
+        Returns:
+            Its index.
+
+        Raises:
+            DemosError: If it does not fit the header, or time runs backwards.
+            OutputError: If it cannot be written. What was written before is there, whole.
+        """
+        self._require_open()
+        refusal = step.refusal(*self._sizes) or self._disorder(step) or _no_picture(jpeg)
+        if refusal:
+            raise DemosError(f"Step {self.steps} of {self.path} cannot be recorded: {refusal}.")
+        if self.steps % _LOOK_EVERY == 0:
+            _require_space(self.path, self._spare_bytes)
+        step = replace(step, index=self.steps, **self._frame(jpeg))
+        self._append(step.to_json())
+        self._before = step
+        self._times.append((step.index, self._time_s(step)))
+        self.steps += 1
+        return step.index
+
+    def mark(self, text: str = "") -> None:
+        """Remember the newest step for later, with a few words.
+
+        Raises:
+            DemosError: If there is no step yet.
+            OutputError: If it cannot be written.
+        """
+        self._require_open()
+        if not self.steps:
+            raise DemosError("There is no step yet that could be marked.")
+        self._append({"kind": "mark", "step": self.steps - 1, "text": text})
+        self.marks += 1
+
+    def undo(self, seconds: float = 5.0) -> int:
+        """Drop the newest steps, which stay in the file but do not count.
+
+        Args:
+            seconds: How far back from the newest step that counts, s.
+
+        Returns:
+            How many steps.
+
+        Raises:
+            DemosError: If it is no time.
+            OutputError: If it cannot be written.
+        """
+        self._require_open()
+        if not seconds > 0.0:
+            raise DemosError(f"The last {seconds} s cannot be undone.")
+        if not self._times:
+            return 0
+        since_s = self._times[-1][1] - seconds
+        gone = [index for index, at_s in self._times if at_s > since_s]
+        self._append({"kind": "drop", "first": gone[0], "last": self.steps - 1, "why": "undo"})
+        del self._times[-len(gone) :]
+        self.dropped += len(gone)
+        return len(gone)
+
+    def close(self, outcome: str = "") -> None:
+        """End the episode; once is enough.
+
+        Args:
+            outcome: How it ended, such as "collision" or "time"; "" for just so.
+
+        Raises:
+            OutputError: If its header cannot be written; all steps are there all the same.
+        """
+        if self._syncer is None:
+            return
+        self._syncer.close()
+        self._syncer = None
+        try:
+            write_header(
+                self.path,
+                self._header.to_json() | {"closed": {"steps": self.steps, "outcome": outcome}},
+            )
+        finally:
+            os.close(self._fd)
+            os.close(self._lock)
+
+    def _append(self, fields: dict[str, object]) -> None:
+        try:
+            write_all(self._fd, encode_line(fields))
+        except OSError as error:
+            raise cannot_write(self.path / STEPS, error) from error
+
+    def _frame(self, jpeg: bytes | None) -> dict[str, object]:
+        """The fields of a step that name its picture, which is written first."""
+        before = self._before
+        if jpeg is None:
+            if before is None:
+                return {}
+            return {
+                "frame": before.frame,
+                "frame_bytes": before.frame_bytes,
+                "frame_crc": before.frame_crc,
+            }
+        name = f"{self.steps:06d}.jpg"
+        path = self.path / FRAMES / name
+        try:
+            with path.open("wb", buffering=0) as file:
+                write_all(file.fileno(), jpeg)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+            raise cannot_write(path, error) from error
+        if self._syncer is not None:
+            self._syncer.add(path)
+        return {"frame": name, "frame_bytes": len(jpeg), "frame_crc": binascii.crc32(jpeg)}
+
+    def _disorder(self, step: Step) -> str:
+        """Which of its times is before that of the last step, in words; empty for none."""
+        if self._before is None:
+            return ""
+        for name in ("captured_ns", "decided_ns"):
+            earlier, later = getattr(self._before, name), getattr(step, name)
+            if earlier is not None and later is not None and later < earlier:
+                return f"time runs backwards, from {earlier} to {later} ns ({name})"
+        return ""
+
+    def _time_s(self, step: Step) -> float:
+        at_ns = step.captured_ns if step.captured_ns is not None else step.decided_ns
+        return step.index / self._header.control_hz if at_ns is None else at_ns / _NS_PER_S
+
+    def _require_open(self) -> None:
+        if self._syncer is None:
+            raise DemosError(f"The episode {self.path} is closed.")
+
+
+def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
+    """Make the folder of an episode, which appears with everything that it needs.
+
+    Raises:
+        OutputError: If it cannot be made.
+    """
+    part = recording / f".{began}.{os.getpid()}"
+    try:
+        (part / FRAMES).mkdir(parents=True, exist_ok=True)
+        (part / STEPS).touch()
+        write_header(part, header.to_json() | {"closed": None})
+        for number in range(1, _MOST_IN_ONE_SECOND):
+            path = recording / f"{began}-{number:04d}"
+            if not path.exists():  # Nobody else makes one: the recording is locked.
+                return part.rename(path)
+    except OutputError:  # Which says it already, and is an OSError, too.
+        raise
+    except OSError as error:
+        raise cannot_write(part, error) from error
+    raise OutputError(f"{recording} has too many episodes of {began}.")
+
+
+def _no_picture(jpeg: bytes | None) -> str:
+    """Why bytes are no picture, in words; empty if they may be one."""
+    if jpeg is None:
+        return ""
+    if len(jpeg) > _LARGEST_PICTURE:
+        return f"its picture has {len(jpeg)} bytes, and at most {_LARGEST_PICTURE} are allowed"
+    return "" if jpeg.startswith(_JPEG) else "its picture is no JPEG"
+
+
+def _require_space(folder: Path, spare_bytes: int) -> None:
+    """Refuse to fill a disk.
+
+    Raises:
+        OutputError: If less is free.
+    """
+    try:
+        found = os.statvfs(folder)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    free = found.f_bavail * found.f_frsize
+    if free < spare_bytes:
+        raise OutputError(
+            f"Cannot write to {folder}: only {free >> 20} MB of the disk are free, and "
+            f"{spare_bytes >> 20} MB stay free."
+        )

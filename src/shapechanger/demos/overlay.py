@@ -1,0 +1,100 @@
+"""Draws an action into the picture that it was decided on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.demos.episodes import Driver, Step
+from shapechanger.layout import Layout
+
+__all__ = ["COLOURS", "blank", "overlay"]
+
+COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
+    "person": (0, 114, 178),
+    "expert": (0, 158, 115),
+    "policy": (230, 159, 0),
+    "program": (153, 153, 153),
+}
+"""Who drives, as red, green and blue: M. Okabe, K. Ito, "Color universal design", 2008."""
+
+_WIDTH: Final = 480  # Pixels that a picture is brought to, at least.
+_BAR: Final = 14  # Height of the strip of one number, pixels.
+_PAPER: Final = (24, 28, 34)
+_MIDDLE: Final = (110, 118, 128)
+_WANTED: Final = (255, 255, 255)
+
+
+def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[np.uint8]:
+    """A picture with the action of its step below it, a bar for each number.
+
+    A bar begins at 0, or at the bound nearest to it: steering to the left is a bar to the left. Its
+    colour says who drives; a white line is what a policy wanted while somebody else drove.
+
+    Args:
+        picture: Shape (h, w, 3).
+        step: The step.
+        layout: Of its action.
+
+    Returns:
+        Shape (H, W, 3); W is at least 480, and both are even, as films need it.
+    """
+    times = max(1, math.ceil(_WIDTH / picture.shape[1]))
+    large = picture.repeat(times, axis=0).repeat(times, axis=1)
+    width = large.shape[1] - large.shape[1] % 2
+    large = large[: large.shape[0] - large.shape[0] % 2, :width]
+    strips = [
+        _strip(
+            width,
+            _share(value, low, high),
+            _share(min(max(0.0, low), high), low, high),
+            None if step.wanted is None else _share(step.wanted[place], low, high),
+            COLOURS[step.driver],
+        )
+        for place, (value, low, high) in enumerate(
+            zip(step.action, *_bounds(layout, step.action), strict=True)
+        )
+    ]
+    return np.concatenate([large, *strips])
+
+
+def blank(size: tuple[int, int]) -> NDArray[np.uint8]:
+    """A picture of nothing, for episodes without a camera; width and height in pixels."""
+    return np.full((size[1], size[0], 3), _PAPER, np.uint8)
+
+
+def _bounds(layout: Layout, action: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Ends of the bars; where the layout has none, those of a number that is as large as it is."""
+    lows = [
+        low if math.isfinite(low) else -max(1.0, abs(value))
+        for low, value in zip(layout.low.tolist(), action, strict=True)
+    ]
+    highs = [
+        high if math.isfinite(high) else max(1.0, abs(value))
+        for high, value in zip(layout.high.tolist(), action, strict=True)
+    ]
+    return lows, highs
+
+
+def _share(value: float, low: float, high: float) -> float:
+    """Where a value lies between two bounds, from 0 to 1."""
+    return 0.5 if not low < high else min(max((value - low) / (high - low), 0.0), 1.0)
+
+
+def _strip(
+    width: int, value: float, zero: float, wanted: float | None, colour: tuple[int, int, int]
+) -> NDArray[np.uint8]:
+    strip = np.full((_BAR, width, 3), _PAPER, np.uint8)
+    last = width - 1
+    from_, to = sorted((round(zero * last), round(value * last)))
+    strip[2:-2, from_ : to + 1] = colour
+    middle = round(zero * last)
+    strip[:, middle : middle + 1] = _MIDDLE
+    if wanted is not None:
+        place = min(round(wanted * last), last - 1)
+        strip[1:-1, place : place + 2] = _WANTED
+    return strip

@@ -1,0 +1,13 @@
+"""The finger as Gymnasium envs."""
+
+from __future__ import annotations
+
+from shapechanger.errors import MissingExtra
+
+try:
+    from shapechanger.envs.finger.reach import FingerReachEnv
+    from shapechanger.envs.finger.track import FingerTrackEnv
+except ModuleNotFoundError as error:
+    raise MissingExtra(error.name or "mujoco", "sim") from error
+
+__all__ = ["FingerReachEnv", "FingerTrackEnv"]

@@ -1,0 +1,316 @@
+"""What all envs of the finger share: the plant, the spaces, and pictures."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.finger import (
+    JOINTS,
+    NOMINAL,
+    TENDONS,
+    FingerParameters,
+    drive_of,
+)
+from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
+from shapechanger.embodiments.finger.figure import FingerFigure
+from shapechanger.envs.finger.gap import Gap, gap_as_asked
+from shapechanger.envs.finger.likeness import identified
+from shapechanger.envs.finger.plant import FingerPlant
+from shapechanger.envs.finger.postures import draw_start
+from shapechanger.envs.picture import body_reach, draw
+from shapechanger.envs.renderer import Renderer
+from shapechanger.envs.stepping.actions import check_action
+from shapechanger.errors import FingerError, UnknownName
+from shapechanger.headless import choose_gl, require_screen
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of_senses
+
+if TYPE_CHECKING:
+    from gymnasium.envs.registration import EnvSpec
+
+__all__ = ["CONTROL_DT", "FingerEnv", "numbers", "posture_of"]
+
+CONTROL_DT: Final = 0.020
+"""How long an action acts, s."""
+
+_MODES: Final = ("human", "rgb_array", "depth_array")
+# From the thumb's side, with the workspace and the end of the hand in view.
+_CAMERA: Final[Mapping[str, Any]] = {
+    "lookat": np.array([0.017, 0.0, -0.024]),
+    "distance": 0.18,
+    "azimuth": -125.0,
+    "elevation": -15.0,
+}
+_PICTURE: Final = 480
+
+
+class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
+    """An index finger that seven tendons pull.
+
+    What the fingertip should do belongs to the classes derived from this one.
+
+    Args:
+        actions: What an action commands; see `shapechanger.embodiments.finger.DRIVES`.
+        parameters: Of the finger, as `FingerParameters`, their JSON, or some by name; the nominal
+            finger if not given.
+        gap: Name of the distribution, or the distribution, that the finger is drawn from in place
+            of `parameters`; see `shapechanger.envs.finger.gap`.
+        finger_seed: Which finger of the gap this is; None draws another at each reset, as domain
+            randomisation does.
+        reward: Weights that replace the default ones, by name.
+        render_mode: "human", "rgb_array" or "depth_array".
+        width: Of frames, pixels.
+        height: Of frames, pixels.
+
+    Attributes:
+        plant: The finger itself, for whoever may know the truth.
+        observation_layout: What each number of the observation means.
+        action_layout: What each number of the action means.
+
+    Raises:
+        UnknownName: If there is no such mode of action, gap, parameter, weight or render mode.
+        FingerError: If the parameters contradict themselves, or come with a gap.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own is no ClassVar.
+        "render_modes": [*_MODES],
+        "render_fps": round(1.0 / CONTROL_DT),
+    }
+    observation_layout: Layout
+    _spec: EnvSpec | None = None
+
+    def __init__(
+        self,
+        *,
+        actions: str = "impedance",
+        parameters: FingerParameters | Mapping[str, Any] | str | None = None,
+        gap: str | Gap | Mapping[str, Any] | None = None,
+        finger_seed: int | None = None,
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        width: int = _PICTURE,
+        height: int = _PICTURE,
+    ) -> None:
+        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
+        EzPickle.__init__(self, **arguments)
+        if render_mode is not None and render_mode not in _MODES:
+            raise UnknownName("render mode", render_mode, _MODES)
+        if render_mode == "human":
+            require_screen()
+        elif render_mode is not None:
+            choose_gl()
+        if gap is not None and parameters is not None:
+            raise FingerError("A finger has its own parameters or is drawn from a gap: give one.")
+        if gap is None and finger_seed is not None:
+            raise FingerError("finger_seed says which finger of a gap it is: give a gap, too.")
+        self.render_mode = render_mode
+        self.width, self.height = width, height
+        self._actions = actions
+        self._gap = None if gap is None else gap_as_asked(gap)
+        self._is_drawn_anew = gap is not None and finger_seed is None
+        self._reward = FingertipReward.from_weights(reward or {})
+        self._figure: FingerFigure | None = None
+        self._renderer: Renderer | None = None
+        if self._gap is None:
+            self._have(_parameters(parameters))
+        else:
+            self._have(self._gap.draw(np.random.default_rng(finger_seed or 0)))
+        self._senses: FingerSenses | None = None
+        self.action_layout = Layout(
+            tuple(
+                Feature(f"{name}/command", "1", -1.0, 1.0, Element("tendon", name))
+                for name in TENDONS
+            )
+        )
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (len(TENDONS),), np.float32)
+
+    def _have(self, parameters: FingerParameters) -> None:
+        """Be another finger from here on."""
+        self.parameters = parameters
+        self.drive = drive_of(self._actions, NOMINAL)
+        self.plant = FingerPlant(parameters, self.drive, CONTROL_DT)
+        self._most = np.array(parameters.most_tension)
+        self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until it is put at a start.
+
+    def _place(self, options: dict[str, Any] | None) -> FingerSenses:
+        """Draw the finger if it is drawn anew, and put it at a start."""
+        known = self._options
+        for name in options or {}:
+            if name not in known:
+                raise UnknownName("option of reset", name, known)
+        if self._is_drawn_anew and self._gap is not None:
+            self._have(self._gap.draw(self.np_random))
+        given = (options or {}).get("posture")
+        angles = draw_start(self.np_random) if given is None else posture_of(given)
+        self._senses = self.plant.place(angles, self.np_random)
+        return self._senses
+
+    _options: tuple[str, ...] = ("posture",)
+
+    def _act(self, action: Any) -> FingerSenses:
+        """Let an action act.
+
+        Raises:
+            BadAction: If it is none; nothing has moved then.
+            ResetNeeded: If `reset` was never called.
+        """
+        if self._senses is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        checked = check_action(self, action)
+        self._senses = self.plant.act(np.asarray(checked, np.float64), self.np_random)
+        return self._senses
+
+    def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
+        """How far the fingertip is from where it should be, m, and the terms of the reward."""
+        distance = float(np.linalg.norm(self.plant.fingertip - place))
+        tension = np.abs(self.plant.data.actuator_force) / self._most
+        return distance, self._reward.terms(distance, float(np.mean(tension**2)), CONTROL_DT)
+
+    def render(self) -> Any:
+        """A frame as `render_mode` asks; None without one.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        if self.render_mode is None:
+            return None
+        figure = self._shown()
+        if self._renderer is None:
+            self._renderer = Renderer(
+                figure.model, figure.data, dict(_CAMERA), self.width, self.height
+            )
+        return self._renderer.render(self.render_mode)
+
+    def _shown(self) -> FingerFigure:
+        """The finger as it is now, to be drawn; what is simulated has nothing to be seen."""
+        if self._figure is None:
+            self._figure = FingerFigure()
+        data = self.plant.data
+        pulled = np.abs(data.actuator_force) / self._most
+        self._figure.show(self.plant.angles, pulled, data.mocap_pos[0])
+        return self._figure
+
+    def close(self) -> None:
+        """Free what draws."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    # The spec is what `gym.make`, Minari and a vector env build the env from again; it is written
+    # down as JSON.
+
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The registered spec, with parameters and gap as JSON has them."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        self._spec = copy.deepcopy(spec)
+        kwargs: dict[str, Any] = {} if self._spec is None else self._spec.kwargs
+        for name in ("parameters", "gap"):
+            if isinstance(kwargs.get(name), msgspec.Struct):
+                kwargs[name] = msgspec.to_builtins(kwargs[name])
+
+    # What a transfer study asks of an env, whichever kind it is.
+
+    @property
+    def reach(self) -> float:
+        """How far from the middle of the finger its farthest point is, m."""
+        figure = self._shown()
+        return body_reach(figure.model, figure.data.qpos)
+
+    def picture(
+        self, width: int = 480, height: int = 360, reach: float | None = None
+    ) -> NDArray[np.uint8]:
+        """The finger as it is, shape (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Metres in view around the middle of the finger; None for its own reach.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        figure = self._shown()
+        return draw(figure.without_target(), figure.data.qpos, width, height, reach or self.reach)
+
+    @property
+    def individual(self) -> str:
+        """The argument that says which finger this is, where the gap has many; else empty."""
+        return "finger_seed" if self._is_drawn_anew else ""
+
+    def randomised_source(self) -> dict[str, Any]:
+        """Arguments with which an env of the finger has other fingers that this one may be."""
+        return {"gap": "wide"}
+
+    def identified_source(self, seed: int) -> dict[str, Any]:
+        """Arguments with which an env of the finger has this one, as ten seconds of motion show it.
+
+        Args:
+            seed: Of the motions.
+
+        Raises:
+            FingerError: If the motions are not enough, or observations are no list of numbers.
+            MissingExtra: If `mujoco.sysid` is not there.
+        """
+        return {"parameters": msgspec.to_builtins(identified(self, self._actions, seed))}
+
+    def _sense_features(self) -> list[Feature]:
+        return features_of_senses(
+            JOINTS, JOINT_RANGE, TENDONS, [float(most) for most in MOST_TENSION_N]
+        )
+
+
+def _parameters(value: FingerParameters | Mapping[str, Any] | str | None) -> FingerParameters:
+    if value is None:
+        return NOMINAL
+    if isinstance(value, FingerParameters):
+        return value
+    if isinstance(value, str):
+        return FingerParameters.from_json(value)
+    given: Any = value  # What a type checker knows, a notebook may not.
+    if not isinstance(given, Mapping):
+        raise FingerError(f"Parameters of a finger are numbers by name or JSON, got {given!r}.")
+    known = FingerParameters.__struct_fields__
+    for name in value:
+        if name not in known:
+            raise UnknownName("parameter of a finger", name, known)
+    return NOMINAL.replace(**value)
+
+
+def posture_of(value: Any) -> NDArray[np.float64]:
+    """The posture that a user means, rad, (4,).
+
+    Raises:
+        FingerError: If it is none, or beyond the ranges of the joints.
+    """
+    angles = numbers(value)
+    low, high = JOINT_RANGE.T
+    if angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
+        raise FingerError(
+            f"A posture is four angles in rad, {', '.join(JOINTS)}, within "
+            f"{_rounded(low)} and {_rounded(high)}; got {value}."
+        )
+    return angles
+
+
+def numbers(value: Any) -> NDArray[np.float64]:
+    """What a user gives as an array; an empty one if it is none."""
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
+def _rounded(angles: NDArray[np.float64]) -> list[float]:
+    return [round(float(angle), 3) for angle in angles]

@@ -1,0 +1,248 @@
+"""What a real finger may have and the nominal one has not, as distributions to draw from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.finger import NOMINAL, FingerParameters
+from shapechanger.embodiments.finger.balance import spans_all_torques
+from shapechanger.errors import FingerError, UnknownName
+
+__all__ = ["GAPS", "Gap", "gap_as_asked", "geared_around", "with_gears"]
+
+# How often draws whose tendons cannot balance one another are thrown away before giving up. With
+# arms off by 25 % about one in two hundred is.
+_TRIES: Final = 1000
+
+# Whose logarithms are drawn.
+_LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
+
+# What identified arms and stretch, and identified joints, are off by: `benchmarks.finger_identify`.
+_FOUND: Final = 0.03
+_JOINTS_FOUND: Final = 0.2
+
+Range = tuple[float, float]
+
+
+class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Ranges that the parameters of a finger are drawn from, uniformly where nothing else is said.
+
+    Attributes:
+        arm_error: Relative error of each moment arm, at most this on either side.
+        joint_factor: Of the stiffness, damping and friction of each joint; their logarithm is drawn
+            uniformly.
+        strength: Of the largest tensions.
+        tendon_friction: N.
+        tendon_stiffness: N/m; its logarithm is drawn uniformly.
+        backlash: m.
+        motor_kg: kg; its logarithm is drawn uniformly.
+        motor_lag: s.
+        command_delay: s.
+        joint_noise: Standard deviation of measured angles, rad.
+        tension_noise: The same of tensions, N.
+        tendon_damping: N·s/m.
+        least_tension: N.
+        around: The finger that errors and factors are of.
+
+    Raises:
+        FingerError: If a range has its ends swapped, is not finite, or begins at 0 where logarithms
+            are drawn; or an error is not from 0 to below 1.
+    """
+
+    arm_error: float
+    joint_factor: Range
+    strength: Range
+    tendon_friction: Range
+    tendon_stiffness: Range
+    backlash: Range
+    motor_kg: Range
+    motor_lag: Range
+    command_delay: Range
+    joint_noise: Range
+    tension_noise: Range
+    tendon_damping: Range = (NOMINAL.tendon_damping, NOMINAL.tendon_damping)
+    least_tension: Range = (NOMINAL.least_tension, NOMINAL.least_tension)
+    around: FingerParameters = NOMINAL
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.arm_error < 1.0:
+            raise FingerError(f"arm_error must be 0 to below 1, got {self.arm_error}.")
+        for name, value in msgspec.structs.asdict(self).items():
+            if name in ("arm_error", "around"):
+                continue
+            if not 0.0 <= value[0] <= value[1] < math.inf:
+                raise FingerError(f"{name}: the range {value} is empty, infinite or below zero.")
+            if name in _LOGARITHMIC and not value[0] > 0.0:
+                raise FingerError(f"{name}: the range {value} must begin above zero.")
+
+    def draw(self, rng: np.random.Generator) -> FingerParameters:
+        """A finger; one whose tendons could not hold it is drawn again.
+
+        Raises:
+            FingerError: If hardly any could.
+        """
+        arms = self._arms(rng)
+
+        def joints(values: tuple[float, ...]) -> tuple[float, ...]:
+            return tuple(value * _log_uniform(rng, self.joint_factor) for value in values)
+
+        strength = rng.uniform(*self.strength)
+        return FingerParameters(
+            moment_arms=tuple(map(tuple, arms.tolist())),  # pyright: ignore[reportArgumentType]
+            most_tension=tuple(strength * most for most in self.around.most_tension),
+            joint_stiffness=joints(self.around.joint_stiffness),
+            joint_damping=joints(self.around.joint_damping),
+            joint_friction=joints(self.around.joint_friction),
+            tendon_friction=rng.uniform(*self.tendon_friction),
+            tendon_stiffness=_log_uniform(rng, self.tendon_stiffness),
+            backlash=rng.uniform(*self.backlash),
+            motor_kg=_log_uniform(rng, self.motor_kg),
+            motor_lag=rng.uniform(*self.motor_lag),
+            command_delay=rng.uniform(*self.command_delay),
+            joint_noise=rng.uniform(*self.joint_noise),
+            tension_noise=rng.uniform(*self.tension_noise),
+            tendon_damping=rng.uniform(*self.tendon_damping),
+            least_tension=rng.uniform(*self.least_tension),
+        )
+
+    def _arms(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        middle = self.around.arms
+        for _ in range(_TRIES):
+            arms = middle * (1.0 + rng.uniform(-self.arm_error, self.arm_error, middle.shape))
+            if spans_all_torques(arms):
+                return arms
+        raise FingerError(
+            f"With moment arms off by {self.arm_error:.0%}, hardly any finger's tendons can hold "
+            "it: make arm_error smaller."
+        )
+
+
+def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
+    low, high = (math.log(bound) for bound in bounds)
+    return math.exp(rng.uniform(low, high))
+
+
+_DEGREE: Final = math.radians(1.0)
+
+GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
+    {
+        # What a tendon-driven finger on a bench is like. The arms, delay, noise and friction are
+        # those that the study of the gap is asked for; the others are chosen: cords of some
+        # decimetres give 5 to 20 N/mm, servos lag by tens of milliseconds.
+        "real-like": Gap(
+            arm_error=0.2,
+            joint_factor=(0.7, 1.4),
+            strength=(0.9, 1.1),
+            tendon_friction=(1.0, 1.0),
+            tendon_stiffness=(5e3, 20e3),
+            backlash=(0.0, 0.5e-3),
+            motor_kg=(0.02, 0.05),
+            motor_lag=(0.015, 0.030),
+            command_delay=(0.020, 0.040),
+            joint_noise=(_DEGREE, _DEGREE),
+            tension_noise=(0.2, 0.5),
+        ),
+        # What a learner sees that is to cope with all of them: from hardly anything to somewhat
+        # more than the above.
+        "wide": Gap(
+            arm_error=0.25,
+            joint_factor=(0.6, 1.6),
+            strength=(0.85, 1.15),
+            tendon_friction=(0.0, 1.5),
+            tendon_stiffness=(4e3, 30e3),
+            backlash=(0.0, 1e-3),
+            motor_kg=(0.01, 0.06),
+            motor_lag=(0.010, 0.035),
+            command_delay=(0.0, 0.050),
+            joint_noise=(0.0, 1.5 * _DEGREE),
+            tension_noise=(0.0, 0.6),
+        ),
+        # The same for a finger whose servos have gears and spools of a centimetre, as the profile
+        # "finger" has: what turns weighs 1.4 kg at the tendon, drags with 4 N·s/m and rubs with
+        # 0.5 N (the motor's numbers, `shapechanger.twin.servos.models`, by the spool's radius); the
+        # force is there within a millisecond, but a rig changes it by no more than all of it in
+        # 50 ms, which a lag stands for, and what it senses is late as well: policies did there as
+        # they do here with 40 to 60 ms. They pull 15 of 25 N at most, and 1 N at least.
+        # How far the ranges reach around these is chosen.
+        "geared": Gap(
+            arm_error=0.25,
+            joint_factor=(0.6, 1.6),
+            strength=(0.55, 0.75),
+            tendon_friction=(0.2, 0.9),
+            tendon_stiffness=(5e3, 30e3),
+            backlash=(0.0, 0.5e-3),
+            motor_kg=(1.0, 2.0),
+            motor_lag=(0.005, 0.030),
+            command_delay=(0.020, 0.060),
+            joint_noise=(0.0, 1.5 * _DEGREE),
+            tension_noise=(0.0, 0.6),
+            tendon_damping=(3.0, 10.0),
+            least_tension=(0.5, 1.5),
+        ),
+    }
+)
+"""Gaps by name."""
+
+
+def with_gears(parameters: FingerParameters) -> FingerParameters:
+    """The same finger on servos with gears: what turns is as heavy as the gap "geared" has it.
+
+    It also drags and rubs as much, and the force comes as soon; each is the middle of its range.
+    """
+    geared = GAPS["geared"]
+    return parameters.replace(
+        motor_kg=math.sqrt(geared.motor_kg[0] * geared.motor_kg[1]),
+        tendon_damping=sum(geared.tendon_damping) / 2,
+        tendon_friction=sum(geared.tendon_friction) / 2,
+        motor_lag=sum(geared.motor_lag) / 2,
+    )
+
+
+def geared_around(found: FingerParameters) -> Gap:
+    """What a finger on servos with gears may be, after it was identified.
+
+    Arms, joints and stretch are near those that were found; what a log hardly tells of motors with
+    gears is as wide as in the gap "geared".
+
+    Args:
+        found: What was identified.
+    """
+    stiffness = found.tendon_stiffness or GAPS["geared"].tendon_stiffness[1]
+    return msgspec.structs.replace(
+        GAPS["geared"],
+        around=found,
+        arm_error=_FOUND,
+        joint_factor=(1.0 - _JOINTS_FOUND, 1.0 + _JOINTS_FOUND),
+        strength=(1.0, 1.0),
+        tendon_stiffness=((1.0 - _FOUND) * stiffness, (1.0 + _FOUND) * stiffness),
+        joint_noise=(found.joint_noise, found.joint_noise),
+        tension_noise=(found.tension_noise, found.tension_noise),
+        least_tension=(found.least_tension, found.least_tension),
+    )
+
+
+def gap_as_asked(value: str | Gap | Mapping[str, object]) -> Gap:
+    """The gap that a user means: its name, its ranges, or a gap.
+
+    Raises:
+        UnknownName: If it is the name of none.
+        FingerError: If the ranges are none.
+    """
+    if isinstance(value, Gap):
+        return value
+    if isinstance(value, str):
+        if value not in GAPS:
+            raise UnknownName("gap", value, GAPS)
+        return GAPS[value]
+    try:
+        return msgspec.convert(value, Gap)
+    except msgspec.ValidationError as error:
+        said = str(error).rstrip(".")
+        raise FingerError(f"This is no gap between fingers: {said}.") from error

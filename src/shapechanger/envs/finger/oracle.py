@@ -1,0 +1,136 @@
+"""A controller that knows the nominal finger: the upper reference for reaching and following."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.finger import (
+    NOMINAL,
+    TENDONS,
+    Drive,
+    FingerParameters,
+    build_finger,
+    drive_of,
+)
+from shapechanger.embodiments.finger.anatomy import LEAST_TENSION_N
+from shapechanger.embodiments.finger.balance import hold
+from shapechanger.envs.finger.env import CONTROL_DT
+from shapechanger.envs.finger.inverse import angles_for
+from shapechanger.envs.finger.postures import joint_torque
+from shapechanger.layout import Layout
+
+__all__ = ["FingerOracle"]
+
+# 1/s. Of what a joint is off, the share that it makes up for in a second: most of it in two steps.
+_GAIN: Final = 25.0
+# rad/s. Faster than this no joint is asked to move.
+_MOST_SPEED: Final = 12.0
+_ENDS: Final = (-np.ones(len(TENDONS)), np.ones(len(TENDONS)))
+
+
+class FingerOracle:
+    """Brings the fingertip of a finger to where its observation says that it should be.
+
+    Each step it takes the angles that the fingertip needs at the end of the step (inverse
+    kinematics), the speeds that lead there, the torques that those take by the finger's model
+    (inertia, weight, passive tissue), the tensions that give these torques with the least co-
+    contraction (bounded least squares), and the commands that give those tensions, with the motors'
+    lag made up for.
+
+    It sees only observations, so that it drives a finger on a bench as well; what it takes for
+    granted are the parameters that it is given.
+
+    Args:
+        layout: Of the observations.
+        actions: What an action commands.
+        parameters: What the finger is taken to be.
+        gain: Of what a joint is off, the share made up for in a second, 1/s; lower for a finger
+            whose commands come late.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        actions: str = "impedance",
+        parameters: FingerParameters = NOMINAL,
+        gain: float = _GAIN,
+    ) -> None:
+        self._drive: Drive = drive_of(actions, NOMINAL)
+        self._gain = gain
+        self._arms = parameters.arms
+        self._most = np.array(parameters.most_tension)
+        # Whatever its tendons are like, the bones' motion follows from the tensions.
+        stiff = parameters.replace(tendon_stiffness=None, backlash=0.0, command_delay=0.0)
+        self._model = build_finger(stiff, drive_of("tension", stiff)).compile()
+        self._data = mujoco.MjData(self._model)
+        # Of the way to a new tension, what a motor goes in one step.
+        self._follows = 1.0 - math.exp(-CONTROL_DT / parameters.motor_lag)
+        self._places = _Places(layout)
+        self._wanted: NDArray[np.float64] | None = None
+
+    def reset(self) -> None:
+        """Begin with another episode."""
+        self._wanted = None
+
+    def __call__(self, observation: Any) -> NDArray[np.float32]:
+        """The action, (7,), for an observation, (n,)."""
+        seen = self._places.read(np.asarray(observation, np.float64))
+        wanted, _ = angles_for(
+            seen.next_place, seen.angles if self._wanted is None else self._wanted
+        )
+        self._wanted = wanted
+        speed = np.clip(self._gain * (wanted - seen.angles), -_MOST_SPEED, _MOST_SPEED)
+        # The command acts on lengths that change meanwhile: what counts is the middle of the step.
+        length = -self._arms @ (seen.angles + 0.5 * CONTROL_DT * speed)
+        pulling = -self._arms @ speed
+        low, high = (self._drive.tension(end, length, pulling) for end in _ENDS)
+        low = np.clip(low, LEAST_TENSION_N, self._most)
+        high = np.clip(high, low, self._most)
+        tensions, _ = hold(self._arms, self._torque(seen, speed), low, high)
+        ahead = seen.tensions + (tensions - seen.tensions) / self._follows
+        command = self._drive.command(ahead, length, pulling)
+        return np.clip(command, -1.0, 1.0).astype(np.float32)
+
+    def _torque(self, seen: _Seen, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What moves the joints at this speed by the end of the step, N·m, (4,)."""
+        acceleration = (speed - seen.velocities) / CONTROL_DT
+        return joint_torque(self._model, self._data, seen.angles, speed, acceleration)
+
+
+class _Seen(NamedTuple):
+    """What the controller takes from an observation."""
+
+    angles: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    tensions: NDArray[np.float64]
+    next_place: NDArray[np.float64]
+
+
+class _Places:
+    """Where those numbers are."""
+
+    def __init__(self, layout: Layout) -> None:
+        names = layout.names
+
+        def those(*ends: str) -> list[int]:
+            return [i for i, name in enumerate(names) if name.endswith(ends)]
+
+        self._angles = those("/angle")
+        self._velocities = those("/velocity")
+        self._tensions = those("/tension")
+        target: Sequence[str] = tuple(f"target/{axis}" for axis in "xyz")
+        self._target = [names.index(name) for name in target]
+
+    def read(self, observation: NDArray[np.float64]) -> _Seen:
+        return _Seen(
+            observation[self._angles],
+            observation[self._velocities],
+            observation[self._tensions],
+            observation[self._target],
+        )

@@ -1,0 +1,130 @@
+"""A finger in simulation: commands in, what its senses say out."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.finger import JOINTS, TENDONS, Drive, FingerParameters, build_finger
+from shapechanger.embodiments.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.embodiments.finger.model import FINGERTIP, TARGET
+from shapechanger.envs.finger.velocities import JointVelocities
+from shapechanger.tasks.finger import FingerSenses, fingertip
+
+__all__ = ["FingerPlant"]
+
+_N_JOINTS: Final = len(JOINTS)
+_N_TENDONS: Final = len(TENDONS)
+
+
+class FingerPlant:
+    """A finger that is driven and sensed.
+
+    Args:
+        parameters: Of the finger.
+        drive: What its commands mean.
+        control_dt: How long a command acts, s; a whole number of steps of the simulation.
+
+    Attributes:
+        model: The compiled model.
+        data: Its state.
+    """
+
+    def __init__(self, parameters: FingerParameters, drive: Drive, control_dt: float) -> None:
+        self.parameters = parameters
+        self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
+        self.data = mujoco.MjData(self.model)
+        # A view; to go through the warnings one by one takes longer than a step.
+        self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
+        self._drive = drive
+        self._frame_skip = round(control_dt / self.model.opt.timestep)
+        self._arms = parameters.arms
+        self._tip = self.data.site_xpos[self.model.site(FINGERTIP).id]
+        self._command = np.zeros(_N_TENDONS)
+        self._angles = np.zeros(_N_JOINTS)
+        self._velocities = np.zeros(_N_JOINTS)
+        self._differences = JointVelocities(control_dt)
+
+    @property
+    def fingertip(self) -> NDArray[np.float64]:
+        """Where the fingertip is, m, (3,)."""
+        return self._tip.copy()
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """What the angles are, rad, (4,)."""
+        return self.data.qpos[:_N_JOINTS].copy()
+
+    @property
+    def diverged(self) -> bool:
+        """Whether MuJoCo has found a number bad since the last `place`."""
+        return bool(self._warnings.any())
+
+    def mark(self, place: NDArray[np.float64]) -> None:
+        """Show in pictures where the fingertip should be, m, (3,)."""
+        self.data.mocap_pos[self.model.body(TARGET).mocapid[0]] = place
+
+    def place(self, angles: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
+        """Begin at rest with these angles, rad, (4,), and every tendon just taut."""
+        model, data = self.model, self.data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:_N_JOINTS] = angles
+        least = self.parameters.least_tension
+        if self.parameters.tendon_stiffness is not None:
+            taut = self.parameters.backlash + least / self.parameters.tendon_stiffness
+            data.qpos[_N_JOINTS:] = self._arms @ angles + taut
+        length = -self._arms @ angles
+        command = self._drive.command(np.full(_N_TENDONS, least), length, np.zeros(_N_TENDONS))
+        self._command = np.clip(command, -1.0, 1.0)
+        data.ctrl[:] = self._command
+        data.act[:] = self._command
+        if self.parameters.command_delay > 0.0:
+            # What acts until the first command arrives; a new history holds zeros.
+            for i, held in enumerate(self._command):
+                samples = np.full((model.actuator_history[i, 0], 1), held)
+                mujoco.mj_initCtrlHistory(model, data, i, None, samples)
+        mujoco.mj_forward(model, data)
+        self._angles = self._measured(rng)
+        self._differences.forget()
+        self._velocities = self._differences.of(self._angles)
+        return self._senses(rng)
+
+    def act(self, command: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
+        """Let a command, -1 to 1, (7,), act for one period of control."""
+        self._command = np.clip(np.asarray(command, np.float64), -1.0, 1.0)
+        self.data.ctrl[:] = self._command
+        mujoco.mj_step(self.model, self.data, self._frame_skip)
+        mujoco.mj_kinematics(self.model, self.data)  # The tip belongs to the angles after it.
+        self._angles = self._measured(rng)
+        if self.parameters.joint_noise > 0.0:
+            self._velocities = self._differences.of(self._angles)
+        else:
+            self._velocities = self.data.qvel[:_N_JOINTS].copy()
+        return self._senses(rng)
+
+    def _measured(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        noise = self.parameters.joint_noise
+        angles = self.angles
+        return angles + noise * rng.standard_normal(_N_JOINTS) if noise > 0.0 else angles
+
+    def _senses(self, rng: np.random.Generator) -> FingerSenses:
+        tensions = np.abs(self.data.actuator_force)
+        noise = self.parameters.tension_noise
+        if noise > 0.0:
+            tensions = np.maximum(tensions + noise * rng.standard_normal(_N_TENDONS), 0.0)
+        return FingerSenses(
+            angles=self._angles,
+            velocities=self._velocities,
+            tensions=tensions,
+            lengths=self._lengths(),
+            commands=self._command,
+            fingertip=fingertip(self._angles, PHALANX_LENGTH_M),
+        )
+
+    def _lengths(self) -> NDArray[np.float64]:
+        if self.parameters.gives:  # Winding up by a metre makes it a metre shorter.
+            return -self.data.qpos[_N_JOINTS:]
+        return -self._arms @ self.angles

@@ -1,0 +1,17 @@
+"""The policies of the finger that come with the package; `README.md` beside this is their card."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+__all__ = ["POLICIES"]
+
+_FOLDER: Final = Path(__file__).parent
+
+POLICIES: Final[Mapping[str, Path]] = MappingProxyType(
+    {task: _FOLDER / f"{task}.zip" for task in ("reach", "track")}
+)
+"""File of the policy by what it does: "reach" for `Finger-v1`, "track" for `FingerTrack-v1`."""

@@ -1,0 +1,73 @@
+// A gamepad: the left stick steers; the triggers, the right stick or the left one drive.
+
+const DEAD = 0.12; // Share of a stick's travel that is no wish: sticks do not rest at 0.
+const POLL_MS = 20;
+const ARM = 0; // Of the standard mapping: A.
+const STOP = 1; // B.
+
+function alive(value) {
+  const size = Math.abs(value);
+  return size < DEAD ? 0 : (Math.sign(value) * (size - DEAD)) / (1 - DEAD);
+}
+
+export class Gamepads {
+  #changed;
+  #pressed;
+  #mustRest = true;
+  #buttons = [];
+  #timer = 0;
+
+  /** Steering and throttle, -1 to 1 each. */
+  value = { steering: 0, throttle: 0 };
+
+  /** `pressed` is called with "arm" or "stop". */
+  constructor(changed, pressed) {
+    this.#changed = changed;
+    this.#pressed = pressed;
+    addEventListener("gamepadconnected", () => this.#begin());
+    if (this.#pad()) this.#begin();
+  }
+
+  /** Count nothing until the sticks have been at rest. */
+  letGo() {
+    this.#mustRest = true;
+    this.value = { steering: 0, throttle: 0 };
+  }
+
+  #pad() {
+    // Where a page may not ask, as in an insecure context, there is no such function.
+    return navigator.getGamepads?.().find((pad) => pad?.connected) ?? null;
+  }
+
+  #begin() {
+    clearInterval(this.#timer);
+    this.letGo();
+    this.#timer = setInterval(() => this.#poll(), POLL_MS);
+  }
+
+  #poll() {
+    const pad = this.#pad();
+    const before = this.value;
+    if (!pad) {
+      clearInterval(this.#timer);
+      this.letGo();
+    } else {
+      this.#read(pad);
+    }
+    const { steering, throttle } = this.value;
+    if (steering !== before.steering || throttle !== before.throttle) this.#changed();
+  }
+
+  #read(pad) {
+    const triggers = (pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0);
+    const ways = [triggers, -(pad.axes[3] ?? 0), -(pad.axes[1] ?? 0)].map(alive);
+    const throttle = ways.reduce((most, way) => (Math.abs(way) > Math.abs(most) ? way : most), 0);
+    const value = { steering: alive(pad.axes[0] ?? 0), throttle };
+    if (this.#mustRest) this.#mustRest = value.steering !== 0 || value.throttle !== 0;
+    if (!this.#mustRest) this.value = value;
+    const now = pad.buttons.map((button) => button.pressed);
+    if (now[STOP] && !this.#buttons[STOP]) this.#pressed("stop");
+    if (now[ARM] && !this.#buttons[ARM]) this.#pressed("arm");
+    this.#buttons = now;
+  }
+}

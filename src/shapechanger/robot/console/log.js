@@ -1,0 +1,40 @@
+// What happened, newest last, for people to read and to hear.
+
+import { make } from "./dom.js";
+
+const MOST = 100;
+const AGAIN_MS = 5_000; // The same words within this time are counted, and not said again.
+
+export class Log {
+  #list;
+  #last = { text: "", atMs: -Infinity, count: 1, item: null };
+
+  constructor(list) {
+    this.#list = list;
+  }
+
+  /** Whether these words were the last ones. */
+  said(text) {
+    return text === this.#last.text;
+  }
+
+  /** Add a sentence; `kind` is "event", "refused" or "trouble". */
+  add(text, kind = "event") {
+    const nowMs = performance.now();
+    const last = this.#last;
+    if (text === last.text && nowMs - last.atMs < AGAIN_MS) {
+      last.count += 1;
+      last.atMs = nowMs;
+      last.item.dataset.count = `×${last.count}`;
+      return;
+    }
+    const time = new Date();
+    const stamp = make("time", { datetime: time.toISOString() }, time.toLocaleTimeString());
+    const item = make("li", { class: kind }, stamp, " ", text);
+    const isAtEnd = this.#list.scrollHeight - this.#list.scrollTop - this.#list.clientHeight < 24;
+    this.#list.append(item);
+    if (this.#list.childElementCount > MOST) this.#list.firstElementChild.remove();
+    if (isAtEnd) this.#list.scrollTop = this.#list.scrollHeight;
+    this.#last = { text, atMs: nowMs, count: 1, item };
+  }
+}

@@ -1,0 +1,54 @@
+// The key of a robot as people write it, and the proof that somebody holds it.
+
+const ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"; // Base 32, RFC 4648.
+const CHARACTERS = 26;
+const KEY_BYTES = 16;
+const PURPOSE = new TextEncoder().encode("shapechanger link 1");
+const MISREAD = { 0: "O", 1: "I", 8: "B" };
+
+/** The 16 bytes of a key; groups, spaces and small letters do not matter. Throws an Error in words. */
+export function parseKey(text) {
+  const plain = text.toUpperCase().replace(/[-\s]/g, "").replace(/[018]/g, (c) => MISREAD[c]);
+  if (plain.length !== CHARACTERS) {
+    throw new Error(`A key has ${CHARACTERS} letters and numbers, this one has ${plain.length}.`);
+  }
+  const key = new Uint8Array(KEY_BYTES);
+  let bits = 0;
+  let held = 0;
+  let at = 0;
+  for (const letter of plain) {
+    const value = ALPHABET.indexOf(letter);
+    if (value < 0) throw new Error("A key has only the letters A to Z and the numbers 2 to 7.");
+    held = (held << 5) | value;
+    bits += 5;
+    if (bits >= 8) {
+      bits -= 8;
+      key[at] = held >> bits;
+      held &= (1 << bits) - 1;
+      at += 1;
+    }
+  }
+  if (held !== 0) throw new Error("This key has a wrong last letter.");
+  return key;
+}
+
+/** The bytes of hexadecimal digits. */
+export function fromHex(digits) {
+  return Uint8Array.from(digits.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
+}
+
+/** HMAC-SHA256 of nonce, certificate and role, each with its length before it. */
+export async function makeProof(key, nonce, certificate, role) {
+  const parts = [PURPOSE, nonce, certificate, new TextEncoder().encode(role)];
+  const text = new Uint8Array(parts.reduce((sum, part) => sum + 4 + part.length, 0));
+  const view = new DataView(text.buffer);
+  let at = 0;
+  for (const part of parts) {
+    view.setUint32(at, part.length);
+    text.set(part, at + 4);
+    at += 4 + part.length;
+  }
+  const hmac = { name: "HMAC", hash: "SHA-256" };
+  const held = await crypto.subtle.importKey("raw", key, hmac, false, ["sign"]);
+  return new Uint8Array(await crypto.subtle.sign(hmac, held, text));
+}

@@ -1,0 +1,41 @@
+// The numbers of the state, with their units and where they come from.
+
+import { find, make, tell } from "./dom.js";
+import { inWords, shown } from "./layout.js";
+
+export class Readings {
+  #features;
+  #cells = new Map();
+
+  constructor(features) {
+    this.#features = features;
+    const list = find("readings");
+    list.replaceChildren();
+    features.forEach(({ name }, index) => {
+      if (name.endsWith("/applied")) return; // The actions show it.
+      const value = make("dd");
+      list.append(make("div", {}, make("dt", {}, inWords(name)), value));
+      this.#cells.set(index, value);
+    });
+    find("sensed").hidden = this.#cells.size === 0;
+  }
+
+  show({ state, sources }) {
+    for (const [index, cell] of this.#cells) {
+      const { name } = this.#features[index];
+      tell(cell, inFew(state[index], this.#features[index]));
+      const source = sources[name] ?? "";
+      cell.dataset.source = source;
+      cell.title = source === "absent" ? "Nothing measures this." : source && `from ${source}`;
+    }
+    const battery = this.#features.findIndex(({ name }) => name === "battery");
+    find("battery-fact").hidden = battery < 0;
+    if (battery >= 0) tell(find("battery"), shown(state[battery], this.#features[battery].unit));
+  }
+}
+
+/** A number with its unit; what only can be so or not, in a word. */
+function inFew(value, { unit, low, high }) {
+  if (!unit && low === 0 && high === 1 && (value === 0 || value === 1)) return value ? "yes" : "no";
+  return shown(value, unit);
+}

@@ -1,0 +1,56 @@
+// The sentence that says what the robot does and who drives it, and what can be done about it.
+
+import { find, label, tell } from "./dom.js";
+
+const STOPPED_MS = 400; // A reason that is shorter than this would only flicker.
+
+export class Status {
+  #reason = "";
+  #sinceMs = 0;
+  #wasEmergency = false;
+
+  /** Show what an observation says; `mine` is whether this page commands. */
+  show(seen, mine, nowMs) {
+    if (seen.stop_reason !== this.#reason) {
+      this.#reason = seen.stop_reason;
+      this.#sinceMs = nowMs;
+    }
+    const reason = nowMs - this.#sinceMs >= STOPPED_MS ? this.#reason : "";
+    const { body } = document;
+    body.dataset.robot = seen.emergency ? "emergency" : seen.armed ? "armed" : "disarmed";
+    body.dataset.driver = mine ? "me" : seen.holder_role || "nobody";
+    tell(find("holder"), mine ? "you" : seen.holder || "nobody");
+    tell(find("state"), sentence(seen, mine, reason));
+    if (seen.emergency && !this.#wasEmergency) tell(find("alert"), `Emergency stop. ${seen.stop_reason}`);
+    if (!seen.emergency) tell(find("alert"), "");
+    this.#wasEmergency = seen.emergency;
+    const isByProgram = !mine && seen.holder_role === "program";
+    const arm = seen.emergency ? "End the stop, arm" : isByProgram ? `Arm for ${seen.holder}` : "Arm";
+    label(find("arm"), seen.armed ? "Disarm" : arm);
+    tell(find("arm").lastElementChild, seen.armed ? "X" : isByProgram ? "P" : "E");
+    find("arm").setAttribute("aria-keyshortcuts", seen.armed ? "X" : isByProgram ? "P" : "E");
+    const isOthers = !mine && seen.holder !== "";
+    label(find("hand"), isOthers ? "Take over" : "Let a program drive");
+    find("hand").setAttribute("aria-keyshortcuts", isOthers ? "E" : "P");
+  }
+
+  /** There is no connection. */
+  lose(text) {
+    const { body } = document;
+    body.dataset.robot = "lost";
+    body.dataset.driver = "nobody";
+    tell(find("holder"), "unknown");
+    tell(find("state"), text);
+  }
+}
+
+function sentence(seen, mine, reason) {
+  if (seen.emergency) return `Emergency stop: ${reason || seen.stop_reason || "everything rests."}`;
+  const who = mine ? "You drive" : seen.holder ? `${seen.holder} drives` : "";
+  if (!seen.armed) {
+    if (mine) return "Yours, and not armed: arm it to drive.";
+    return who ? `${seen.holder} holds it, not armed.` : "Nobody drives. Arm it to drive.";
+  }
+  if (!who) return "Armed, and nobody drives.";
+  return reason ? `${who}; it rests: ${reason}` : `${who}.`;
+}

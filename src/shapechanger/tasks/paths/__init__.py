@@ -1,0 +1,34 @@
+"""Paths that a fingertip follows: shapes, functions of time, and tables of where it was.
+
+The frame is the finger's: x distal, y radial, z dorsal, in metres from the knuckle (the MCP joint);
+time is in seconds. Whether a finger reaches a path is for the env to say.
+
+>>> from shapechanger.tasks.paths import as_path
+>>> path = as_path({"kind": "circle", "radius": 0.01, "hz": 1.0})
+>>> path.at([0.0, 0.5]).round(3).tolist()
+[[0.06, 0.0, -0.045], [0.04, 0.0, -0.045]]
+"""
+
+from __future__ import annotations
+
+from shapechanger.tasks.paths.function import from_callable
+from shapechanger.tasks.paths.given import KINDS, PathSource, as_path
+from shapechanger.tasks.paths.path import Path, sample
+from shapechanger.tasks.paths.shapes import circle, curve_3d, figure_eight, line
+from shapechanger.tasks.paths.speed import FASTEST_MPS
+from shapechanger.tasks.paths.table import from_csv
+
+__all__ = [
+    "FASTEST_MPS",
+    "KINDS",
+    "Path",
+    "PathSource",
+    "as_path",
+    "circle",
+    "curve_3d",
+    "figure_eight",
+    "from_callable",
+    "from_csv",
+    "line",
+    "sample",
+]

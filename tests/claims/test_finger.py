@@ -1,0 +1,93 @@
+"""What is said of the finger, on few episodes each; `python -m benchmarks.run` does many."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import shapechanger  # noqa: F401 - Registers the ids.
+from shapechanger.embodiments.finger import DRIVES
+from shapechanger.envs.finger.oracle import FingerOracle
+from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.transfer.policy_file import TrainedPolicy, load_policy
+
+FINGER = "shapechanger/Finger-v1"
+TRACK = "shapechanger/FingerTrack-v1"
+# Far from those that anything was learned or tried on.
+FIRST_SEED = 2_000_000
+_CIRCLE = {"kind": "circle", "radius": 0.012, "hz": 0.5}
+
+
+class _Policy:
+    """A policy that acts for one env."""
+
+    def __init__(self, policy: TrainedPolicy) -> None:
+        self._policy = policy
+
+    def __call__(self, observation: Any) -> Any:
+        return self._policy.act(np.asarray(observation)[None])[0]
+
+
+def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str, Any]]:
+    """The last info of each episode."""
+    infos: list[dict[str, Any]] = []
+    with gym.make(env, **arguments) as made:
+        for i in range(episodes):
+            observation, info = made.reset(seed=FIRST_SEED + i)
+            ended = False
+            while not ended:
+                observation, _, terminated, ended, info = made.step(act(observation))
+                assert not terminated
+            infos.append(info)
+    return infos
+
+
+def _oracle(env: str, mode: str, **arguments: Any) -> FingerOracle:
+    with gym.make(env, actions=mode, **arguments) as made:
+        layout: Any = made.get_wrapper_attr("observation_layout")
+        return FingerOracle(layout, mode)
+
+
+@pytest.mark.parametrize("mode", DRIVES)
+def test_who_knows_the_finger_reaches_every_target(mode: str) -> None:
+    """With whatever an action commands; half of the errors are below a tenth of a millimetre."""
+    infos = _ends(_oracle(FINGER, mode), FINGER, 20, actions=mode)
+    assert all(info["is_success"] for info in infos)
+    assert np.median([info["distance"] for info in infos]) < 1e-4
+
+
+def test_who_knows_the_finger_follows_a_circle() -> None:
+    """Of 12 mm, once a second, by less than 3 mm."""
+    path = {**_CIRCLE, "hz": 1.0}
+    infos = _ends(_oracle(TRACK, "impedance"), TRACK, 2, path=path)
+    assert max(info["rms"] for info in infos) < 3e-3
+
+
+def test_the_policy_that_ships_reaches() -> None:
+    """Nine of ten targets, and its card says of which env and version it is."""
+    policy = load_policy(POLICIES["reach"])
+    assert policy.card.env.id == FINGER
+    infos = _ends(_Policy(policy), FINGER, 30)
+    assert np.mean([info["is_success"] for info in infos]) >= 0.9
+
+
+def test_the_policy_that_ships_follows() -> None:
+    """A circle at half a turn a second, at most twice as far off as who knows the finger."""
+    policy = load_policy(POLICIES["track"])
+    assert policy.card.env.id == TRACK
+    infos = _ends(_Policy(policy), TRACK, 3, path=_CIRCLE)
+    knows = _ends(_oracle(TRACK, "impedance"), TRACK, 3, path=_CIRCLE)
+    errors = [np.mean([info["rms"] for info in some]) for some in (infos, knows)]
+    assert errors[0] <= 2.0 * errors[1]
+
+
+def test_another_finger_is_no_mild_change() -> None:
+    """Moved as it is to fingers of the gap, the policy keeps less than half of its success."""
+    act = _Policy(load_policy(POLICIES["reach"]))
+    infos: list[dict[str, Any]] = []
+    for finger in range(3):
+        infos += _ends(act, FINGER, 8, gap="real-like", finger_seed=finger)
+    assert np.mean([info["is_success"] for info in infos]) < 0.5

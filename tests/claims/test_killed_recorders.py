@@ -1,0 +1,56 @@
+"""SIGKILL at 200 random moments while recording: every complete step is there after repair."""
+
+import os
+import random
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from shapechanger.demos.episodes import episodes_of, read_episode, repair
+from tests.demos.episodes.making import picture
+
+_TRIALS = 200
+_ROOT = Path(__file__).parents[2]
+
+
+def test_no_complete_step_is_lost_to_sigkill(tmp_path: Path) -> None:
+    """What the recorder had said is on the disk is there, with its picture, and in order."""
+    chance = random.Random(0)
+    command = [sys.executable, "-m", "tests.demos.episodes.recorder", str(tmp_path)]
+    kept_in_all = 0
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, cwd=_ROOT, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0
+    ) as runner:
+        assert runner.stdin is not None
+        assert runner.stdout is not None
+        assert runner.stderr is not None
+        steps = runner.stderr.fileno()
+        for trial in range(_TRIALS):
+            runner.stdin.write(b"\n")
+            pid = int(runner.stdout.readline())
+            said = 0
+            for _ in range(chance.randrange(1, 40)):
+                said += len(os.read(steps, 1))
+            for _ in range(chance.randrange(3000)):  # Some microseconds, more or fewer each time.
+                pass
+            os.kill(pid, signal.SIGKILL)
+            assert runner.stdout.readline() == b"dead\n"
+            while select.select([steps], [], [], 0.0)[0]:
+                said += len(os.read(steps, 4096))
+            (episode,) = episodes_of(tmp_path / str(trial))
+            kept_in_all += _kept(episode, said)
+        runner.stdin.close()
+    assert kept_in_all > _TRIALS
+
+
+def _kept(path: Path, said: int) -> int:
+    """How many steps there are after repair, which are all that were said to be there."""
+    done = repair(path)
+    episode = read_episode(path)
+    assert done.kept >= said
+    assert [step.index for step in episode.steps] == list(range(done.kept))
+    assert all(episode.jpeg(step) == picture(step.index) * 20 for step in episode.steps)
+    return done.kept

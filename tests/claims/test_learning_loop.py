@@ -1,0 +1,42 @@
+"""Record, train, drive, correct, train again: one loop, by the commands that a user types."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.dataset import load_dataset
+from shapechanger.demos.episodes import episodes_of, read_episode
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_the_loop_goes_round(tmp_path: Path) -> None:
+    """What the expert corrected is learned from, and changes what the policy does."""
+    shown, corrected, both = (str(tmp_path / name) for name in ("shown", "corrected", "both"))
+    first, second = (str(tmp_path / name) for name in ("first.zip", "second.zip"))
+    drive = ["demos", "record", "Car", "--minutes", "0.5", "--episode-s", "10", "--put-back"]
+    main([*drive, "--out", shown])
+    main(["demos", "train", shown, "--out", first, "--held-out", "0"])
+    main([*drive, "--seed", "1000", "--out", corrected])  # Courses that it has not seen.
+    watched = ("--driver", first, "--corrected-by", "expert")
+    main([*drive, "--seed", "2000", "--out", corrected, *watched])
+    main(["demos", "merge", shown, corrected, "--out", both])
+    main(["demos", "train", both, "--out", second, "--held-out", "0"])
+
+    drivers = {
+        step.driver for path in episodes_of(Path(corrected)) for step in read_episode(path).steps
+    }
+    assert {"policy", "expert"} <= drivers
+    data = load_dataset(Path(both))
+    assert data.pictures is not None
+    assert len(data) > len(load_dataset(Path(shown)))
+    before, after = (
+        CameraPolicy.load(Path(p)).predict_many(data.pictures) for p in (first, second)
+    )
+    errors = [float(np.abs(done - data.actions).mean()) for done in (before, after)]
+    assert errors[1] < errors[0]

@@ -1,0 +1,19 @@
+"""What many envs take of the memory, on whatever machine this is."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_PEER = Path(__file__).parents[2] / "benchmarks" / "vector_peer.py"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux says what is resident")
+def test_an_ant_takes_less_than_a_megabyte() -> None:
+    """Each of 256, under way; the benchmark asks 1,024."""
+    command = [sys.executable, str(_PEER), "memory", "256", "1"]
+    run = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert float(run.stdout) < 1e6

@@ -1,0 +1,308 @@
+"""`RemoteFinger-v1` over the real thing: link, daemon, guard, driver, bytes, and a twin's bones."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.finger import NOMINAL, FingerParameters
+from shapechanger.envs.finger.gap import gap_as_asked
+from shapechanger.errors import BadAction, UnknownName
+from shapechanger.robot.profile.load import find_profile
+from shapechanger.twin.running import RunningRobot, run_robot
+from tests.twin.robots import until
+
+Env = gym.Env[Any, Any]
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[RunningRobot]:
+    """The shipped rig on its twin's clock."""
+    with run_robot(find_profile("finger"), clock="twin") as robot:
+        yield robot
+
+
+def _access(robot: RunningRobot) -> dict[str, Any]:
+    known = robot.known
+    return {
+        "robot": known.address,
+        "key": known.key,
+        "fingerprint": known.fingerprint,
+        "twin_folder": str(robot.folder),
+    }
+
+
+def _env(robot: RunningRobot, **options: Any) -> Env:
+    return gym.make("shapechanger/RemoteFinger-v1", **_access(robot), **options)
+
+
+@pytest.fixture
+def env(rig: RunningRobot) -> Iterator[Env]:
+    """The rig's env."""
+    made = _env(rig)
+    yield made
+    made.close()
+
+
+def _script(env: Env) -> dict[str, Any]:
+    """What somebody writes for `Finger-v1`: it holds the finger where it starts."""
+    unwrapped: Any = env.unwrapped
+    names = unwrapped.observation_layout.names
+    observation, info = env.reset(seed=4)
+    commands = [names.index(n) for n in names if n.endswith("/command")]
+    total, truncated = 0.0, False
+    while not truncated:
+        action = np.asarray(observation)[commands].astype(np.float32)
+        observation, reward, _, truncated, info = env.step(action)
+        total += float(reward)
+    return {"target": info["target"], "total": total, "last": observation, "info": info}
+
+
+def test_one_script_runs_on_both_ids(rig: RunningRobot, env: Env) -> None:
+    """The same layouts, the same target, a whole episode, and much the same reward."""
+    with gym.make("shapechanger/Finger-v1") as simulated:
+        there, here = _script(env), _script(simulated)
+        ours: Any = env.unwrapped
+        theirs: Any = simulated.unwrapped
+        assert ours.observation_layout == theirs.observation_layout
+        assert ours.action_layout == theirs.action_layout
+        assert env.observation_space == simulated.observation_space
+        assert env.action_space == simulated.action_space
+    np.testing.assert_array_equal(there["target"], here["target"])
+    assert there["last"].shape == here["last"].shape
+    assert there["info"]["truncated_because"] == ""
+    assert there["total"] == pytest.approx(here["total"], rel=0.6)
+    assert set(here["info"]) <= set(there["info"])
+
+
+def test_what_is_sensed_is_near_the_truth(env: Env) -> None:
+    """Angles to a count of the encoders, and the fingertip to a fraction of a millimetre."""
+    env.reset(seed=1)
+    pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+    info: dict[str, Any] = {}
+    observation: Any = None
+    for _ in range(60):
+        observation, *_, info = env.step(pull)
+    np.testing.assert_allclose(observation[:4], info["true_angles"], atol=0.001)
+    assert observation[0] > 0.6  # It has bent.
+    assert info["distance"] == pytest.approx(info["true_distance"], abs=0.0002)
+
+
+def test_a_finger_with_other_arms_knows_where_its_fingertip_is() -> None:
+    """By its encoders, up to their noise; it comes to its start, and its lengths are let pass."""
+    other = ("--gap", "real-like", "--finger-seed", "3")
+    with run_robot(find_profile("finger"), clock="twin", arguments=other) as robot:
+        env = _env(robot)
+        observation, info = env.reset(seed=0)
+        with gym.make("shapechanger/Finger-v1") as simulated:
+            begins, _ = simulated.reset(seed=0)
+        np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.1)
+        off: list[float] = []
+        for action in np.random.default_rng(0).uniform(-1.0, 1.0, (40, 7)).astype(np.float32):
+            observation, *_, info = env.step(action)
+            off.append(float(np.abs(observation[:4] - info["true_angles"]).max()))
+            assert info["distance"] == pytest.approx(info["true_distance"], abs=0.006)
+        assert 0.001 < np.median(off) < 0.05
+        env.close()
+
+
+def test_a_rig_without_encoders_goes_by_its_lengths(tmp_path: Path) -> None:
+    """Angles to a few degrees, and the fingertip to millimetres, with the nominal arms."""
+    text = find_profile("finger").read_text()
+    path = tmp_path / "finger.toml"
+    path.write_text(text[: text.index("[sensor.joints]")] + text[text.index("[limits]") :])
+    with run_robot(path, clock="twin") as robot:
+        env = _env(robot)
+        env.reset(seed=1)
+        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+        info: dict[str, Any] = {}
+        observation: Any = None
+        for _ in range(60):
+            observation, *_, info = env.step(pull)
+        np.testing.assert_allclose(observation[:4], info["true_angles"], atol=0.06)
+        assert info["distance"] == pytest.approx(info["true_distance"], abs=0.003)
+        env.close()
+
+
+def test_a_magnet_that_comes_off_ends_the_motion() -> None:
+    """As a servo that fails."""
+    with run_robot(find_profile("finger"), clock="twin") as robot:
+        env = _env(robot)
+        env.reset(seed=0)
+        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+        for _ in range(10):
+            env.step(pull)
+        with robot.operator() as operator:
+            operator.break_magnet("PIP_flexion")
+            truncated, info = False, dict[str, Any]()
+            for _ in range(10):
+                *_, truncated, info = env.step(pull)
+                if truncated:
+                    break
+            assert "The encoder of PIP_flexion" in info["truncated_because"]
+            assert not info["armed"]
+            operator.advance(0.8)
+            assert max(operator.tensions().values()) < 1.0
+        env.close()
+
+
+@pytest.mark.parametrize("actions", ["tension", "length", "impedance"])
+def test_every_mode_of_action_moves_the_finger(rig: RunningRobot, actions: str) -> None:
+    """Flexors bend, extensors straighten."""
+    env = _env(rig, actions=actions)
+    flex = np.array([0.6, 0.6, -1.0, -1.0, 0.0, -0.5, -0.5], np.float32)
+    env.reset(seed=2)
+    bent: Any = None
+    for _ in range(40):
+        bent, *_ = env.step(flex)
+    straight: Any = None
+    for _ in range(60):
+        straight, *_ = env.step(-flex)
+    env.close()
+    assert bent[0] > straight[0] + 0.3
+
+
+def test_a_start_is_that_of_the_simulation(env: Env) -> None:
+    """After an episode that left the finger bent it is brought back."""
+    env.reset(seed=0)
+    for _ in range(30):
+        env.step(np.array([1, 1, -1, -1, 0, 0, 0], np.float32))
+    observation, info = env.reset(seed=0)
+    with gym.make("shapechanger/Finger-v1") as simulated:
+        begins, _ = simulated.reset(seed=0)
+    np.testing.assert_allclose(observation[:4], begins[:4], atol=0.05)
+    np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.05)
+
+
+def test_the_same_seed_gives_the_same_episode(rig: RunningRobot) -> None:
+    """On the twin's clock nothing depends on the machine."""
+    ends: list[Any] = []
+    for _ in range(2):
+        with run_robot(find_profile("finger"), clock="twin") as robot:
+            env = _env(robot)
+            env.reset(seed=3)
+            action = np.linspace(-0.5, 0.5, 7, dtype=np.float32)
+            for _ in range(10):
+                observation, *_ = env.step(action)
+            ends.append(observation)
+            env.close()
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_goals_are_there_too(rig: RunningRobot) -> None:
+    """As learners with hindsight take them."""
+    env = _env(rig, goal=True)
+    observation, info = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    unwrapped: Any = env.unwrapped
+    reward = unwrapped.compute_reward(
+        observation["achieved_goal"], observation["desired_goal"], info
+    )
+    assert reward in (0.0, -1.0)
+    env.close()
+
+
+def test_what_is_no_action_is_refused(env: Env) -> None:
+    """Before anything is sent."""
+    env.reset(seed=0)
+    unwrapped: Any = env.unwrapped
+    with pytest.raises(BadAction):
+        unwrapped.step(np.full(7, np.nan, np.float32))
+    with pytest.raises(UnknownName, match="option of reset"):
+        env.reset(options={"postur": 1})
+
+
+@pytest.mark.parametrize(("how", "words"), [("mute", "does not answer"), ("hot", "FDS")])
+def test_a_servo_that_fails_ends_the_motion(how: str, words: str) -> None:
+    """The tensions go down to the pretension and then to nothing; the twin's line judges it."""
+    with run_robot(find_profile("finger"), clock="twin") as robot:
+        env = _env(robot)
+        env.reset(seed=0)
+        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+        for _ in range(20):
+            *_, info = env.step(pull)
+            assert info["stop_reason"] == ""
+        with robot.operator() as operator:
+            before = max(operator.tensions().values())
+            assert before > 6.0
+            operator.break_servo("FDS", how)  # pyright: ignore[reportArgumentType]
+            for _ in range(20):
+                *_, truncated, info = env.step(pull)
+                if truncated:
+                    break
+            assert words in info["truncated_because"]
+            assert not info["armed"]
+            operator.advance(0.2)
+            assert max(operator.tensions().values()) < before
+            operator.advance(0.6)
+            assert max(operator.tensions().values()) < 2.0
+        env.close()
+
+
+@pytest.mark.parametrize("program", ["daemon", "guard"])
+def test_a_program_that_is_killed_lets_the_finger_go(program: Literal["daemon", "guard"]) -> None:
+    """Without a daemon the guard takes the tensions down; without a guard the servos' watchdogs."""
+    with run_robot(find_profile("finger"), clock="real") as robot:
+        env = _env(robot)
+        env.reset(seed=0)
+        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+        for _ in range(20):
+            env.step(pull)
+        with robot.operator() as operator:
+            assert max(operator.tensions().values()) > 5.0
+            os.kill(robot.pid_of(program), signal.SIGKILL)
+            until(lambda: max(operator.tensions().values()) < 2.0)
+        env.close()
+
+
+def test_a_twin_of_its_own_is_the_judge_and_ends_with_the_env() -> None:
+    """What is observed stays what is sensed; reward and success are by what the twin knows."""
+    env = gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=1)
+    own: Any = env.unwrapped
+    supervisor = own._own.supervisor
+    observation, info = env.reset(seed=0)
+    off: list[float] = []
+    for _ in range(20):
+        observation, _, _, _, info = env.step(env.action_space.sample())
+        assert info["distance"] == pytest.approx(info["true_distance"], abs=1e-6)
+        off.append(float(np.abs(observation[:4] - info["true_angles"]).max()))
+    assert 0.002 < np.median(off) < 0.1  # An encoder's noise of a degree, and no more.
+    # A servo that an episode has made too hot has cooled before the next.
+    own._operator.break_servo("EDC", "hot")
+    _, info = env.reset(seed=1)
+    assert info["armed"]
+    env.close()
+    env.close()
+    assert supervisor.poll() is not None
+
+
+def test_each_seed_of_a_study_meets_another_rig() -> None:
+    """Where the gap is told and the finger is not."""
+    with gym.make("shapechanger/RemoteFinger-v1", twin="real-like") as many:
+        own: Any = many.unwrapped
+        assert own.individual == "finger_seed"
+        assert own.randomised_source() == {"gap": "geared"}
+        assert not own.side_by_side
+
+
+def test_ten_seconds_tell_what_finger_is_on_a_rig() -> None:
+    """Its arms to a twentieth, where those of the nominal finger are off by a fifth; its joints."""
+    with gym.make("shapechanger/Finger-v1", gap="real-like", finger_seed=0) as simulated:
+        truth: FingerParameters = simulated.get_wrapper_attr("parameters")
+    with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:
+        own: Any = rig.unwrapped
+        found = gap_as_asked(own.identified_source(0)["gap"]).around
+    large = np.abs(truth.arms) > 2e-3
+    np.testing.assert_allclose(found.arms[large], truth.arms[large], rtol=0.05)
+    assert np.abs(NOMINAL.arms / np.where(large, truth.arms, 1.0) - 1.0)[large].max() > 0.15
+    np.testing.assert_allclose(found.joint_stiffness, truth.joint_stiffness, rtol=0.2)
+    assert found.tendon_stiffness == pytest.approx(truth.tendon_stiffness, rel=0.05)

@@ -1,0 +1,75 @@
+"""Who drives: policies by what they see and feel, experts, and what fits nowhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.cli.demos.drivers import pilot_of
+from shapechanger.demos.cloning.card import Card
+from shapechanger.demos.cloning.errors import PolicyError
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.pilots import CorrectedPilot
+from shapechanger.errors import DemosError
+from shapechanger.layout import Feature, Layout
+from tests.demos.corridor_env import CorridorEnv, Shows
+
+
+def clone(path: Path, **changes: Any) -> str:
+    """A policy that has learned nothing, for the state of the corridor."""
+    env = CorridorEnv("state")
+    card = Card(
+        framing=Framing(),
+        channels=(4,),
+        features=8,
+        format=2,
+        eyes="none",
+        nerves=(8,),
+        action_layout=env.action_layout,
+        state_layout=env.observation_layout,
+        low=(-1.0, -1.0),
+        high=(1.0, 1.0),
+    )
+    CameraPolicy.blank(msgspec.structs.replace(card, **changes), 0).save(path)
+    return str(path)
+
+
+@pytest.mark.parametrize("shows", ["state", "both"])
+def test_a_policy_gets_the_part_that_it_takes(shows: Shows, tmp_path: Path) -> None:
+    """A state alone, or out of a Dict; its actions fit the env."""
+    env = CorridorEnv(shows)
+    pilot = pilot_of(env, clone(tmp_path / "policy.zip"), "", 0)
+    pilot.begin()
+    decision = pilot.decide(env.reset(seed=0)[0])
+    assert decision.driver == "policy"
+    assert decision.carried_out.shape == (2,)
+    assert env.action_space.contains(decision.carried_out)
+    np.testing.assert_array_equal(decision.carried_out, decision.meant)
+
+
+def test_a_policy_that_is_corrected_has_the_expert_of_the_env(tmp_path: Path) -> None:
+    """A world that tells nothing is no danger."""
+    env = CorridorEnv("both")
+    pilot = pilot_of(env, clone(tmp_path / "policy.zip"), "expert", 0)
+    assert isinstance(pilot, CorrectedPilot)
+    pilot.begin()
+    assert pilot.decide(env.reset(seed=0)[0]).driver == "policy"
+
+
+def test_what_feels_or_sees_something_else_is_refused(tmp_path: Path) -> None:
+    """With both sides in the sentence."""
+    other = Layout((Feature("way", "m"), Feature("heat", "K")))
+    policy = clone(tmp_path / "other.zip", state_layout=other)
+    with pytest.raises(PolicyError, match=r"heat.*battery"):
+        pilot_of(CorridorEnv("both"), policy, "", 0)
+    with pytest.raises(PolicyError, match=r"battery.*no state"):
+        pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.zip"), "", 0)
+    from shapechanger.envs.vehicle.clones import CLONES
+
+    with pytest.raises(DemosError, match="drives by pictures"):
+        pilot_of(CorridorEnv("state"), str(CLONES["car"]), "", 0)

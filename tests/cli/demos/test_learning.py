@@ -1,0 +1,105 @@
+"""`demos train` and `demos evaluate`, as their user runs them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.cli.demos.evaluate import Evaluate
+from shapechanger.cli.demos.train import Train
+from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
+from shapechanger.errors import DemosError, OutputError
+from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings with which it takes seconds."""
+    monkeypatch.setattr("shapechanger.demos.cloning.learn.DEMOS", QUICK)
+
+
+def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
+    """An episode on disk, as a person would have driven it."""
+    chosen = STEERS if layout is STEERS else KEYS
+    data = stripes(n, seed, chosen)
+    header = EpisodeHeader(action_layout=chosen.to_json(), image_size=(50, 33), clock="none")
+    assert data.pictures is not None
+    with EpisodeWriter.create(folder, header) as writer:
+        for picture, action in zip(data.pictures, data.actions, strict=True):
+            jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(picture), quality=95)
+            writer.add(Step(action=tuple(map(float, action)), driver="person"), jpeg)
+        writer.close()
+    return folder
+
+
+def test_a_recording_becomes_a_policy_with_a_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The last line of the other command is its accuracy; all files are there, and no others."""
+    data = _record(tmp_path / "drive", 150, 0)
+    out = tmp_path / "made" / "policy.zip"
+    Train(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
+    made = sorted(path.name for path in out.parent.iterdir())
+    assert made == ["policy.html", "policy.json", "policy.zip", "ppo.zip"]
+    page = out.with_suffix(".html").read_text()
+    assert page.count("data:image/png;base64,") == 12
+    assert "http" not in page.replace("http://www.w3.org", "")
+    told = json.loads(out.with_suffix(".json").read_text())
+    assert told["judgement"]["steps"] == 30
+    assert CameraPolicy.load(out).card.data["learned"] == 120
+    capsys.readouterr()
+    Evaluate(out, data).run()
+    lines = capsys.readouterr().out.splitlines()
+    assert "learned from the first 120 of these 150 steps" in " ".join(lines)
+    capsys.readouterr()
+    Evaluate(out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html").run()
+    lines = capsys.readouterr().out.splitlines()
+    told = json.loads((tmp_path / "r" / "page.json").read_text())
+    assert lines[-1] == f"accuracy {told['judgement']['accuracy']:.3f}"
+    assert told["judgement"]["accuracy"] > 0.8
+
+
+def test_numbers_end_with_the_accuracy_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With errors in place of a calibration; whole episodes judge, if asked for."""
+    data = _record(tmp_path / "drive", 90, 0, STEERS)
+    _record(data, 30, 1, STEERS)
+    out = tmp_path / "policy.zip"
+    Train(data, out, split="episode", sac=tmp_path / "sac.zip").run()
+    assert CameraPolicy.load(out).card.data["learned"] == 90
+    text = capsys.readouterr().out
+    assert "steering: mean absolute error" in text
+    assert text.splitlines()[-1].startswith("accuracy ")
+    assert out.with_suffix(".html").exists()
+
+
+def test_what_cannot_be_done_is_said_before_the_work(tmp_path: Path) -> None:
+    """And leaves no file."""
+    data = _record(tmp_path / "drive", 20, 0)
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(OutputError, match="it is a folder"):
+        Train(data, tmp_path / "taken").run()
+    with pytest.raises(OutputError, match="two files"):
+        Train(data, tmp_path / "p.zip", sac=tmp_path / "p.zip").run()
+    with pytest.raises(CloningError, match="one episode only"):
+        Train(data, tmp_path / "p.zip", split="episode").run()
+    with pytest.raises(DemosError):
+        Train(tmp_path / "nowhere", tmp_path / "p.zip").run()
+    with pytest.raises(PolicyError, match="no policy file"):
+        Evaluate(tmp_path / "p.zip", data).run()
+    assert not (tmp_path / "p.zip").exists()
+
+
+def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
+    """In one sentence."""
+    policy = CameraPolicy.fresh(QUICK, 0)
+    policy.save(tmp_path / "p.zip")
+    with pytest.raises(PolicyError, match=r"decides steering, throttle, and .* takes forward"):
+        Evaluate(tmp_path / "p.zip", _record(tmp_path / "drive", 10, 0)).run()

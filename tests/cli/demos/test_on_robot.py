@@ -1,0 +1,109 @@
+"""`shapechanger demos replay --robot` on a robot on its twin, with a person at the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
+from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.twin.running import RunningRobot, run_robot
+from tests.cli.robot.typing import Person
+from tests.remote.robot import eventually
+from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningRobot]:
+    """A car in a room, remembered as `car`."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        yield robot
+
+
+def forward(folder: Path, robot: RunningRobot, seconds: float, **changes: object) -> Path:
+    """An episode of this robot: full throttle for so long, and rest."""
+    with robot.client(role="person") as client:
+        welcome = client.welcome
+    about = EpisodeHeader(
+        action_layout=welcome.action_layout, control_hz=welcome.control_hz, robot="car"
+    )
+    about = replace(about, **changes)
+    with EpisodeWriter.create(folder / "data", about, spare_bytes=0) as writer:
+        for _ in range(round(seconds * welcome.control_hz)):
+            writer.add(Step(action=(0.0, 1.0), driver="person"))
+        for _ in range(4):
+            writer.add(Step(action=(0.0, 0.0), driver="person"))
+    return writer.path
+
+
+def person(episode: Path, folder: Path) -> Person:
+    """Somebody who asks for it to be played."""
+    arguments = ("demos", "replay", str(episode), "--robot", "car")
+    return Person(arguments, folder, {"XDG_CONFIG_HOME": str(folder)})
+
+
+def test_it_plays_once_somebody_has_armed_it(robot: RunningRobot, tmp_path: Path) -> None:
+    """Nothing moves before E; at the end the robot stands still and is disarmed."""
+    episode = forward(tmp_path, robot, 0.6)
+    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+        operator.place(0)
+        start = operator.where().travelled_m
+        somebody.read_until("E arms it")
+        assert operator.where().travelled_m == start
+        somebody.press("e")
+        somebody.read_until("played 16 steps")
+        assert somebody.end() == 0
+        assert operator.where().travelled_m - start > 0.05
+        eventually(lambda: operator.where().speed < 0.05, 20.0)
+        with robot.client(role="person") as client:
+            assert not client.ask().message.armed
+
+
+def test_any_key_stops_it(robot: RunningRobot, tmp_path: Path) -> None:
+    """With an emergency stop, which a person has to end."""
+    episode = forward(tmp_path, robot, 60.0)
+    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+        operator.place(0)
+        start = operator.where().travelled_m
+        somebody.read_until("E arms it")
+        somebody.press("e")
+        somebody.wait_for(lambda: operator.where().travelled_m - start > 0.05)
+        somebody.press("j")
+        somebody.read_until("stopped by a key")
+        assert somebody.end() == 0
+        eventually(lambda: operator.where().speed < 0.05, 20.0)
+        with robot.client(role="person") as client:
+            assert client.ask().message.emergency
+
+
+def test_another_key_than_e_leaves(robot: RunningRobot, tmp_path: Path) -> None:
+    """And so does E after another one: a hand that lies on the keys arms nothing."""
+    episode = forward(tmp_path, robot, 0.2)
+    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+        operator.place(0)
+        start = operator.where().travelled_m
+        somebody.read_until("E arms it")
+        somebody.press("qe")
+        somebody.read_until("nothing was played")
+        assert somebody.end() == 0
+        assert operator.where().travelled_m == start
+
+
+def test_what_does_not_fit_the_robot_is_refused(robot: RunningRobot, tmp_path: Path) -> None:
+    """By its rate and by its layout, before anybody is asked."""
+    slow = forward(tmp_path / "slow", robot, 0.2, control_hz=7.0)
+    with person(slow, tmp_path) as somebody:
+        somebody.read_until("steps a second.")
+        assert somebody.end() == 2
+    with robot.client(role="person") as client:
+        layout = client.welcome.action_layout.replace('"low":-1.0', '"low":-0.5', 1)
+    other = forward(tmp_path / "other", robot, 0.2, action_layout=layout)
+    with person(other, tmp_path) as somebody:
+        somebody.read_until("was recorded with steering [1] from -0.5 to 1")
+        assert somebody.end() == 2

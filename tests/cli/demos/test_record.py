@@ -1,0 +1,119 @@
+"""`shapechanger demos record` in a real env, and its replay there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.demos.dataset import load_dataset
+from shapechanger.demos.episodes import episodes_of, read_episode
+from shapechanger.envs.vehicle.clones import CLONES
+from tests.cli.demos.test_demos import refused, said
+
+SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_the_expert_is_recorded_and_comes_out_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What was decided, what was applied, the state and the pictures; one seed an episode."""
+    data = tmp_path / "data"
+    printed = said(capsys, "record", "Car", "--out", data, "--seed", 7, *SHORT)
+    assert "wrote 60 steps" in printed
+    first, second = (read_episode(path) for path in episodes_of(data))
+    assert (len(first.steps), len(second.steps)) == (40, 20)
+    assert (first.outcome, second.outcome) == ("time", "")
+    assert (first.header.seed, second.header.seed) == (7, 8)
+    assert first.header.env == "shapechanger/Car-v1"
+    assert first.header.body == "car"
+    assert first.header.image_size == (64, 48)
+    assert {step.driver for step in first.steps} == {"expert"}
+    assert any(step.action != step.applied for step in first.steps)
+    assert load_dataset(data).pictures is not None
+    printed = said(capsys, "replay", first.path, "--env", "Car")
+    assert "played 40 of 40 steps" in printed
+    assert "the state is the same in every step" in printed
+    assert "the pictures are the same in every step" in printed
+    printed = said(capsys, "replay", first.path, "--env", "Tank")
+    assert "is now worth" in printed
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The clone of another vehicle is often off; only what the expert did is learned from."""
+    data = tmp_path / "data"
+    policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
+    said(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
+    (path,) = episodes_of(data)
+    episode = read_episode(path)
+    drivers = [step.driver for step in episode.steps]
+    assert set(drivers) == {"policy", "expert"}
+    corrected = [step for step in episode.steps if step.driver == "expert"]
+    assert all(step.wanted is not None for step in corrected)
+    assert all(step.wanted is None for step in episode.steps if step.driver == "policy")
+    assert "the expert takes over" in episode.marks[0].text
+    assert len(load_dataset(data)) == len(corrected)
+    assert episode.header.notes["corrected_by"] == "expert"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["Ant"], "has no expert"),
+        (["Cor"], "Did you mean 'Car'"),
+        (["Car", "--minutes", "0"], "--minutes is more than 0"),
+        (["Car", "--driver", "expret"], "no driver 'expret'"),
+        (["Car", "--driver", "text.zip"], "not a policy"),
+        (["Car", "--corrected-by", "expert"], "needs no correction"),
+        (["Car", "--corrected-by", "me"], "corrected by expert"),
+        (["Car", "--options", "{"], "no JSON"),
+        (["Car", "--options", "[1]"], "a JSON object"),
+        (["Car", "--options", '{"colour": 3}'], "colour"),
+        (["Car", "--seed", "-1"], "A seed is"),
+        (["Ant", "--put-back"], "is no vehicle"),
+    ],
+)
+def test_what_cannot_be_recorded_is_one_sentence(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    gl: None,
+) -> None:
+    """And nothing is left behind."""
+    monkeypatch.chdir(tmp_path)
+    Path("text.zip").write_text("text")
+    assert words in refused(capsys, "record", *arguments, "--out", "data")
+    assert not Path("data").exists()
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_ctrl_c_leaves_whole_episodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 130, and what was recorded until then is closed."""
+    from shapechanger.envs.vehicle.demonstrator import Demonstrator
+
+    acts = Demonstrator.act
+    calls = iter(range(100))
+
+    def interrupted(self: Demonstrator) -> object:
+        if next(calls) == 10:
+            raise KeyboardInterrupt
+        return acts(self)
+
+    monkeypatch.setattr(Demonstrator, "act", interrupted)
+    with pytest.raises(SystemExit) as stop:
+        main(["demos", "record", "Car", "--out", str(tmp_path / "data"), *SHORT])
+    assert stop.value.code == 130
+    assert "is in" in capsys.readouterr().err
+    (path,) = episodes_of(tmp_path / "data")
+    episode = read_episode(path)
+    assert (len(episode.steps), episode.closed, episode.outcome) == (10, True, "stopped")

@@ -1,0 +1,193 @@
+"""`shapechanger robot fetch`: the same bytes here as there, whatever was cut off before."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.cli.robot.fetching import fetch_episode
+from shapechanger.demos.episodes import (
+    EpisodeHeader,
+    EpisodeWriter,
+    Step,
+    drop,
+    episodes_of,
+    read_episode,
+)
+from shapechanger.errors import DemosError
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.known import KnownRobot, remember
+from tests.remote.test_real_daemon import Served
+from tests.robot.daemon.plans import ACTIONS, picture
+
+HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), driver="Ada")
+
+
+@pytest.fixture
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Folder of the recordings of a robot that is known as car."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    kept = tmp_path / "robot" / "kept"
+    with Served(tmp_path / "robot", monkeypatch, recordings=str(kept)).serving() as served:
+        known = served.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        yield kept
+
+
+@pytest.fixture
+def robot(there: Path) -> Iterator[RobotClient]:
+    """A connection to it."""
+    from shapechanger.remote.known import recall
+
+    with RobotClient.connect(recall("car"), frames=False) as client:
+        yield client
+
+
+def record(folder: Path, count: int = 40) -> Path:
+    """An episode on the robot."""
+    with EpisodeWriter.create(folder, HEADER) as writer:
+        for number in range(count):
+            jpeg = picture(number) if number % 3 != 2 else None
+            writer.add(Step(action=(0.0, number / count), driver="person"), jpeg)
+        writer.mark("é ☃")
+    return writer.path
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """All files below a folder, by name."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_everything_comes_byte_for_byte_and_then_only_what_is_new(
+    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A judgement that was made on the robot since, too."""
+    first, data = record(there), tmp_path / "here"
+    fetch = ["robot", "fetch", "car", "--out", str(data)]
+    main(fetch)
+    assert "40 steps kept of 40, 41 lines came" in capsys.readouterr().out
+    assert files(data / first.name) == files(first)
+    drop(first, 0, 9, "bad")
+    second = record(there, 3)
+    main(fetch)
+    said = capsys.readouterr().out
+    assert "30 steps kept of 40, 1 lines came" in said
+    assert "3 steps kept of 3, 4 lines came" in said
+    main([*fetch, "--episodes", second.name])
+    assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, nothing new\n"
+    assert [path.name for path in episodes_of(data)] == [first.name, second.name]
+    for path in (first, second):
+        assert files(data / path.name) == files(path)
+    assert len(read_episode(data / first.name).kept) == 30
+
+
+def test_it_goes_on_wherever_it_was_cut_off(
+    there: Path, robot: RobotClient, tmp_path: Path
+) -> None:
+    """At any byte of the lines or of a picture; no reader sees the half of it meanwhile."""
+    rng = random.Random(3)
+    episode = record(there)
+    lines = (episode / "steps.jsonl").read_bytes()
+    for number, cut in enumerate(
+        [0, 1, len(lines), *(rng.randrange(len(lines)) for _ in range(9))]
+    ):
+        data = tmp_path / str(number)
+        part = data / f".{episode.name}.fetching"
+        (part / "frames").mkdir(parents=True)
+        (part / "steps.jsonl").write_bytes(lines[:cut])
+        # Pictures come before the line that names them, and the last one may be cut off, too.
+        whole = lines[:cut].count(b"\n")
+        for frame in sorted((episode / "frames").iterdir()):
+            if int(frame.stem) < whole:
+                (part / "frames" / frame.name).write_bytes(frame.read_bytes())
+        (part / "frames" / f"{whole:06d}.jpg").write_bytes(b"\xff\xd8")
+        stray = whole % 3 == 2 or whole >= 40
+        with pytest.raises(DemosError, match="no episode"):
+            episodes_of(data)
+        fetch_episode(robot, episode.name, data)
+        came = files(data / episode.name)
+        if stray:
+            del came[f"frames/{whole:06d}.jpg"]
+        assert came == files(episode)
+        assert not part.exists()
+
+
+def test_what_was_changed_here_is_not_written_over(
+    there: Path, robot: RobotClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is said, the others come all the same, and the exit status tells."""
+    first, data = record(there, 4), tmp_path / "here"
+    fetch_episode(robot, first.name, data)
+    drop(data / first.name, 0, 0, "bad")
+    drop(first, 1, 1, "bad")
+    second = record(there, 2)
+    before = files(data / first.name)
+    with pytest.raises(SystemExit) as ended:
+        main(["robot", "fetch", "car", "--out", str(data)])
+    assert ended.value.code == 1
+    said = capsys.readouterr()
+    assert "it was changed here" in said.err
+    assert second.name in said.out
+    assert files(data / first.name) == before
+    assert files(data / second.name) == files(second)
+
+
+@pytest.mark.parametrize("damage", ["line", "picture", "missing"])
+def test_what_is_damaged_on_the_robot_is_not_taken(
+    there: Path, robot: RobotClient, tmp_path: Path, damage: str
+) -> None:
+    """What came before stays here, for when it was repaired there."""
+    episode = record(there, 9)
+    frame = episode / "frames" / "000003.jpg"
+    if damage == "line":
+        steps = episode / "steps.jsonl"
+        steps.write_bytes(steps.read_bytes().replace(b'"step":3', b'"step":5', 1))
+    elif damage == "picture":
+        frame.write_bytes(frame.read_bytes()[:-3] + b"abc")
+    else:
+        frame.unlink()
+    with pytest.raises((DemosError, LookupError, ConnectionError), match=r"damaged|cannot be read"):
+        fetch_episode(robot, episode.name, tmp_path / "here")
+    with pytest.raises(DemosError, match="no episode"):
+        episodes_of(tmp_path / "here")
+
+
+def test_mistakes_are_answered_in_a_sentence(
+    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An episode that is not there; nothing recorded; a file in the way."""
+    out = ["--out", str(tmp_path / "here")]
+    main(["robot", "fetch", "car", *out])
+    assert "has recorded nothing yet" in capsys.readouterr().out
+    episode = record(there, 1)
+    _fails(["robot", "fetch", "car", *out, "--episodes", f"{episode.name[:-1]}2"])
+    assert f"Did you mean {episode.name!r}?" in capsys.readouterr().err
+    (tmp_path / "here").write_text("in the way")
+    _fails(["robot", "fetch", "car", *out])
+    assert "Cannot write" in capsys.readouterr().err
+
+
+def test_what_is_being_recorded_comes_later(
+    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It says so."""
+    from shapechanger.remote.known import recall
+
+    with RobotClient.connect(recall("car"), role="person") as person:
+        began = person.record()
+        main(["robot", "fetch", "car", "--out", str(tmp_path / "here")])
+        assert f"{began.episode} is being recorded" in capsys.readouterr().out
+
+
+def _fails(arguments: list[str], run: Callable[[list[str]], None] = main) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run(arguments)
+    assert ended.value.code not in (0, None)

@@ -1,0 +1,129 @@
+"""A policy drives a robot on its twin, and the person in charge takes over from the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.cli.robot.recorded import recorded
+from shapechanger.demos.episodes import episodes_of, read_episode
+from shapechanger.envs.vehicle.clones import CLONES
+from shapechanger.link.messages import Observation
+from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.twin.running import run_robot
+from tests.cli.robot.typing import Person
+from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
+
+
+@pytest.mark.gl
+def test_a_person_lets_a_policy_drive_and_corrects_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """P lets it drive, a direction takes over at once, and both are in what was recorded."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(
+        write_profile(tmp_path, PATIENT_CAR), arguments=("--world", "corridor")
+    ) as robot:
+        known = robot.known
+        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        data = tmp_path / "data"
+        command = ("robot", "drive", "car", "--policy", str(CLONES["car"]), "--record", str(data))
+        with Person(command, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
+            read = person.read_until("not armed")
+            # It does not drive by itself, though anyone may arm a twin.
+            read = person.read_until("recording", read)
+            person.press("p")
+            read = person.read_until("it drives", read)
+            read = person.read_until("commanded by car", read)
+            with robot.client(role="person", frames=False) as watcher:
+                person.wait_for(lambda: watcher.ask().message.action_applied[1] != 0.0)
+                person.press("w")
+                person.wait_for(lambda: watcher.ask().message.holder_role == "person")
+                for _ in range(5):
+                    person.press("w")
+                    person.wait_for(lambda: _is_corrected(watcher.ask().message))
+            person.press("q")
+            assert person.end() == 0
+        (path,) = episodes_of(data)
+        steps = read_episode(path).kept
+        assert {step.driver for step in steps} == {"person", "program"}
+        corrections = [step for step in steps if step.driver == "person" and step.wanted]
+        assert corrections
+        assert all(read_episode(path).jpeg(step) for step in steps)
+
+
+def test_what_was_recorded_stays_where_driving_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And it is said which command brings it; otherwise it is here, closed and whole."""
+    with (
+        run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
+        robot.client(role="person") as person,
+    ):
+        person.take()
+        with pytest.raises(KeyboardInterrupt), recorded(person, "car", tmp_path / "lost"):
+            raise KeyboardInterrupt
+        said = " ".join(capsys.readouterr().err.split())
+        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` brings it" in said
+        assert not (tmp_path / "lost").exists()
+        person.record(on=False)
+
+        with recorded(person, "car", tmp_path / "kept"):
+            person.arm()
+            for _ in range(20):
+                person.exchange((0.0, 0.3), person.ask())
+        (path,) = episodes_of(tmp_path / "kept")
+        episode = read_episode(path)
+        assert episode.closed
+        assert len(episode.steps) == 20
+
+
+def _is_corrected(seen: Observation) -> bool:
+    """Whether a person drives, and the policy says what it would do."""
+    return seen.commanded[1:] == (0.5,) and bool(seen.suggested)
+
+
+PLOUGH = """\
+[robot]
+name = "plough"
+body = "truck"
+
+[action.throttle]
+propels = true
+
+[action.blade]
+
+[output.drive]
+driver = "hbridge"
+part = "wheels"
+forward = 22
+backward = 27
+mix = { throttle = 1.0 }
+
+[output.lift]
+driver = "hbridge"
+part = "bed"
+forward = 4
+backward = 17
+mix = { blade = 1.0 }
+
+[limits]
+deadline_ms = 1000
+"""
+
+
+def test_a_policy_for_another_robot_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything moves, with what the one decides and what the other takes."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path, PLOUGH), arguments=IN_A_ROOM) as robot:
+        known = robot.known
+        remember(KnownRobot("plough", known.address, known.key, known.fingerprint))
+        with pytest.raises(SystemExit) as stop:
+            main(["robot", "drive", "plough", "--policy", str(CLONES["car"])])
+    assert stop.value.code == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "decides steering, throttle, and what it is to drive takes throttle, blade" in said

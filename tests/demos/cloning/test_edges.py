@@ -1,0 +1,46 @@
+"""Eyes that see edges: not the light, not the colour, and hardly a small shift."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from shapechanger.demos.cloning.edges import DIRECTIONS, EdgeEyes, edges
+from shapechanger.demos.cloning.pictures import Framing
+
+
+def _bars(upright: bool) -> Tensor:
+    """Bars of four pixels, shape (1, 3, 32, 32)."""
+    bar = 0.3 + 0.5 * (torch.arange(32) // 4 % 2).float()
+    rows = bar.expand(32, 32)
+    return (rows if upright else rows.T).expand(1, 3, 32, 32).clone()
+
+
+def test_each_direction_has_its_place() -> None:
+    """Upright bars are edges of the first direction, level ones of the middle one."""
+    upright, level = (edges(_bars(x), (4, 4)).mean(dim=(0, 2, 3)) for x in (True, False))
+    assert int(upright.argmax()) == 0
+    assert int(level.argmax()) == DIRECTIONS // 2
+    assert float(upright[0]) > 5.0 * float(upright[1:].max())
+
+
+def test_neither_light_nor_colour_matters() -> None:
+    """A lamp of half the strength, and a yellow one."""
+    before = edges(_bars(True), (4, 4))
+    yellow = torch.tensor([1.0, 0.9, 0.4]).view(1, 3, 1, 1)
+    for other in (0.5 * _bars(True), yellow * _bars(True)):
+        torch.testing.assert_close(edges(other, (4, 4)), before, atol=0.05, rtol=0.0)
+
+
+def test_a_dark_lens_sees_nothing() -> None:
+    """No noise is blown up to edges."""
+    assert float(edges(torch.zeros(1, 3, 32, 32), (4, 4)).max()) == 0.0
+
+
+def test_pictures_of_any_size_have_features() -> None:
+    """Also smaller than a cell."""
+    for height, width in ((48, 64), (30, 41), (3, 5)):
+        eyes = EdgeEyes(Framing(height=height, width=width, top=0.0), (8, 8), 5)
+        found = eyes(torch.rand(2, 3, height, width))
+        assert found.shape == (2, 5)
+        assert bool((found >= 0.0).all())

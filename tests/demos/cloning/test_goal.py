@@ -1,0 +1,72 @@
+"""What is to come out: classes where few actions were shown, numbers elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.demos.cloning.goal import class_numbers, goal_of
+from shapechanger.layout import Feature, Layout
+
+_KEYS = Layout(
+    tuple(Feature(name, "1", 0.0, 1.0) for name in ("forward", "backward", "right", "left"))
+)
+_STEERS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+
+
+def _keys(text: str) -> np.ndarray:
+    held = np.zeros((len(text), 4), np.float32)
+    for i, letter in enumerate(text):
+        if letter != "N":
+            held[i, "FBRL".index(letter)] = 1.0
+    return held
+
+
+def test_keys_become_classes_with_names() -> None:
+    """The most frequent first."""
+    goal = goal_of(_keys("FFFFFFFFFFLLLLLLNNNN"), _KEYS, "auto")
+    assert (goal.head, goal.names) == ("class", ("forward", "left", "none"))
+    assert goal.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
+
+
+def test_what_only_the_mirror_shows_is_a_class_too() -> None:
+    """A mirrored picture needs something to be learned with it."""
+    actions = _keys("FFFFFFFFLLLLLLLL")
+    goal = goal_of(actions, _KEYS, "class", actions[:, [0, 1, 3, 2]])
+    assert set(goal.names) == {"forward", "left", "right"}
+
+
+def test_numbers_are_scaled_by_their_layout() -> None:
+    """Or by what was shown, where the layout has no bound; what never changes is no harm."""
+    layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
+    actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
+    goal = goal_of(actions.astype(np.float32), layout, "auto")
+    assert (goal.head, goal.low, goal.high[:2]) == ("regression", (0.0, -3.0, 1.0), (10.0, 5.0))
+    np.testing.assert_allclose(goal.targets(actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
+
+
+def test_few_steps_of_many_actions_are_no_choice() -> None:
+    """Ten different actions in ten steps are numbers."""
+    rng = np.random.default_rng(0)
+    goal = goal_of(rng.uniform(-1, 1, (10, 2)).astype(np.float32), _STEERS, "auto")
+    assert goal.head == "regression"
+
+
+def test_what_cannot_be_chosen_from_is_refused() -> None:
+    """Too many classes, or one."""
+    rng = np.random.default_rng(0)
+    many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
+    with pytest.raises(CloningError, match="200 different actions, and classes are at most 16"):
+        goal_of(many, _STEERS, "class")
+    with pytest.raises(CloningError, match=r"the same in all of 5 steps \(left\)"):
+        goal_of(_keys("LLLLL"), _KEYS, "auto")
+
+
+def test_an_action_that_is_no_class() -> None:
+    """Close is the same, and farther is none."""
+    classes = ((0.0, 1.0), (1.0, 0.0))
+    actions = np.array([[1.0 + 1e-6, 0.0], [0.5, 0.5], [math.nan, 0.0]])
+    assert class_numbers(actions, classes).tolist() == [1, -1, -1]

@@ -1,0 +1,89 @@
+"""The numbers that say how good a policy is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.demos.cloning.judge import judge, macro_f1
+from shapechanger.demos.cloning.learn import learn
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.temperature import best_temperature
+from shapechanger.demos.cloning.thirds import in_thirds
+from tests.demos.cloning.data import QUICK, STEERS, stripes
+
+
+@pytest.fixture(scope="module")
+def keys() -> CameraPolicy:
+    """A policy that chooses among keys."""
+    return learn(stripes(120, 0), settings=QUICK, seed=0)[0]
+
+
+def test_macro_f1_counts_each_class_the_same() -> None:
+    """Also one that was chosen and never right; checked by hand."""
+    truth, done = np.array([0, 0, 0, 1]), np.array([0, 0, 1, 2])
+    assert macro_f1(done, truth) == pytest.approx((2 * 2 / 5 + 0.0 + 0.0) / 3)
+    assert macro_f1(truth, truth) == 1.0
+
+
+def test_the_numbers_agree_with_each_other(keys: CameraPolicy) -> None:
+    """Confusion, accuracy, calibration and the worst frames are of the same steps."""
+    data = stripes(60, 5)
+    data.actions[:5] = [0, 1, 0, 0]  # A key that it was never shown.
+    told = judge(keys, data)
+    confusion = np.array(told.confusion)
+    assert confusion.sum() == told.steps == 60
+    assert np.trace(confusion) / 60 == pytest.approx(told.accuracy)
+    assert sum(b.steps for b in told.calibration) == 60
+    right = sum(b.right * b.steps for b in told.calibration) / 60
+    assert right == pytest.approx(told.accuracy)
+    assert told.ece == pytest.approx(
+        sum(b.steps * abs(b.sure - b.right) for b in told.calibration) / 60
+    )
+    assert "backward" in told.classes
+    assert set(range(5)) <= set(told.worst)
+
+
+def test_only_the_chosen_steps_are_judged(keys: CameraPolicy) -> None:
+    """And the worst are counted in all of them."""
+    data = stripes(60, 5)
+    told = judge(keys, data, np.arange(60) >= 40)
+    assert told.steps == 20
+    assert min(told.worst) >= 40
+    with pytest.raises(CloningError, match="no step to judge"):
+        judge(keys, data, np.zeros(60, np.bool_))
+
+
+def test_numbers_are_right_in_the_same_third() -> None:
+    """Left, straight or right, and back, still or forward."""
+    actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
+    names, numbers = in_thirds(actions, STEERS)
+    assert [names[i] for i in numbers] == [
+        "left forward",
+        "left forward",
+        "straight still",
+        "right back",
+    ]
+
+
+def test_a_policy_that_gives_numbers_is_judged_by_errors() -> None:
+    """In the units of the actions."""
+    policy = learn(stripes(120, 0, STEERS), settings=QUICK, seed=0)[0]
+    data = stripes(50, 6, STEERS)
+    told = judge(policy, data)
+    done = policy.predict_many(data.pictures)
+    np.testing.assert_allclose(told.errors, np.abs(done - data.actions).mean(axis=0), rtol=1e-5)
+    assert told.within == pytest.approx((np.abs(done - data.actions) <= 0.1).all(axis=1).mean())
+    np.testing.assert_allclose(told.done, done, rtol=1e-6)
+    assert told.ece is None
+
+
+def test_the_temperature_makes_a_network_as_sure_as_it_is_right() -> None:
+    """One that is three times too sure is divided by three; few steps say nothing."""
+    generator = torch.Generator().manual_seed(0)
+    logits = torch.randn((4000, 3), generator=generator)
+    drawn = torch.multinomial(logits.softmax(dim=1), 1, generator=generator)[:, 0]
+    assert best_temperature(3.0 * logits, drawn) == pytest.approx(3.0, rel=0.15)
+    assert best_temperature(3.0 * logits[:5], drawn[:5]) == 1.0

@@ -1,0 +1,173 @@
+"""Learning from any demonstrations: pictures or states, keys or numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.judge import judge
+from shapechanger.demos.cloning.learn import Inputs, Training, learn
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.layout import Feature, Layout
+from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
+
+
+@pytest.fixture(scope="module")
+def keys() -> tuple[CameraPolicy, Training]:
+    """A policy that has learned which key is held."""
+    return learn(stripes(200, 0), settings=QUICK, seed=3)
+
+
+def test_it_learns_which_key_is_held(keys: tuple[CameraPolicy, Training]) -> None:
+    """From pictures whose size does not divide, and through its file."""
+    policy, training = keys
+    told = judge(policy, stripes(90, 1))
+    assert told.accuracy > 0.9
+    assert told.macro_f1 > 0.9
+    assert (policy.card.head, policy.card.members) == ("class", 2)
+    assert training.learned == 200
+    assert training.mirrored > 0.3  # It goes to both sides.
+
+
+def test_an_action_comes_in_the_order_of_its_layout(keys: tuple[CameraPolicy, Training]) -> None:
+    """One of those that were shown."""
+    done = keys[0].predict_many(stripes(30, 2).pictures)
+    assert done.shape == (30, 4)
+    assert set(map(tuple, done.tolist())) <= set(keys[0].card.classes)
+    probabilities = keys[0].outputs(stripes(30, 2).pictures)
+    np.testing.assert_allclose(probabilities.sum(axis=1), 1.0, atol=1e-5)
+
+
+def test_it_comes_back_from_its_file(keys: tuple[CameraPolicy, Training], tmp_path: Path) -> None:
+    """With all of its networks, its classes and its layouts."""
+    policy, _ = keys
+    policy.save(tmp_path / "keys.zip")
+    again = CameraPolicy.load(tmp_path / "keys.zip")
+    pictures = stripes(20, 2).pictures
+    np.testing.assert_array_equal(again.outputs(pictures), policy.outputs(pictures))
+    assert again.card == policy.card
+
+
+@pytest.mark.parametrize("inputs", ["picture", "state", "both"])
+def test_it_learns_numbers_from_whatever_it_perceives(inputs: Inputs) -> None:
+    """Steering within a tenth, and a throttle that never changes."""
+    policy, _ = learn(stripes(200, 0, STEERS), settings=QUICK, inputs=inputs, seed=0)
+    told = judge(policy, stripes(90, 1, STEERS))
+    assert told.head == "regression"
+    assert told.accuracy > 0.9
+    assert told.errors[0] < 0.25
+    assert told.errors[1] < 0.1
+
+
+def test_what_the_robot_did_before_is_not_looked_at() -> None:
+    """A clone that saw it would repeat itself."""
+    policy, _ = learn(stripes(100, 0, STEERS), settings=QUICK, inputs="state")
+    assert policy.card.unseen == ("steering/applied",)
+    states = stripes(10, 1, STEERS).states
+    assert states is not None
+    other = states.copy()
+    other[:, 2] = 0.123
+    np.testing.assert_array_equal(
+        policy.predict_many(None, states), policy.predict_many(None, other)
+    )
+
+
+def test_a_number_that_is_missing_is_no_number() -> None:
+    """The policy acts all the same, and as finitely, when everything is missing or far out."""
+    data = stripes(100, 0, STEERS)
+    assert data.states is not None
+    data.states[::3, 1] = np.nan
+    policy, _ = learn(data, settings=QUICK, inputs="state")
+    for value in (np.nan, np.inf, 1e30):
+        assert np.isfinite(policy.predict(None, np.full(3, value))).all()
+
+
+def test_a_drive_to_one_side_is_hardly_mirrored() -> None:
+    """In the mirror it would teach to go the other way."""
+    data = stripes(200, 0)
+    to_the_right = data.actions[:, 2] > 0
+    data.actions[to_the_right] = [1, 0, 0, 0]
+    _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
+    assert training.mirrored == 0.0
+    assert "one side" in training.mirror_note
+
+
+def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
+    """And the reason is told."""
+    odd = Layout(tuple(Feature(f"joint_{i}/angle", "rad", -1.0, 1.0) for i in range(4)))
+    data = replace(stripes(60, 0), action_layout=odd)
+    _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
+    assert training.mirrored == 0.0
+    assert training.mirror_note == (
+        "Nothing is mirrored: nothing is known of the mirror of joint_0/angle."
+    )
+
+
+def test_the_same_seed_gives_the_same_policy() -> None:
+    """Whatever was drawn before; and another seed gives another."""
+    few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
+    data, test = stripes(40, 0), stripes(10, 1).pictures
+
+    def outputs(seed: int) -> np.ndarray:
+        return learn(data, settings=few, seed=seed)[0].outputs(test)
+
+    first = outputs(1)
+    torch.rand(3)
+    np.testing.assert_array_equal(outputs(1), first)
+    assert not np.array_equal(outputs(2), first)
+
+
+def test_what_is_held_out_is_not_learned_from() -> None:
+    """Whatever is in it."""
+    few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
+    data = stripes(60, 0)
+    learned = np.arange(60) < 40
+    first, _ = learn(data, learned, settings=few)
+    assert data.pictures is not None
+    data.pictures[40:] = 255
+    data.actions[40:] = [0, 1, 0, 0]
+    again, _ = learn(data, learned, settings=few)
+    test = stripes(10, 1).pictures
+    np.testing.assert_array_equal(first.outputs(test), again.outputs(test))
+
+
+def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Training]) -> None:
+    """In a sentence with both."""
+    with pytest.raises(PolicyError, match=r"decides forward \[1\].*takes steering \[1\]"):
+        judge(keys[0], stripes(10, 0, STEERS))
+    keys[0].card.require_layouts(KEYS)
+    felt, _ = learn(
+        stripes(40, 0),
+        settings=msgspec.structs.replace(QUICK, fewest_steps=1, most_steps=1),
+        inputs="state",
+    )
+    with pytest.raises(PolicyError, match=r"feels distance \[m\].*gives no state"):
+        felt.card.require_layouts(KEYS)
+
+
+def test_a_policy_of_the_package_drives_what_steers() -> None:
+    """Its file is older than layouts, and says nothing of them."""
+    policy = CameraPolicy.fresh(QUICK, 0)
+    policy.card.require_layouts(STEERS)
+    with pytest.raises(PolicyError, match="decides steering, throttle"):
+        policy.card.require_layouts(KEYS)
+
+
+def test_what_cannot_be_learned_from_is_refused() -> None:
+    """Each in a sentence."""
+    data = stripes(20, 0)
+    with pytest.raises(CloningError, match="no step to learn from"):
+        learn(data, np.zeros(20, np.bool_), settings=QUICK)
+    with pytest.raises(CloningError, match="no pictures"):
+        learn(replace(data, pictures=None), settings=QUICK, inputs="picture")
+    with pytest.raises(CloningError, match="no state"):
+        learn(replace(data, states=None, state_layout=None), settings=QUICK, inputs="both")
+    data.actions[3, 0] = np.nan
+    with pytest.raises(CloningError, match=r"Action 3 is \[nan"):
+        learn(data, settings=QUICK)

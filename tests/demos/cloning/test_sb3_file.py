@@ -1,0 +1,137 @@
+"""A clone as an ordinary file of Stable-Baselines3: it acts the same, and goes on learning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+import pytest
+from stable_baselines3 import PPO, SAC
+
+from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.learn import Inputs, learn
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.replay import keep_demonstrations
+from shapechanger.demos.cloning.sb3_file import ChosenActions, as_ppo, as_sac
+from shapechanger.layout import Layout
+from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
+
+_SIZE = (33, 50)
+_SHORT = msgspec.structs.replace(QUICK, fewest_steps=20, most_steps=20)
+
+
+class _World(gym.Env[Any, Any]):
+    """Shows stripes, and is fond of throttle; a world for a learner to begin in."""
+
+    def __init__(self, layout: Layout, inputs: Inputs) -> None:
+        self._data, self._inputs, self._at = stripes(20, 9, layout), inputs, 0
+        seen = gym.spaces.Box(0, 255, (*_SIZE, 3), np.uint8)
+        felt = gym.spaces.Box(-np.inf, np.inf, (3,), np.float32)
+        both = gym.spaces.Dict({"image": seen, "state": felt})
+        self.observation_space = {"picture": seen, "state": felt, "both": both}[inputs]
+        self.action_space = gym.spaces.Box(
+            layout.low.astype(np.float32), layout.high.astype(np.float32)
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        return self._observation(), {}
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        assert self.action_space.contains(action)
+        self._at = (self._at + 1) % 20
+        return self._observation(), float(action[1]), False, self._at == 0, {}
+
+    def _observation(self) -> Any:
+        return _observations(self._data, self._inputs, slice(self._at, self._at + 1), squeeze=True)
+
+
+def _observations(data: Any, inputs: Inputs, which: slice, *, squeeze: bool = False) -> Any:
+    seen, felt = data.pictures[which], data.states[which]
+    seen, felt = (seen[0], felt[0]) if squeeze else (seen, felt)
+    return {"picture": seen, "state": felt, "both": {"image": seen, "state": felt}}[inputs]
+
+
+def _policy(layout: Layout, inputs: Inputs = "picture") -> CameraPolicy:
+    return learn(stripes(60, 0, layout), settings=_SHORT, inputs=inputs)[0]
+
+
+def _done(policy: CameraPolicy, inputs: Inputs, data: Any) -> np.ndarray:
+    return policy.predict_many(
+        None if inputs == "state" else data.pictures, None if inputs == "picture" else data.states
+    )
+
+
+@pytest.mark.parametrize("inputs", ["picture", "state", "both"])
+def test_sac_loads_it_acts_as_it_and_goes_on(inputs: Inputs, tmp_path: Path) -> None:
+    """On raw observations, one or many; and a few steps later it acts otherwise."""
+    policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
+    size = None if inputs == "state" else _SIZE
+    as_sac(policy, size, batch_size=8, buffer_size=64).save(tmp_path / "sac.zip")
+    model = SAC.load(tmp_path / "sac.zip", env=_World(STEERS, inputs))
+    raw = _observations(data, inputs, slice(None))
+    expected = _done(policy, inputs, data)
+    np.testing.assert_allclose(model.predict(raw, deterministic=True)[0], expected, atol=2e-4)
+    one = _observations(data, inputs, slice(0, 1), squeeze=True)
+    np.testing.assert_allclose(model.predict(one, deterministic=True)[0], expected[0], atol=2e-4)
+    model.learn(12)
+    learned = model.predict(raw, deterministic=True)[0]
+    assert np.isfinite(learned).all()
+    assert not np.allclose(learned, expected, atol=2e-4)
+
+
+@pytest.mark.parametrize("inputs", ["picture", "both"])
+def test_ppo_loads_it_and_acts_as_it(inputs: Inputs, tmp_path: Path) -> None:
+    """Numbers as numbers, squashed as the clone's are."""
+    policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
+    as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
+    model = PPO.load(tmp_path / "ppo.zip", env=_World(STEERS, inputs))
+    raw, expected = _observations(data, inputs, slice(None)), _done(policy, inputs, data)
+    np.testing.assert_allclose(model.predict(raw, deterministic=True)[0], expected, atol=2e-4)
+    model.learn(16)
+    assert not np.allclose(model.predict(raw, deterministic=True)[0], expected, atol=1e-6)
+
+
+def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
+    """By their numbers, which a wrapper turns into keys."""
+    policy, data = _policy(KEYS), stripes(16, 1)
+    as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
+    model = PPO.load(tmp_path / "ppo.zip", env=ChosenActions(_World(KEYS, "picture"), policy))
+    chosen = model.predict(data.pictures, deterministic=True)[0]
+    np.testing.assert_array_equal(
+        np.asarray(policy.card.classes)[chosen], policy.predict_many(data.pictures)
+    )
+    model.learn(16)
+
+
+def test_sac_cannot_choose() -> None:
+    """And says what can."""
+    with pytest.raises(PolicyError, match="write it for PPO"):
+        as_sac(_policy(KEYS), _SIZE)
+
+
+def test_demonstrations_stay_in_the_replay() -> None:
+    """Half of each batch is of them, with what was done then."""
+    policy, data = _policy(STEERS), stripes(20, 1, STEERS)
+    model = as_sac(policy, _SIZE, batch_size=8, buffer_size=64)
+    assert data.pictures is not None
+    ends = np.zeros(20, np.bool_)
+    ends[-1] = True
+    rewards = np.full(20, 7.0, np.float32)
+    keep_demonstrations(model, data.pictures, data.actions, rewards, [8, 12], ends)
+    model.set_env(_World(STEERS, "picture"))
+    model.learn(12)
+    replay: Any = model.replay_buffer
+    batch = replay.sample(8)
+    assert (batch.rewards[4:] == 7.0).all()
+    assert (batch.rewards[:4] <= 1.0).all()
+    shown = replay.demonstrations
+    assert (shown.size(), int(shown.dones.sum())) == (19, 1)  # The last of the first leads nowhere.
+    np.testing.assert_array_equal(shown.observations[0, 0].transpose(1, 2, 0), data.pictures[0])
+    with pytest.raises(CloningError, match="an observation, an action and a reward"):
+        keep_demonstrations(model, data.pictures, data.actions, rewards[:3], [20])

@@ -1,0 +1,249 @@
+"""Episodes on disk: what goes in comes out, and what cannot be recorded is refused in words."""
+
+import dataclasses
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shapechanger.demos.episodes import (
+    EpisodeWriter,
+    Step,
+    drop,
+    episodes_of,
+    keep,
+    mark,
+    read_episode,
+)
+from shapechanger.errors import BrokenEpisode, DemosError, OutputError
+from tests.demos.episodes.making import header, picture, recorded, step
+
+_NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
+_FINITE = st.floats(allow_nan=False, allow_infinity=False)
+_NS = st.none() | st.integers(0, 2**62)
+_STEPS = st.builds(
+    Step,
+    action=st.tuples(_FINITE, _FINITE),
+    driver=st.sampled_from(["person", "policy", "expert", "program"]),
+    applied=st.none() | st.tuples(_NUMBERS, _NUMBERS),
+    wanted=st.none() | st.tuples(_NUMBERS, _NUMBERS),
+    state=st.tuples(_NUMBERS, _NUMBERS),
+    wall_ns=_NS,
+    reward=st.none() | _NUMBERS,
+    terms=st.dictionaries(st.text(max_size=5), _NUMBERS, max_size=3),
+    terminated=st.booleans(),
+    truncated=st.booleans(),
+    stop_reason=st.text(max_size=20),
+)
+
+
+def _content(one: Step) -> str:
+    """Everything that was given, as text: NaN equals nothing, but it is always written alike."""
+    return repr(dataclasses.replace(one, index=0, frame="", frame_bytes=0, frame_crc=0))
+
+
+@settings(max_examples=40)
+@given(steps=st.lists(_STEPS, max_size=5), new=st.lists(st.booleans(), min_size=5, max_size=5))
+def test_what_is_recorded_is_read_back(
+    steps: list[Step], new: list[bool], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Every number, NaN and infinity, every word and every byte of a picture comes back."""
+    recording = tmp_path_factory.mktemp("recording")
+    pictures: list[bytes | None] = []
+    with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
+        for number, one in enumerate(steps):
+            jpeg = picture(number) if new[number] else None
+            writer.add(one, jpeg)
+            pictures.append(jpeg or (pictures[-1] if pictures else None))
+    read = read_episode(writer.path)
+    assert [_content(s) for s in read.steps] == [
+        _content(dataclasses.replace(s, stop_reason=_as_utf8(s.stop_reason))) for s in steps
+    ]
+    assert [read.jpeg(s) for s in read.steps] == pictures
+    assert read.closed
+
+
+def _as_utf8(text: str) -> str:
+    return text.encode(errors="replace").decode()
+
+
+def test_the_header_comes_back(tmp_path: Path) -> None:
+    """What an episode is of is kept, with the time at which it began."""
+    given_header = header(env="shapechanger/Car-v1", env_kwargs={"put_back": True}, seed=3)
+    now = datetime(2026, 11, 21, 10, 30, 5, tzinfo=UTC)
+    with EpisodeWriter.create(tmp_path, given_header, spare_bytes=0, now=lambda: now) as writer:
+        pass
+    read = read_episode(writer.path).header
+    assert dataclasses.replace(read, created="", version="") == given_header
+    assert read.created == "2026-11-21T10:30:05.000+00:00"
+    assert writer.path.name == "20261121T103005Z-0001"
+
+
+def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> None:
+    """Short episodes that follow each other closely do not overwrite each other."""
+    now = datetime(2026, 11, 21, tzinfo=UTC)
+    for _ in range(2):
+        EpisodeWriter.create(tmp_path, header(), spare_bytes=0, now=lambda: now).close()
+    names = [path.name for path in episodes_of(tmp_path)]
+    assert names == ["20261121T000000Z-0001", "20261121T000000Z-0002"]
+
+
+def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
+    """Whoever looks at a recording while it grows sees every step up to now."""
+    writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
+    writer.add(step(0), picture())
+    read = read_episode(writer.path)
+    assert len(read.steps) == 1
+    assert not read.closed
+    writer.close("collision")
+    assert read_episode(writer.path).outcome == "collision"
+
+
+def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
+    """At 20 Hz one second is 20 steps; a second undo takes the ones before."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        for number in range(60):
+            writer.add(step(number))
+        assert writer.undo(1.0) == 20
+        assert writer.undo(1.0) == 20
+        writer.add(step(60))
+    read = read_episode(writer.path)
+    assert len(read.steps) == 61
+    assert [s.index for s in read.kept] == [*range(20), 60]
+    assert writer.dropped == 40
+
+
+def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
+    """The button may be pressed before there is anything."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        assert writer.undo() == 0
+        with pytest.raises(DemosError, match="cannot be undone"):
+            writer.undo(math.nan)
+
+
+def test_dropped_steps_can_be_taken_back(tmp_path: Path) -> None:
+    """The last word counts, and nothing that was recorded is ever rewritten."""
+    path = recorded(tmp_path)
+    before = (path / "steps.jsonl").read_bytes()
+    drop(path, 1, 3, "bad")
+    keep(path, 2, 2)
+    mark(path, 4, "a door")
+    read = read_episode(path)
+    assert [s.index for s in read.kept] == [0, 2, 4]
+    assert [(m.step, m.text) for m in read.marks] == [(4, "a door")]
+    assert (path / "steps.jsonl").read_bytes().startswith(before)
+
+
+def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
+    """The sentence says which steps there are."""
+    path = recorded(tmp_path)
+    with pytest.raises(DemosError, match="has the steps 0 to 4, and not 3 to 5"):
+        drop(path, 3, 5, "bad")
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"action": (1.0,)}, "its action has 1 numbers, and the layout has 2"),
+        ({"action": (math.nan, 0.0)}, "its action is"),
+        ({"wanted": (1.0, 2.0, 3.0)}, "its wanted has 3 numbers"),
+        ({"state": ()}, "its state has 0 numbers, and the layout has 2"),
+        ({"driver": "robot"}, "not one of person, policy, expert, program"),
+        ({"captured_ns": -1}, "time runs backwards"),
+    ],
+)
+def test_a_step_that_does_not_fit_is_refused(
+    tmp_path: Path, change: dict[str, object], reason: str
+) -> None:
+    """It is refused with its number and why, and the episode goes on without it."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        writer.add(step(0))
+        with pytest.raises(DemosError, match=f"Step 1 of .* cannot be recorded: .*{reason}"):
+            writer.add(step(1, **change))
+        writer.add(step(1))
+    assert len(read_episode(writer.path).steps) == 2
+
+
+def test_a_picture_that_is_none_is_refused(tmp_path: Path) -> None:
+    """What is no JPEG, and what is far too large, is not written."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        with pytest.raises(DemosError, match="its picture is no JPEG"):
+            writer.add(step(0), b"GIF89a")
+        with pytest.raises(DemosError, match="at most 16777216 are allowed"):
+            writer.add(step(0), b"\xff\xd8" + bytes(1 << 24))
+    assert not list((writer.path / "frames").iterdir())
+
+
+def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
+    """The second is refused, and the first goes on; afterwards the folder is free."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        with pytest.raises(DemosError, match="Somebody records in"):
+            EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
+        writer.add(step())
+        with pytest.raises(DemosError, match="is being recorded at this moment"):
+            drop(writer.path, 0, 0, "bad")
+    EpisodeWriter.create(tmp_path, header(), spare_bytes=0).close()
+
+
+def test_a_disk_that_is_nearly_full_is_not_filled(tmp_path: Path) -> None:
+    """The sentence says how much is free; nothing is left behind."""
+    with pytest.raises(OutputError, match="MB of the disk are free"):
+        EpisodeWriter.create(tmp_path, header(), spare_bytes=1 << 60)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_closed_episode_takes_no_more(tmp_path: Path) -> None:
+    """Closing twice is no mistake; adding after it is."""
+    writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
+    writer.close()
+    writer.close()
+    with pytest.raises(DemosError, match="is closed"):
+        writer.add(step())
+
+
+def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
+    """A missing folder, a file and an empty folder each have their own sentence."""
+    (tmp_path / "file").touch()
+    (tmp_path / "empty").mkdir()
+    for name, reason in [
+        ("gone", "There is no recording"),
+        ("file", "is a file"),
+        ("empty", "There is no episode in"),
+    ]:
+        with pytest.raises(DemosError, match=reason):
+            episodes_of(tmp_path / name)
+    with pytest.raises(DemosError, match="is no episode"):
+        read_episode(tmp_path / "empty")
+
+
+def test_a_later_format_is_refused(tmp_path: Path) -> None:
+    """Nobody reads half of what they do not know."""
+    path = recorded(tmp_path)
+    file = path / "episode.json"
+    file.write_text(file.read_text().replace('"format": 1', '"format": 2'))
+    with pytest.raises(DemosError, match=r"has format 2, and this version .* reads format 1"):
+        read_episode(path)
+
+
+@pytest.mark.parametrize("harm", ["missing", "short", "changed"])
+def test_a_damaged_picture_is_found(tmp_path: Path, harm: str) -> None:
+    """Before anybody learns from it, with the command that repairs the episode."""
+    path = recorded(tmp_path)
+    file = path / "frames" / "000002.jpg"
+    if harm == "missing":
+        file.unlink()
+    elif harm == "short":
+        file.write_bytes(file.read_bytes()[:-1])
+    else:
+        file.write_bytes(file.read_bytes()[:-1] + b"!")
+    with pytest.raises(BrokenEpisode, match=f"shapechanger demos repair {path}"):
+        _look_at_all(path)
+
+
+def _look_at_all(path: Path) -> None:
+    episode = read_episode(path)
+    for one in episode.steps:
+        episode.jpeg(one)

@@ -1,0 +1,161 @@
+"""Small recordings and folders of others, made here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import simplejpeg
+
+from shapechanger.demos.episodes import (
+    Episode,
+    EpisodeHeader,
+    EpisodeWriter,
+    Step,
+    episodes_of,
+    read_episode,
+)
+from shapechanger.layout import Feature, Layout
+
+ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+STATES = Layout((Feature("speed", "m/s"), Feature("temperature", "°C", -40.0)))
+
+
+def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False) -> bytes:
+    """A noisy JPEG."""
+    pixels = np.random.default_rng(seed).integers(0, 256, (height, width, 1 if grey else 3))
+    return simplejpeg.encode_jpeg(
+        pixels.astype(np.uint8),
+        colorspace="GRAY" if grey else "RGB",
+        colorsubsampling="Gray" if grey else "420",
+    )
+
+
+def huge(width: int = 60_000, height: int = 60_000) -> bytes:
+    """A small JPEG whose header claims to be huge."""
+    jpeg = bytearray(picture(0))
+    at = jpeg.find(b"\xff\xc0") + 5
+    jpeg[at : at + 4] = height.to_bytes(2, "big") + width.to_bytes(2, "big")
+    return bytes(jpeg)
+
+
+def header(**changes: Any) -> EpisodeHeader:
+    """A header of a car with a camera and a state."""
+    fields: dict[str, Any] = {
+        "action_layout": ACTIONS.to_json(),
+        "state_layout": STATES.to_json(),
+        "image_size": (40, 32),
+        "driver": "Ada",
+        "notes": {"place": "Flur, 2. Stock: ö, 日本"},
+    }
+    return EpisodeHeader(**(fields | changes))
+
+
+def record(
+    data: Path, what: EpisodeHeader, steps: Sequence[tuple[Step, bytes | None]], outcome: str = ""
+) -> Path:
+    """Record an episode."""
+    with EpisodeWriter.create(data, what) as writer:
+        for step, jpeg in steps:
+            writer.add(step, jpeg)
+        writer.close(outcome)
+    return writer.path
+
+
+def drive(data: Path, count: int = 5, **changes: Any) -> Path:
+    """Record an episode of a person with pictures and a state."""
+    steps = [
+        (
+            Step(
+                action=(0.1 * n, 1 / 3),
+                driver="person",
+                state=(n / 7, float("nan")),
+                captured_ns=n * 50_000_000,
+                wall_ns=1_700_000_000_000_000_001 + n * 50_000_000,
+            ),
+            picture(n),
+        )
+        for n in range(count)
+    ]
+    return record(data, header(**changes), steps)
+
+
+def keys_folder(
+    folder: Path,
+    lines: Sequence[str] | None = None,
+    pictures: dict[str, bytes] | None = None,
+    newline: str = "\r\n",
+) -> Path:
+    """A folder in the layout of 2017, of three pictures."""
+    folder.mkdir(parents=True)
+    names = [f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3)]
+    if lines is None:
+        held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
+        lines = [f"{name},{keys}" for name, keys in zip(names, held, strict=True)]
+    if pictures is None:
+        pictures = {name: picture(n) for n, name in enumerate(names)}
+    (folder / "labels.csv").write_bytes("".join(f"{line}{newline}" for line in lines).encode())
+    for name, jpeg in pictures.items():
+        (folder / name).write_bytes(jpeg)
+    return folder
+
+
+def tub_folder(
+    folder: Path,
+    records: Sequence[dict[str, Any]],
+    deleted: Sequence[int] = (),
+    inputs: dict[str, str] | None = None,
+    per_catalog: int = 2,
+) -> Path:
+    """A tub of version 2; each record without a picture gets one, unless it has None."""
+    (folder / "images").mkdir(parents=True)
+    kinds = {"cam/image_array": "image_array", "user/angle": "float"} | (inputs or {})
+    lines: list[dict[str, Any]] = []
+    for index, record_ in enumerate(records):
+        name = f"{index}_cam_image_array_.jpg"
+        plain = {"cam/image_array": name, "user/mode": "user", "_index": index} | dict(record_)
+        if plain["cam/image_array"] == name:
+            (folder / "images" / name).write_bytes(picture(index))
+        lines.append({key: value for key, value in plain.items() if value is not None})
+    paths = []
+    for number, start in enumerate(range(0, len(lines), per_catalog)):
+        paths.append(f"catalog_{number}.catalog")
+        part = lines[start : start + per_catalog]
+        (folder / paths[-1]).write_text("".join(json.dumps(line) + "\r\n" for line in part))
+    ending = {"paths": paths, "current_index": len(lines), "max_len": per_catalog}
+    manifest = [list(kinds), list(kinds.values()), {}, {}, ending | {"deleted_indexes": [*deleted]}]
+    (folder / "manifest.json").write_text("".join(json.dumps(line) + "\r\n" for line in manifest))
+    return folder
+
+
+def all_of(data: Path) -> list[Episode]:
+    """The episodes of a recording."""
+    return [read_episode(path) for path in episodes_of(data)]
+
+
+def told(episode: Episode) -> dict[str, Any]:
+    """All that an episode says, but for its name and when it began; equal also where it is NaN."""
+    head = episode.header.to_json()
+    del head["created"]
+    kept = {step.index for step in episode.kept}
+    return {
+        "header": head,
+        "steps": [step.to_json() for step in episode.steps],
+        "pictures": [episode.jpeg(step) for step in episode.steps],
+        "marks": [(mark.step, mark.text) for mark in episode.marks],
+        "kept": kept,
+        "outcome": episode.outcome,
+        "closed": episode.closed,
+    }
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, with its bytes."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }

@@ -1,0 +1,363 @@
+"""What is not whole is refused in one sentence, and nothing is written then."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from shapechanger.demos.episodes import Step
+from shapechanger.demos.exchange import (
+    export_recording,
+    find_format,
+    import_episodes,
+    import_recording,
+)
+from shapechanger.errors import DemosError, OutputError, ShapechangerError, UnknownName
+from tests.demos.exchange.small import (
+    drive,
+    header,
+    huge,
+    keys_folder,
+    picture,
+    record,
+    snapshot,
+    tub_folder,
+)
+
+FIRST, SECOND, THIRD = (f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3))
+
+
+def refused(folder: Path, out: Path, format: str = "auto") -> str:
+    """Why an import is refused; nothing is written, and what was there is as it was."""
+    before = snapshot(folder) if folder.is_dir() else {}
+    beside = sorted(out.parent.iterdir())
+    with pytest.raises(ShapechangerError) as caught:
+        import_recording(folder, out, format)
+    assert sorted(out.parent.iterdir()) == beside
+    assert (snapshot(folder) if folder.is_dir() else {}) == before
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.endswith(".")
+    return text
+
+
+def _edit(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        path = folder / name
+        path.write_bytes(change(path.read_bytes()))
+
+    return edit
+
+
+def _labels(old: bytes, new: bytes) -> Callable[[Path], None]:
+    return _edit("labels.csv", lambda text: text.replace(old, new))
+
+
+def _link_away(folder: Path) -> None:
+    outside = folder.parent / "outside.jpg"
+    outside.write_bytes(picture(9))
+    (folder / SECOND).unlink()
+    (folder / SECOND).symlink_to(outside)
+
+
+def _pipe(folder: Path) -> None:
+    (folder / SECOND).unlink()
+    os.mkfifo(folder / SECOND)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda f: (f / SECOND).unlink(), f"line 2 names '{SECOND}', which is not in"),
+        (_edit(SECOND, lambda jpeg: jpeg[:-300]), "is damaged"),
+        (_edit(THIRD, lambda jpeg: b""), "is empty"),
+        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "is no JPEG"),
+        (_edit(SECOND, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
+        (_edit(FIRST, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
+        (_edit(SECOND, lambda jpeg: jpeg + bytes(17 << 20)), "bytes, and at most"),
+        (_edit(SECOND, lambda jpeg: picture(1, 48, 32)), "48 x 32 pixels, and not 40 x 32"),
+        (lambda f: (f / "extra.jpg").write_bytes(picture(5)), "have no line in labels.csv (extra"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"1.0,0.0,0.0,1.0"), "holds forward and left at once"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "line 2: left is '0.5'"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "line 2: left is 'nan'"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 2 has 4 cells"),
+        (_labels(SECOND.encode(), b"1499144070.2_/../" + SECOND.encode()), "leaves the folder"),
+        (_labels(SECOND.encode(), b"passwd"), "does not begin with the Unix time"),
+        (_labels(SECOND.encode(), FIRST.encode()), "which line 1 has labelled already"),
+        (_labels(b"0", b"\xff"), "is not text in UTF-8"),
+        (_edit("labels.csv", lambda t: t.decode().encode("utf-16")), "is not text in UTF-8"),
+        (_edit("labels.csv", lambda t: b""), "labels nothing"),
+        (_edit("labels.csv", lambda t: t + b'"open'), "is no line of a CSV file"),
+        (_edit("labels.csv", lambda t: b"".join(t.splitlines(True)[::-1])), "Time runs backwards"),
+        (_link_away, "is a link that leaves the folder"),
+        (_pipe, "which is not in"),
+    ],
+)
+def test_a_folder_of_2017_that_is_not_whole(
+    tmp_path: Path, spoil: Callable[[Path], object], says: str
+) -> None:
+    """The sentence names the file or the line, and what to do."""
+    folder = keys_folder(tmp_path / "keys")
+    spoil(folder)
+    assert says in refused(folder, tmp_path / "data")
+
+
+def test_a_byte_order_mark_is_no_label(tmp_path: Path) -> None:
+    """Spreadsheets write one."""
+    folder = keys_folder(tmp_path / "keys")
+    _edit("labels.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
+    assert import_recording(folder, tmp_path / "data").steps == 3
+
+
+_GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for n in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"user/angle": 1.5}, "user/angle is 1.5"),
+        ({"user/angle": "left"}, "user/angle is 'left'"),
+        ({"user/angle": None}, "has no user/angle"),
+        ({"cam/image_array": None}, "has no picture"),
+        ({"cam/image_array": "../1.jpg"}, "leaves the folder"),
+        ({"cam/image_array": "gone.jpg"}, "is not in"),
+        ({"_timestamp_ms": 500}, "Time runs backwards"),
+    ],
+)
+def test_a_tub_that_is_not_whole(tmp_path: Path, change: dict[str, object], says: str) -> None:
+    """The sentence names the catalog and the line."""
+    records = [*_GOOD[:1], _GOOD[1] | change, *_GOOD[2:]]
+    text = refused(tub_folder(tmp_path / "tub", records), tmp_path / "data")
+    assert says in text
+    assert "catalog_0.catalog, line 2" in text
+
+
+def test_a_tub_whose_files_are_not_whole(tmp_path: Path) -> None:
+    """A torn line, a manifest that is cut off or names files elsewhere, no record that counts."""
+    out = tmp_path / "data"
+    folder = tub_folder(tmp_path / "torn", _GOOD)
+    _edit("catalog_1.catalog", lambda text: text[:20])(folder)
+    assert "catalog_1.catalog, line 1 is not whole" in refused(folder, out)
+    folder = tub_folder(tmp_path / "short", _GOOD)
+    _edit("manifest.json", lambda text: text.splitlines()[0])(folder)
+    assert "has 1 lines" in refused(folder, out)
+    folder = tub_folder(tmp_path / "away", _GOOD)
+    _edit("manifest.json", lambda text: text.replace(b"catalog_1", b"../catalog_1"))(folder)
+    assert "leaves the folder" in refused(folder, out)
+    folder = tub_folder(tmp_path / "none", _GOOD, deleted=[0, 1, 2])
+    assert "has no records that are not deleted" in refused(folder, out)
+
+
+def test_sessions_at_different_rates(tmp_path: Path) -> None:
+    """A policy that learns from both would not know how long its step is."""
+    records = [
+        {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": ms * n, "_session_id": str(ms)}
+        for ms in (50, 100)
+        for n in range(12)
+    ]
+    folder = tub_folder(tmp_path / "tub", records)
+    text = refused(folder, tmp_path / "data")
+    assert "catalog_6.catalog, line 1 has 10 steps a second" in text
+    assert "catalog_0.catalog, line 1 20, and one data set has one rate" in text
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda f: (f / "header.json").unlink(), "There is no header.json"),
+        (_edit("header.json", lambda t: t[:40]), "is no JSON"),
+        (_edit("header.json", lambda t: t.replace(b'"format": 1', b'"format": 9')), "format 9"),
+        (_edit("header.json", lambda t: t.replace(b'"unit"', b'"u"')), "header.json: This is not"),
+        (_edit("steps.csv", lambda t: t.replace(b"action/steering", b"steer")), "lacks action/"),
+        (_edit("steps.csv", lambda t: t.replace(b"person", b"persona")), "Did you mean 'person'"),
+        (_edit("steps.csv", lambda t: t.replace(b"000001.jpg", b"../1.jpg")), "leaves the folder"),
+        (_edit("steps.csv", lambda t: t.replace(b",0.3333333333333333,", b",x,")), "is no number"),
+        (_edit("steps.csv", lambda t: t.replace(b"false,false", b"maybe,false")), "neither true"),
+        (_edit("steps.csv", lambda t: t + t.splitlines(True)[1]), "step 0 comes after step 4"),
+        (lambda f: (f / "frames/000002.jpg").unlink(), "which is not in"),
+        (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
+    ],
+)
+def test_csv_that_is_not_whole(tmp_path: Path, spoil: Callable[[Path], object], says: str) -> None:
+    """Somebody opened it in a spreadsheet, or lost a part."""
+    drive(tmp_path / "recorded")
+    export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
+    spoil(tmp_path / "csv")
+    assert says in refused(tmp_path / "csv", tmp_path / "data")
+
+
+def _in_file(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
+    def spoil(folder: Path) -> None:
+        with h5py.File(folder / "data/main_data.hdf5", "a") as file:
+            change(file)
+
+    return spoil
+
+
+def _leads_away(file: h5py.File) -> None:
+    del file["episode_0/actions"]
+    file["episode_0/actions"] = h5py.ExternalLink("other.hdf5", "x")
+
+
+def _short(file: h5py.File) -> None:
+    file["episode_0/actions"].resize(2, axis=0)
+
+
+def _spoilt(file: h5py.File) -> None:
+    file["episode_0/observations/image"][1] = np.frombuffer(picture(1)[:-200], np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
+        (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is no whole HDF5 file"),
+        (_edit("data/metadata.json", lambda b: b[:3000]), "is no JSON"),
+        (_edit("data/metadata.json", lambda b: b.replace(b'"hdf5"', b'"arrow"')), "'arrow'"),
+        (_in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'episode_0/rewards'"),
+        (_in_file(_leads_away), "in another file"),
+        (_edit("data/main_data.hdf5", lambda b: b.replace(b"SNOD", b"XXXX")), "is damaged"),
+        (_in_file(_short), "has 2 entries, and 5 are needed"),
+        (_in_file(_spoilt), "is damaged"),
+    ],
+)
+def test_a_minari_dataset_that_is_not_whole(
+    tmp_path: Path, spoil: Callable[[Path], object], says: str
+) -> None:
+    """The sentence names what is missing, and no other file is opened."""
+    drive(tmp_path / "recorded")
+    export_recording(tmp_path / "recorded", tmp_path / "set-v0", "minari")
+    spoil(tmp_path / "set-v0")
+    assert says in refused(tmp_path / "set-v0", tmp_path / "data")
+
+
+def test_folders_that_are_none_of_these(tmp_path: Path) -> None:
+    """Empty, a file, not there, a recording, two formats at once, one folder too high."""
+    out = tmp_path / "data"
+    (tmp_path / "empty").mkdir()
+    assert "is empty" in refused(tmp_path / "empty", out)
+    (tmp_path / "file").write_text("x")
+    assert "is a file: give the folder" in refused(tmp_path / "file", out)
+    assert "There is no" in refused(tmp_path / "gone", out)
+    drive(tmp_path / "mine")
+    assert "is a recording already" in refused(tmp_path / "mine", out)
+    both = keys_folder(tmp_path / "above/both")
+    assert f"{both} in it is 2017: import that" in refused(tmp_path / "above", out)
+    (both / "manifest.json").write_text("[]")
+    assert "looks like 2017 and tub" in refused(both, out)
+    assert import_recording(both, out, "2017").steps == 3
+
+
+def test_formats_that_there_are_not(tmp_path: Path) -> None:
+    """The nearest spelling is told, in both directions."""
+    keys_folder(tmp_path / "keys")
+    assert "Did you mean 'minari'" in refused(tmp_path / "keys", tmp_path / "data", "minary")
+    assert "is not tub" in refused(tmp_path / "keys", tmp_path / "data", "tub")
+    with pytest.raises(UnknownName, match="Did you mean 'csv'"):
+        export_recording(drive(tmp_path / "recorded"), tmp_path / "out", "cvs")
+    with pytest.raises(UnknownName):
+        next(import_episodes(tmp_path / "keys", "minary"))
+
+
+def test_outputs_that_cannot_be(tmp_path: Path) -> None:
+    """What exists stays; nothing is put into what is read; a name that Minari could not load."""
+    folder = keys_folder(tmp_path / "keys")
+    (tmp_path / "there").mkdir()
+    assert "exists already" in refused(folder, tmp_path / "there")
+    assert "lies in" in refused(folder, folder / "data")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    assert "exists already" in refused(folder, tmp_path / "dangling")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OutputError, match="Cannot write"):
+        import_recording(folder, tmp_path / "file/data")
+    drive(tmp_path / "data")
+    with pytest.raises(DemosError, match=r"call it .*drive-v0"):
+        export_recording(tmp_path / "data", tmp_path / "drive", "minari")
+    assert not (tmp_path / "drive").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "says"),
+    [
+        ("2017", {}, "steering, throttle, and those of the layout of 2017"),
+        ("minari", {"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
+        ("minari", {"image_size": (80, 60)}, "40 x 32, and .* 80 x 60"),
+    ],
+)
+def test_recordings_that_do_not_fit_a_format(
+    tmp_path: Path, name: str, changes: dict[str, object], says: str
+) -> None:
+    """Other actions, mixed rates, mixed sizes."""
+    drive(tmp_path / "data")
+    drive(tmp_path / "data", **changes)
+    with pytest.raises(DemosError, match=says):
+        export_recording(tmp_path / "data", tmp_path / "out-v0", name)
+    assert [path.name for path in tmp_path.iterdir()] == ["data"]
+
+
+@pytest.mark.parametrize(
+    ("jpeg", "says"),
+    [
+        (picture(1)[:-200], "is damaged"),
+        (huge(), "claims 60000 x 60000"),
+        (picture(1, 48, 32), "48 x 32 pixels, and not 40 x 32"),
+        (picture(1, grey=True), "is grey, and the first one is not"),
+    ],
+)
+def test_pictures_that_minari_could_not_read(tmp_path: Path, jpeg: bytes, says: str) -> None:
+    """Minari decodes all pictures of an episode at once, so that one of them would spoil it."""
+    steps = [
+        (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0)), data)
+        for data in (picture(0), jpeg)
+    ]
+    record(tmp_path / "data", header(), steps)
+    with pytest.raises(DemosError, match=says):
+        export_recording(tmp_path / "data", tmp_path / "out-v0", "minari")
+    assert [path.name for path in tmp_path.iterdir()] == ["data"]
+
+
+def test_nothing_to_export(tmp_path: Path) -> None:
+    """A recording without steps, and one with neither pictures nor a state."""
+    record(tmp_path / "data", header(), [])
+    with pytest.raises(DemosError, match="nothing to export"):
+        export_recording(tmp_path / "data", tmp_path / "csv", "csv")
+    bare = header(image_size=None, state_layout="")
+    record(tmp_path / "bare", bare, [(Step(action=(0.0, 0.0), driver="person"), None)])
+    with pytest.raises(DemosError, match="neither pictures nor a state"):
+        export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")
+    with pytest.raises(DemosError, match="cannot say that a step does not count"):
+        export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)
+
+
+def test_no_text_is_a_formula(tmp_path: Path) -> None:
+    """A spreadsheet runs what begins with =, +, - or @ in a cell."""
+    steps = [
+        (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0), stop_reason=text), picture(0))
+        for text in ("=1+1", "+1", "-1", "@x", "\t=1", "\r=1")
+    ]
+    record(tmp_path / "data", header(), steps)
+    export_recording(tmp_path / "data", tmp_path / "csv", "csv")
+    with (tmp_path / "csv/steps.csv").open(newline="") as file:
+        reasons = [row["stop_reason"] for row in csv.DictReader(file)]
+    assert [json.loads(reason) for reason in reasons] == [s.stop_reason for s, _ in steps]
+    assert {reason[0] for reason in reasons} == {'"'}
+
+
+def test_a_file_that_vanishes_is_told(tmp_path: Path) -> None:
+    """An import that reads step by step fails in words where its source goes away meanwhile."""
+    folder = keys_folder(tmp_path / "keys")
+    ((_, steps),) = list(import_episodes(folder))
+    next(steps)
+    shutil.rmtree(folder)
+    with pytest.raises(DemosError, match="is not in"):
+        next(steps)
+    with pytest.raises(DemosError, match="There is no"):
+        find_format(folder)

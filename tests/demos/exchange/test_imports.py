@@ -1,0 +1,247 @@
+"""What others recorded becomes episodes."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import h5py
+import minari
+import numpy as np
+import pytest
+import simplejpeg
+from minari.data_collector import EpisodeBuffer
+
+from shapechanger.demos.exchange import (
+    export_recording,
+    find_format,
+    import_episodes,
+    import_recording,
+)
+from shapechanger.layout import Layout
+from tests.demos.exchange.small import (
+    all_of,
+    drive,
+    keys_folder,
+    picture,
+    snapshot,
+    tub_folder,
+)
+
+
+def test_the_layout_of_2017(tmp_path: Path) -> None:
+    """Four numbers, the time of each name, the bytes of each picture; the source stays as it is."""
+    folder = keys_folder(tmp_path / "keys")
+    before = snapshot(folder)
+    assert find_format(folder) == "2017"
+    done = import_recording(folder, tmp_path / "data")
+    assert (done.episodes, done.steps, done.pictures) == (1, 3, 3)
+    (episode,) = all_of(tmp_path / "data")
+    assert Layout.from_json(episode.header.action_layout).names == (
+        "forward",
+        "backward",
+        "right",
+        "left",
+    )
+    assert [step.action for step in episode.steps] == [(1, 0, 0, 0), (0, 0, 0, 1), (0, 0, 0, 0)]
+    assert [step.wall_ns for step in episode.steps] == [
+        1_499_144_070_100_000_000 + n * 100_000_000 for n in range(3)
+    ]
+    assert [episode.jpeg(step) for step in episode.steps] == [picture(n) for n in range(3)]
+    assert episode.header.control_hz == pytest.approx(10.0)
+    assert {step.driver for step in episode.steps} == {"person"}
+    assert snapshot(folder) == before
+
+
+def test_a_long_pause_ends_an_episode_of_2017(tmp_path: Path) -> None:
+    """More than thirty periods; and the parts are one folder again when they go out."""
+    times = [100.0, 100.1, 100.2, 103.2, 103.3, 106.5]
+    names = [f"{at}_.jpg" for at in times]
+    folder = keys_folder(
+        tmp_path / "keys",
+        [f"{name},1.0,0.0,0.0,0.0" for name in names],
+        {name: picture(n) for n, name in enumerate(names)},
+    )
+    import_recording(folder, tmp_path / "data")
+    assert [len(e.steps) for e in all_of(tmp_path / "data")] == [5, 1]
+    export_recording(tmp_path / "data", tmp_path / "again", "2017")
+    assert snapshot(tmp_path / "again") == snapshot(folder)
+
+
+_RECORDS: list[dict[str, Any]] = [
+    {"user/angle": -1.0, "user/throttle": 0.5, "_timestamp_ms": 1000, "_session_id": "21-06-25_0"},
+    {"user/angle": 0.0, "user/throttle": 0.5, "_timestamp_ms": 1050, "_session_id": "21-06-25_0"},
+    {"user/angle": 0.1, "user/throttle": 0.5, "_timestamp_ms": 1100, "_session_id": "21-06-25_0"},
+    {"user/angle": 0.5, "user/throttle": 1.0, "_timestamp_ms": 900, "_session_id": "21-06-25_1"},
+    {
+        "user/angle": 0.25,
+        "user/throttle": 1,
+        "user/mode": "local_angle",
+        "pilot/angle": -0.5,
+        "pilot/throttle": 0.125,
+        "imu/gyr_z": 2.5,
+        "_timestamp_ms": 950,
+        "_session_id": "21-06-25_1",
+    },
+]
+
+
+def test_a_tub(tmp_path: Path) -> None:
+    """Sessions are episodes, deleted records are left out, and the pilot is a policy."""
+    folder = tub_folder(tmp_path / "tub", _RECORDS, [1], {"imu/gyr_z": "float", "lap": "str"})
+    before = snapshot(folder)
+    assert find_format(folder) == "tub"
+    import_recording(folder, tmp_path / "data")
+    first, second = all_of(tmp_path / "data")
+    assert [step.action for step in first.steps] == [(-1.0, 0.5), (0.1, 0.5)]
+    assert [first.jpeg(step) for step in first.steps] == [picture(0), picture(2)]
+    assert [step.wall_ns for step in first.steps] == [1_000_000_000, 1_100_000_000]
+    assert [step.action for step in second.steps] == [(0.5, 1.0), (-0.5, 1.0)]
+    assert [step.driver for step in second.steps] == ["person", "policy"]
+    assert Layout.from_json(second.header.state_layout).names == ("imu/gyr_z",)
+    assert math.isnan(second.steps[0].state[0])
+    assert second.steps[1].state == (2.5,)
+    assert second.header.notes == {"session": "21-06-25_1"}
+    assert snapshot(folder) == before
+
+
+def test_an_old_tub(tmp_path: Path) -> None:
+    """Records are counted, not sorted as words; a start of the car begins a drive."""
+    folder = tmp_path / "tub"
+    folder.mkdir()
+    for n, ms in enumerate([0, 50, 100, 150, 200, 250, 300, 350, 400, 450, 0, 50]):
+        name = f"{n}_cam-image_array_.jpg"
+        (folder / name).write_bytes(picture(n))
+        fields = {"cam/image_array": name, "user/angle": n / 100, "user/throttle": 0.5}
+        text = json.dumps(fields | {"user/mode": "user", "milliseconds": ms})
+        (folder / f"record_{n}.json").write_text(text)
+    assert find_format(folder) == "tub"
+    import_recording(folder, tmp_path / "data")
+    first, second = all_of(tmp_path / "data")
+    assert [step.action[0] for step in first.steps] == [n / 100 for n in range(10)]
+    assert [step.action[0] for step in second.steps] == [0.1, 0.11]
+    assert first.header.control_hz == pytest.approx(20.0)
+    assert {step.wall_ns for step in first.steps} == {None}  # It only says when since the start.
+
+
+def test_minari_reads_what_was_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Minari itself gives every pixel and every number, by the name of the dataset."""
+    drive(tmp_path / "data", 5)
+    drive(tmp_path / "data", 3)
+    export_recording(tmp_path / "data", tmp_path / "sets/corridor-v0", "minari")
+    assert sorted(p.name for p in (tmp_path / "sets").iterdir()) == ["corridor-v0"]
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "sets"))
+    dataset = minari.load_dataset("corridor-v0")
+    assert (dataset.total_episodes, dataset.total_steps) == (2, 8)
+    assert list(minari.list_local_datasets()) == ["corridor-v0"]
+    metadata = dataset.storage.metadata
+    assert metadata["author"] == {"Ada"}
+    assert metadata["control_hz"] == 20.0
+    assert [f["name"] for f in metadata["action_layout"]["features"]] == ["steering", "throttle"]
+    episode = dataset[0]
+    assert len(episode) == 5
+    for n, pixels in enumerate(episode.observations["image"][:-1]):
+        np.testing.assert_array_equal(pixels, simplejpeg.decode_jpeg(picture(n)))
+    assert len(episode.observations["image"]) == len(episode.observations["state"]) == 6
+    np.testing.assert_array_equal(
+        episode.observations["state"][:-1], [(n / 7, math.nan) for n in range(5)]
+    )
+    np.testing.assert_array_equal(episode.actions, [(0.1 * n, 1 / 3) for n in range(5)])
+    assert episode.truncations.tolist() == [False] * 4 + [True]
+    assert episode.infos["driver"].tolist() == [b"person"] * 5
+    assert dataset.observation_space["image"].contains(episode.observations["image"][0])
+
+
+def _foreign(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    observation_space: gym.Space[Any],
+    action_space: gym.Space[Any],
+    observations: Any,
+    actions: Any,
+    *,
+    jpeg: bool = False,
+) -> Path:
+    """A dataset that Minari itself has made, of one episode."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder))
+    steps = len(actions)
+    buffer = EpisodeBuffer(
+        observations=observations,
+        actions=actions,
+        rewards=[1.0] * steps,
+        terminations=[False] * (steps - 1) + [True],
+        truncations=[False] * steps,
+        infos={},
+    )
+    with pytest.warns(UserWarning, match="is set to None|env_spec is None"):
+        minari.create_dataset_from_buffers(
+            "others/set-v3",
+            [buffer],
+            observation_space=observation_space,
+            action_space=action_space,
+            jpeg_encoding=jpeg,
+        )
+    return folder / "others/set-v3"
+
+
+def test_numbers_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dictionary of boxes and a discrete action become a state and one number."""
+    path = _foreign(
+        tmp_path,
+        monkeypatch,
+        gym.spaces.Dict({"goal": gym.spaces.Box(-1, 1, (2,)), "at": gym.spaces.Discrete(9)}),
+        gym.spaces.Discrete(3, start=1),
+        {"goal": np.full((4, 2), 0.5, np.float32), "at": np.arange(4)},
+        np.array([1, 2, 3]),
+    )
+    ((head, steps),) = import_episodes(path)
+    assert Layout.from_json(head.state_layout).names == ("at", "goal/0", "goal/1")
+    (action,) = Layout.from_json(head.action_layout)
+    assert (action.low, action.high) == (1.0, 3.0)
+    read = [step for step, jpeg in steps if jpeg is None]
+    assert [step.action for step in read] == [(1.0,), (2.0,), (3.0,)]
+    assert [step.state for step in read] == [(0.0, 0.5, 0.5), (1.0, 0.5, 0.5), (2.0, 0.5, 0.5)]
+    assert read[-1].terminated
+    assert find_format(path) == "minari"
+
+
+@pytest.mark.parametrize("jpeg", [True, False])
+def test_pictures_of_other_minari_datasets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
+) -> None:
+    """What is stored as JPEG stays so; pixels become a JPEG that is close to them."""
+    pixels = np.zeros((3, 40, 48, 3), np.uint8)
+    pixels[:, :, :, 0] = np.arange(48) * 5
+    pixels[:, :, :, 2] = 120
+    path = _foreign(
+        tmp_path,
+        monkeypatch,
+        gym.spaces.Box(0, 255, (40, 48, 3), np.uint8),
+        gym.spaces.Box(-1, 1, (2,)),
+        pixels,
+        np.zeros((2, 2), np.float32),
+        jpeg=jpeg,
+    )
+    import_recording(path, tmp_path / "data")
+    (episode,) = all_of(tmp_path / "data")
+    assert episode.header.image_size == (48, 40)
+    stored = episode.jpeg(episode.steps[0])
+    assert stored is not None
+    far = np.abs(simplejpeg.decode_jpeg(stored).astype(int) - pixels[0])
+    assert far.max() <= (24 if jpeg else 3)
+    if jpeg:
+        with h5py.File(path / "data/main_data.hdf5") as file:
+            assert stored == bytes(file["episode_0/observations"][0])
+
+
+def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
+    """Each step comes with the picture that it saw, and nothing appears anywhere."""
+    keys_folder(tmp_path / "keys")
+    before = snapshot(tmp_path)
+    ((head, steps),) = list(import_episodes(tmp_path / "keys"))
+    assert head.source == "2017"
+    assert [(step.index, jpeg) for step, jpeg in steps] == [(n, picture(n)) for n in range(3)]
+    assert snapshot(tmp_path) == before

@@ -1,0 +1,206 @@
+"""A round trip changes nothing, whatever was recorded."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shapechanger.demos.episodes import DRIVERS, EpisodeWriter, Step, drop
+from shapechanger.demos.exchange import export_recording, import_recording
+from tests.demos.exchange.small import (
+    all_of,
+    drive,
+    header,
+    keys_folder,
+    picture,
+    record,
+    snapshot,
+    told,
+)
+
+# Half of a surrogate pair is no text.
+_TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+_ANY = st.floats(width=64)
+_FINITE = st.floats(allow_nan=False, allow_infinity=False)
+_PAIRS = st.tuples(_ANY, _ANY)
+_TIMES = st.none() | st.integers(0, 2**62)
+
+
+@st.composite
+def _steps(draw: st.DrawFn) -> list[tuple[Step, bytes | None, list[str]]]:
+    """Steps with pictures that repeat, and their marks."""
+    steps = []
+    clock = 0
+    for number in range(draw(st.integers(1, 4))):
+        clock += draw(st.integers(0, 10**9))
+        step = Step(
+            action=draw(st.tuples(_FINITE, _FINITE)),
+            driver=draw(st.sampled_from(DRIVERS)),
+            applied=draw(st.none() | _PAIRS),
+            wanted=draw(st.none() | _PAIRS),
+            state=draw(_PAIRS),
+            captured_ns=draw(st.sampled_from([None, clock])),
+            decided_ns=draw(st.sampled_from([None, clock])),
+            wall_ns=draw(_TIMES),
+            reward=draw(st.none() | _ANY),
+            terms=draw(st.dictionaries(_TEXTS, _ANY, max_size=2)),
+            terminated=draw(st.booleans()),
+            truncated=draw(st.booleans()),
+            stop_reason=draw(_TEXTS | st.sampled_from(["=1+1", '"', "a\r\nb", "a\0b", "@x,y"])),
+        )
+        fresh = number == 0 or draw(st.booleans())
+        marks = draw(st.lists(_TEXTS, max_size=2))
+        steps.append((step, picture(draw(st.integers(0, 3))) if fresh else None, marks))
+    return steps
+
+
+@st.composite
+def _headers(draw: st.DrawFn) -> dict[str, Any]:
+    return {
+        "control_hz": draw(st.floats(0.1, 1000.0)),
+        "robot": draw(_TEXTS),
+        "env": draw(_TEXTS),
+        "env_kwargs": draw(st.dictionaries(_TEXTS, st.booleans() | _TEXTS, max_size=2)),
+        "driver": draw(_TEXTS),
+        "clock": draw(st.sampled_from(["real", "twin", "none"])),
+        "seed": draw(st.none() | st.integers(0, 2**31)),
+        "notes": draw(st.dictionaries(_TEXTS, st.lists(_TEXTS, max_size=2), max_size=2)),
+    }
+
+
+@pytest.mark.parametrize("name", ["csv", "minari"])
+@settings(max_examples=8, suppress_health_check=list(HealthCheck))
+@given(steps=_steps(), head=_headers(), outcome=_TEXTS, data=st.data())
+def test_whatever_was_recorded_comes_back(
+    name: str,
+    steps: list[tuple[Step, bytes | None, list[str]]],
+    head: dict[str, Any],
+    outcome: str,
+    data: st.DataObject,
+) -> None:
+    """Numbers to the last bit, texts, pictures to the last byte, marks and drops."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        with EpisodeWriter.create(place / "data", header(**head)) as writer:
+            for step, jpeg, marks in steps:
+                writer.add(step, jpeg)
+                for mark in marks:
+                    writer.mark(mark)
+            writer.close(outcome)
+        if data.draw(st.booleans()):
+            first = data.draw(st.integers(0, len(steps) - 1))
+            last = data.draw(st.integers(first, len(steps) - 1))
+            drop(writer.path, first, last, data.draw(_TEXTS))
+        export_recording(place / "data", place / "x-v0", name, dropped=True)
+        import_recording(place / "x-v0", place / "back")
+        (before,), (after,) = all_of(place / "data"), all_of(place / "back")
+        assert told(after) == told(before)
+
+
+@pytest.mark.parametrize("name", ["csv", "minari"])
+def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
+    """They come back as many as they were, the first one first."""
+    for count in (3, 1, 300):  # More than fit into one chunk.
+        drive(tmp_path / "data", count)
+    export_recording(tmp_path / "data", tmp_path / "x-v0", name)
+    done = import_recording(tmp_path / "x-v0", tmp_path / "back")
+    assert (done.format, done.episodes, done.steps) == (name, 3, 304)
+    before, after = all_of(tmp_path / "data"), all_of(tmp_path / "back")
+    assert [told(e) for e in after] == [told(e) for e in before]
+
+
+@pytest.mark.parametrize(
+    ("image", "state", "grey"),
+    [((40, 32), False, False), (None, True, False), ((16, 8), True, False), ((40, 32), True, True)],
+)
+@pytest.mark.parametrize("name", ["csv", "minari"])
+def test_every_kind_of_observation_comes_back(
+    tmp_path: Path, name: str, image: tuple[int, int] | None, state: bool, grey: bool
+) -> None:
+    """Without a state, a camera or colours, or with pictures too small for Minari's JPEG."""
+    what = header(image_size=image, **({} if state else {"state_layout": ""}))
+    steps = [
+        (
+            Step(action=(0.0, 1.0), driver="expert", state=(1.0, math.nan) if state else ()),
+            picture(n, *image, grey=grey) if image else None,
+        )
+        for n in range(3)
+    ]
+    record(tmp_path / "data", what, steps, "time")
+    export_recording(tmp_path / "data", tmp_path / "x-v0", name)
+    import_recording(tmp_path / "x-v0", tmp_path / "back")
+    (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
+    assert told(after) == told(before)
+
+
+@pytest.mark.parametrize("newline", ["\r\n", "\n"])
+@pytest.mark.parametrize("style", ["0.0", "0", "header"])
+def test_the_layout_of_2017_comes_back_byte_for_byte(
+    tmp_path: Path, newline: str, style: str
+) -> None:
+    """Labels, names and pictures, however the labels were written."""
+    keys_folder(tmp_path / "keys", newline=newline)
+    labels = tmp_path / "keys/labels.csv"
+    text = labels.read_bytes()
+    if style == "0":
+        text = text.replace(b",0.0", b",0").replace(b",1.0", b",1")
+    if style == "header":
+        text = f"file,forward,backward,right,left{newline}".encode() + text
+    labels.write_bytes(text)
+    import_recording(tmp_path / "keys", tmp_path / "data")
+    export_recording(tmp_path / "data", tmp_path / "again", "2017")
+    assert snapshot(tmp_path / "again") == snapshot(tmp_path / "keys")
+
+
+@pytest.mark.parametrize("name", ["csv", "minari"])
+def test_folders_may_be_relative(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """As they are when somebody types them."""
+    monkeypatch.chdir(tmp_path)
+    drive(Path("data"))
+    export_recording(Path("data"), Path("x-v0"), name)
+    import_recording(Path("x-v0"), Path("back"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["back", "data", "x-v0"]
+
+
+def test_a_tub_comes_back(tmp_path: Path) -> None:
+    """What a tub can hold is there again: actions, drivers, wishes, states, pictures, times."""
+    steps = [
+        (Step(action=(-0.5, 1.0), driver="person", state=(0.1, math.nan), wanted=(0.25, 0.5)), 0),
+        (Step(action=(0.75, 0.0), driver="policy", state=(1 / 3, 20.0)), 1),
+    ]
+    what = header(control_hz=10.0, body="car", clock="none", driver="", notes={})
+    made = [
+        (Step(**{**{f: getattr(s, f) for f in s.__slots__}, "wall_ns": 10**18 + n * 10**8}), n)
+        for s, n in steps
+    ]
+    record(tmp_path / "data", what, [(s, picture(n)) for s, n in made])
+    export_recording(tmp_path / "data", tmp_path / "tub", "tub")
+    import_recording(tmp_path / "tub", tmp_path / "back")
+    (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
+    assert told(after)["steps"] == told(before)["steps"]
+    assert told(after)["pictures"] == told(before)["pictures"]
+    assert after.header.control_hz == 10.0
+
+
+def test_steps_that_were_dropped_stay_at_home(tmp_path: Path) -> None:
+    """Unless they are asked for; and who shared a picture with one of them keeps it."""
+    steps = [
+        (Step(action=(float(n), 0.0), driver="person", state=(0.0, 0.0)), jpeg)
+        for n, jpeg in enumerate((picture(0), None, None, picture(3)))
+    ]
+    path = record(tmp_path / "data", header(), steps)
+    drop(path, 0, 0, "bad")
+    done = export_recording(tmp_path / "data", tmp_path / "csv", "csv")
+    assert (done.steps, done.left_out) == (3, 1)
+    import_recording(tmp_path / "csv", tmp_path / "back")
+    (after,) = all_of(tmp_path / "back")
+    assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
+    assert [after.jpeg(step) for step in after.kept] == [picture(0), picture(0), picture(3)]

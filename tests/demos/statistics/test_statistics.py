@@ -1,0 +1,64 @@
+"""A recording in numbers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from shapechanger.demos.episodes import EpisodeWriter, drop, mark, read_episode
+from shapechanger.demos.statistics import spread, summary
+from shapechanger.demos.statistics.episodes import gaps_s
+from tests.demos.episodes.making import header, recorded, step
+
+
+def test_numbers_are_counted_in_bins() -> None:
+    """Each once, the outer ones too; 0 has a bin of its own."""
+    found = spread([-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, math.nan], -1.0, 1.0)
+    assert found is not None
+    assert (found.counts[0], found.counts[10], found.counts[-1]) == (1, 4, 2)
+    assert (found.total, found.missing) == (7, 1)
+    assert (found.least, found.median, found.most) == (-1.0, 0.01, 1.0)
+
+
+def test_the_range_is_that_of_the_numbers_where_there_is_none() -> None:
+    """Numbers that are all alike have a range around them; none at all have nothing."""
+    found = spread([2.0, 4.0])
+    assert found is not None
+    assert (found.low, found.high) == (2.0, 4.0)
+    alike = spread([3.0, 3.0])
+    assert alike is not None
+    assert (alike.low, alike.high, alike.total) == (2.5, 3.5, 2)
+    assert spread([math.nan, math.inf]) is None
+
+
+def test_an_episode_in_numbers(tmp_path: Path) -> None:
+    """Of the steps that count; who drove most comes first."""
+    with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
+        for number in range(10):
+            writer.add(
+                step(
+                    number,
+                    driver="expert" if number < 4 else "policy",
+                    reward=1.0,
+                    terms={"reward_collision": -10.0 * (number == 9)},
+                    stop_reason="Slow." if number == 8 else "",
+                )
+            )
+        writer.close("collision")
+    drop(writer.path, 0, 2, "bad")
+    mark(writer.path, 5, "here")
+    found = summary(read_episode(writer.path))
+    assert (found.what, found.steps, found.kept) == ("Car-v1", 10, 7)
+    assert list(found.drivers.items()) == [("policy", 6), ("expert", 1)]
+    assert (found.reward, found.collisions, found.stopped, found.marks) == (7.0, 1, 1, 1)
+    assert found.seconds == pytest.approx(7 / 20)
+    assert (found.outcome, found.closed) == ("collision", True)
+
+
+def test_times_between_steps_are_those_of_neighbours(tmp_path: Path) -> None:
+    """What does not count leaves no long gap behind."""
+    path = recorded(tmp_path, 6)
+    drop(path, 2, 3, "bad")
+    assert gaps_s(read_episode(path)) == pytest.approx([0.05, 0.05])

@@ -1,0 +1,127 @@
+"""Demonstrations as arrays: what counts, in order, and nothing that does not go together."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.demos.dataset import decode_picture, load_dataset
+from shapechanger.demos.episodes import EpisodeWriter, drop
+from shapechanger.errors import BrokenEpisode, DemosError, UnknownName
+from tests.demos.episodes.making import ACTIONS, STATES, header, step
+
+
+def _jpeg(number: int, width: int = 32, height: int = 24) -> bytes:
+    image = np.full((height, width, 3), 8 * number, np.uint8)
+    return simplejpeg.encode_jpeg(image, quality=95)
+
+
+def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
+    """An episode in which each second picture is a new one, and the policy drives the last step."""
+    with EpisodeWriter.create(
+        recording, header(**({"image_size": (32, 24)} | changes)), spare_bytes=0
+    ) as writer:
+        for number in range(steps):
+            driver = "policy" if number == steps - 1 else "person"
+            one = step(number, action=(0.1 * number, 0.5), driver=driver)
+            writer.add(one, _jpeg(number) if number % 2 == 0 else None)
+    return writer.path
+
+
+def test_steps_that_count_are_loaded_in_order(tmp_path: Path) -> None:
+    """Of two episodes, without the steps that were dropped and those of others than persons."""
+    first, _ = _recorded(tmp_path), _recorded(tmp_path)
+    drop(first, 1, 1, "bad")
+    data = load_dataset(tmp_path)
+    assert data.episodes == (4, 5)
+    np.testing.assert_allclose(data.actions[:, 0], [0, 0.2, 0.3, 0.4, 0, 0.1, 0.2, 0.3, 0.4])
+    assert data.pictures is not None
+    assert data.pictures.shape == (9, 24, 32, 3)
+    brightness = data.pictures.mean(axis=(1, 2, 3)) / 8.0
+    np.testing.assert_allclose(brightness, [0, 2, 2, 4, 0, 0, 2, 2, 4], atol=0.2)
+    np.testing.assert_allclose(data.times_s[:4], [0.0, 0.1, 0.15, 0.2])
+    assert data.states is not None
+    assert data.states.shape == (9, 2)
+    assert (data.action_layout, data.state_layout) == (ACTIONS, STATES)
+    assert data.files[1].endswith("step 2")
+
+
+def test_a_picture_that_was_shared_stays_with_its_step(tmp_path: Path) -> None:
+    """A step of a person after one of a policy shows the picture that the policy saw first."""
+    with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
+        writer.add(step(0, driver="policy"), _jpeg(5))
+        writer.add(step(1))
+    data = load_dataset(tmp_path)
+    assert data.pictures is not None
+    np.testing.assert_allclose(data.pictures.mean(), 40.0, atol=1.0)
+
+
+def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
+    """A misspelt one is answered with the nearest."""
+    path = _recorded(tmp_path)
+    assert load_dataset(path, drivers=["policy"]).episodes == (1,)
+    with pytest.raises(UnknownName, match="Did you mean 'policy'"):
+        load_dataset(path, drivers=["polcy"])
+    with pytest.raises(DemosError, match="no step of expert"):
+        load_dataset(path, drivers=["expert"])
+
+
+def test_pictures_can_be_made_smaller_while_they_are_read(tmp_path: Path) -> None:
+    """Ten minutes of pictures in full need the memory of a small computer."""
+    data = load_dataset(_recorded(tmp_path), shrink=lambda picture: picture[::2, ::2])
+    assert data.pictures is not None
+    assert data.pictures.shape == (5, 12, 16, 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"control_hz": 10.0}, "steps a second"),
+        ({"action_layout": STATES.to_json()}, "actions"),
+        ({"state_layout": ACTIONS.to_json()}, "states"),
+        ({"image_size": None}, "pictures"),
+    ],
+)
+def test_episodes_that_differ_are_not_mixed(
+    tmp_path: Path, changes: dict[str, Any], what: str
+) -> None:
+    """The sentence names both episodes, and in what they differ."""
+    first, second = _recorded(tmp_path), _recorded(tmp_path, **changes)
+    with pytest.raises(
+        DemosError, match=f"{second} has other {what} than {first}: learn from one kind"
+    ):
+        load_dataset(tmp_path)
+
+
+def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
+    """Also within an episode."""
+    path = _recorded(tmp_path, image_size=(64, 24))
+    with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, and .* 64 x 24"):
+        load_dataset(path)
+
+
+def test_a_picture_that_is_cut_off_is_named(tmp_path: Path) -> None:
+    """As it was received, so that only whoever decodes it can know."""
+    with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
+        writer.add(step(0), _jpeg(1)[:-40])
+    with pytest.raises(DemosError, match=r"000000\.jpg is no whole picture"):
+        load_dataset(tmp_path)
+
+
+def test_a_picture_that_claims_to_be_huge_is_not_decoded() -> None:
+    """Its header alone is believed enough to be refused."""
+    jpeg = bytearray(_jpeg(1))
+    place = jpeg.index(b"\xff\xc0") + 5
+    jpeg[place : place + 4] = b"\xea\x60\xea\x60"  # 60,000 x 60,000.
+    with pytest.raises(DemosError, match=r"x\.jpg says that it has 60000 x 60000 pixels"):
+        decode_picture(bytes(jpeg), "x.jpg")
+
+
+def test_a_broken_episode_is_not_learned_from(tmp_path: Path) -> None:
+    """It says which command repairs it."""
+    path = _recorded(tmp_path)
+    (path / "frames" / "000000.jpg").unlink()
+    with pytest.raises(BrokenEpisode, match="demos repair"):
+        load_dataset(tmp_path)

@@ -1,0 +1,63 @@
+"""Several recordings become one."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from shapechanger.demos.episodes import drop, episodes_of, read_episode
+from shapechanger.demos.merging import merge
+from shapechanger.errors import BrokenEpisode, DemosError
+from tests.demos.episodes.making import recorded
+
+
+def test_everything_is_copied_and_nothing_moved(tmp_path: Path) -> None:
+    """To the byte; names that are taken get the next number."""
+    one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b", 3)
+    shutil.move(two, two.with_name(one.name))
+    two = two.with_name(one.name)
+    done = merge([tmp_path / "a", two], tmp_path / "all")
+    first, second = episodes_of(tmp_path / "all")
+    assert [first.name, second.name] == [one.name, f"{one.name[:-4]}0002"]
+    assert [target for _, target in done.episodes] == [first, second]
+    for source, target in ((one, first), (two, second)):
+        files = sorted(p.relative_to(source) for p in source.rglob("*") if p.is_file())
+        assert files == sorted(p.relative_to(target) for p in target.rglob("*") if p.is_file())
+        assert all((source / f).read_bytes() == (target / f).read_bytes() for f in files)
+    assert done.layouts == 1
+    assert len(read_episode(second).steps) == 3
+
+
+def test_nothing_is_there_twice(tmp_path: Path) -> None:
+    """Also not when somebody has judged its steps since; nothing is copied then."""
+    one = recorded(tmp_path / "a")
+    merge([one], tmp_path / "all")
+    drop(one, 0, 1, "bad")
+    recorded(tmp_path / "b")
+    with pytest.raises(DemosError, match="the same episode"):
+        merge([tmp_path / "b", tmp_path / "a"], tmp_path / "all")
+    assert len(episodes_of(tmp_path / "all")) == 1
+
+
+def test_what_is_not_whole_or_not_closed_is_refused(tmp_path: Path) -> None:
+    """With the command that helps."""
+    begun = recorded(tmp_path / "a", close=False)
+    with pytest.raises(DemosError, match="demos repair"):
+        merge([begun], tmp_path / "all")
+    torn = recorded(tmp_path / "b")
+    with (torn / "steps.jsonl").open("ab") as file:
+        file.write(b'{"kind":"st')
+    with pytest.raises(BrokenEpisode):
+        merge([torn], tmp_path / "all")
+    assert not (tmp_path / "all").exists()
+
+
+def test_an_episode_is_no_place_for_others(tmp_path: Path) -> None:
+    """A recording is a folder of episodes."""
+    one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b")
+    with pytest.raises(DemosError, match="is an episode"):
+        merge([one], two)
+    with pytest.raises(DemosError, match="nothing to merge"):
+        merge([], tmp_path / "all")

@@ -1,0 +1,288 @@
+"""Recording an env: what was decided, what came of it, and what happens when a disk fails."""
+
+from __future__ import annotations
+
+import math
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.wrappers import TimeLimit
+
+from shapechanger.demos.dataset import decode_picture, load_dataset
+from shapechanger.demos.episodes import Episode, EpisodeWriter, episodes_of, read_episode, repair
+from shapechanger.demos.recording import RecordEpisodes
+from shapechanger.errors import DemosError, OutputError
+from tests.demos.corridor_env import SIZE, CorridorEnv, Shows
+from tests.demos.episodes.making import header
+
+FORWARD = np.array([0.5, 1.0], np.float32)
+
+
+def drive(env: gym.Env[Any, Any], steps: int, seed: int | None = None) -> None:
+    """Drive on for so many steps, over as many episodes as it takes."""
+    over = True
+    for _ in range(steps):
+        if over:
+            env.reset(seed=seed)
+        *_, terminated, truncated, _ = env.step(FORWARD)
+        over = terminated or truncated
+
+
+def drive_on(env: gym.Env[Any, Any], steps: int) -> None:
+    """Drive on in an episode that has begun."""
+    for _ in range(steps):
+        env.step(FORWARD)
+
+
+def only(recording: Path) -> Episode:
+    """The one episode."""
+    (path,) = episodes_of(recording)
+    return read_episode(path)
+
+
+@pytest.mark.parametrize("shows", ["picture", "state", "both"])
+def test_what_is_seen_is_paired_with_what_is_decided_on_it(shows: Shows, tmp_path: Path) -> None:
+    """Step n holds what was seen before action n, and the outcome and reward that came of it."""
+    with RecordEpisodes(CorridorEnv(shows), tmp_path) as env:
+        drive(env, 30, seed=3)
+        env.end()
+    first = read_episode(episodes_of(tmp_path)[0])
+    assert [s.action for s in first.steps] == [(0.5, 1.0)] * 20
+    assert [s.driver for s in first.steps] == ["program"] * 20
+    assert first.steps[0].applied == (0.5, 0.5)
+    assert first.outcome == "collision"
+    assert first.steps[-1].terminated
+    assert not first.steps[0].terminated
+    assert first.header.seed == 3
+    assert first.header.control_hz == 10.0
+    for number, step in enumerate(first.steps):
+        way = 0.03 + 0.1 * number
+        if shows != "picture":
+            assert step.state == pytest.approx((way, 7.5), abs=1e-5)
+        jpeg = first.jpeg(step)
+        if shows == "state":
+            assert jpeg is None
+            continue
+        assert jpeg is not None
+        picture = decode_picture(jpeg, "it")
+        assert picture.shape == (*SIZE, 3)
+        assert picture[-4, 4] == pytest.approx(round(100 * way), abs=4)
+        assert picture[4, 4, 0] == pytest.approx(250, abs=6), "red and blue change places"
+    assert first.steps[0].reward == pytest.approx(0.1)
+    assert first.steps[-1].terms["reward_collision"] == -10.0
+    assert first.header.image_size == (None if shows == "state" else (32, 24))
+    assert len(load_dataset(tmp_path, drivers=("program",))) == 30
+
+
+def test_a_person_who_intervenes_is_the_one_who_decided(tmp_path: Path) -> None:
+    """What the program had passed is what it wanted."""
+    inner = CorridorEnv()
+    with RecordEpisodes(inner, tmp_path, driver="policy") as env:
+        env.reset()
+        env.step(FORWARD)
+        inner.more = {"intervene_action": np.array([-1.0, 0.25], np.float32)}
+        env.step(FORWARD)
+    before, after = only(tmp_path).steps
+    assert (before.driver, before.action, before.wanted) == ("policy", (0.5, 1.0), None)
+    assert (after.driver, after.action, after.wanted) == ("person", (-1.0, 0.25), (0.5, 1.0))
+
+
+def test_what_is_meant_need_not_be_what_is_done(tmp_path: Path) -> None:
+    """Of a demonstrator with mistakes the intention is kept; it holds for one step."""
+    with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
+        env.reset()
+        env.decide([0.0, 0.5], "expert", [1.0, 1.0])
+        env.step(FORWARD)
+        env.step(FORWARD)
+    one, two = only(tmp_path).steps
+    assert (one.action, one.driver, one.wanted) == ((0.0, 0.5), "expert", (1.0, 1.0))
+    assert one.applied == (0.5, 0.5)
+    assert (two.action, two.driver, two.wanted) == ((0.5, 1.0), "program", None)
+
+
+def test_bytes_and_times_of_the_env_are_kept_as_they_are(tmp_path: Path) -> None:
+    """A robot's own JPEG is not encoded once more, a picture that is the same is kept once."""
+    inner: Any = CorridorEnv()
+    inner.newest_jpeg = jpeg = _jpeg(inner)
+    inner.record_clock = "twin"
+    inner.more = {"captured_ns": 1_000, "decided_ns": 1_500, "absent": ("battery",)}
+    with RecordEpisodes(inner, tmp_path) as env:
+        drive(env, 3)
+    episode = only(tmp_path)
+    assert [episode.jpeg(step) for step in episode.steps] == [jpeg] * 3
+    assert {step.frame for step in episode.steps} == {"000000.jpg"}
+    assert episode.header.clock == "twin"
+    assert (episode.steps[1].captured_ns, episode.steps[1].decided_ns) == (1_000, 1_500)
+    assert math.isnan(episode.steps[1].state[1])
+
+
+def _jpeg(inner: CorridorEnv) -> bytes:
+    import simplejpeg
+
+    return simplejpeg.encode_jpeg(inner.reset()[0]["image"], quality=50)
+
+
+def test_the_key_of_a_robot_stays_where_it_is(tmp_path: Path) -> None:
+    """A recording is given to others; the other arguments of the env are in it."""
+    inner = CorridorEnv("state")
+    inner.spec = EnvSpec("x/Y-v0", kwargs={"key": "5ec2e7", "shows": "state", "path": tmp_path})
+    with RecordEpisodes(inner, tmp_path) as env:
+        drive(env, 1)
+    episode = only(tmp_path)
+    assert episode.header.env == "x/Y-v0"
+    assert episode.header.env_kwargs == {"shows": "state", "path": str(tmp_path)}
+    assert "5ec2e7" not in (episode.path / "episode.json").read_text()
+
+
+def test_how_an_episode_ends_is_told(tmp_path: Path) -> None:
+    """Time, a lost link in its own words, a reset in the midst."""
+    inner = CorridorEnv("state")
+    with RecordEpisodes(TimeLimit(inner, 2), tmp_path / "time") as env:
+        drive(env, 2)
+        assert env.outcome == "time"
+        inner.more = {"truncated_because": "The robot was disarmed."}
+        drive(env, 2)
+        assert env.outcome == "The robot was disarmed."
+        drive(env, 1)
+        env.reset()
+    outcomes = [read_episode(path).outcome for path in episodes_of(tmp_path / "time")]
+    assert outcomes == ["time", "The robot was disarmed.", ""]
+
+
+def test_a_reset_alone_is_no_episode(tmp_path: Path) -> None:
+    """Nothing is left by who resets and goes."""
+    with RecordEpisodes(CorridorEnv("state"), tmp_path / "data") as env:
+        env.reset()
+        env.reset()
+    assert not (tmp_path / "data").exists()
+
+
+def test_marks_and_undo(tmp_path: Path) -> None:
+    """Both are of the episode that is recorded now."""
+    with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
+        with pytest.raises(DemosError, match="No episode is being recorded"):
+            env.mark()
+        drive(env, 8)
+        env.mark("here")
+        assert env.undo(0.25) == 3
+    episode = only(tmp_path)
+    assert [(mark.step, mark.text) for mark in episode.marks] == [(7, "here")]
+    assert len(episode.kept) == 5
+
+
+@contextmanager
+def small_files(size: int) -> Iterator[None]:
+    """No file becomes larger than so many bytes, as on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("size", [100, 4_000])
+def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
+    size: int, tmp_path: Path
+) -> None:
+    """The error names the file, the last action moves nothing, and no complete step is lost."""
+    inner = CorridorEnv("state")
+    with RecordEpisodes(inner, tmp_path) as env:
+        env.reset()
+        env.step(FORWARD)
+        with small_files(size), pytest.raises(OutputError, match=r"Cannot write .*steps"):
+            drive_on(env, 19)
+        assert inner.done[-1] == [0.0, 0.0]
+        assert inner.done[-2] == [0.5, 1.0]
+        with pytest.raises(gym.error.ResetNeeded):
+            env.step(FORWARD)
+    path = episodes_of(tmp_path)[0]
+    repair(path)
+    assert len(read_episode(path).steps) == len(inner.done) - 2
+    with RecordEpisodes(inner, tmp_path) as env:
+        drive(env, 1)
+    assert len(episodes_of(tmp_path)) == 2
+
+
+def test_a_disk_that_is_full_already_moves_nothing(tmp_path: Path) -> None:
+    """It is told before the first action."""
+    inner = CorridorEnv("state")
+    with RecordEpisodes(inner, tmp_path, spare_bytes=1 << 62) as env:
+        env.reset()
+        with pytest.raises(OutputError, match="stay free"):
+            env.step(FORWARD)
+    assert inner.done == []
+
+
+def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
+    """The second is told, before it moves anything."""
+    inner = CorridorEnv("state")
+    with (
+        EpisodeWriter.create(tmp_path, header(), spare_bytes=0),
+        RecordEpisodes(inner, tmp_path) as env,
+    ):
+        env.reset()
+        with pytest.raises(DemosError, match="records in"):
+            env.step(FORWARD)
+    assert inner.done == []
+
+
+def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
+    """What happened until then is there; Ctrl-C is told from a defect."""
+
+    class Failing(CorridorEnv):
+        error: type[BaseException] = KeyboardInterrupt
+
+        def step(self, action: Any) -> Any:
+            if len(self.done) % 3 == 2:
+                self.done.append([])
+                raise self.error
+            return super().step(action)
+
+    inner = Failing("state")
+    with RecordEpisodes(inner, tmp_path) as env:
+        for error in (KeyboardInterrupt, RuntimeError):
+            inner.error = error
+            with pytest.raises(error):
+                drive(env, 3)
+    episodes = [read_episode(path) for path in episodes_of(tmp_path)]
+    assert [(e.closed, e.outcome, len(e.steps)) for e in episodes] == [
+        (True, "stopped", 2),
+        (True, "failed", 2),
+    ]
+
+
+def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
+    """A robot whose clock jumps is brought to rest, too."""
+    inner = CorridorEnv("state")
+    inner.more = {"captured_ns": 2_000}
+    with RecordEpisodes(inner, tmp_path) as env:
+        drive(env, 1)
+        inner.more = {"captured_ns": 1_000}
+        env.step(FORWARD)
+        with pytest.raises(DemosError, match="time runs backwards"):
+            env.step(FORWARD)
+    assert inner.done[-1] == [0.0, 0.0]
+    assert len(only(tmp_path).steps) == 2
+
+
+def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
+    """By what it shows, by what it does not say, and by a quality that is none."""
+    with pytest.raises(DemosError, match="what can be recorded is a picture"):
+        RecordEpisodes(gym.make("Taxi-v4"), tmp_path)
+    with pytest.raises(DemosError, match="CartPole-v1 publishes no observation_layout"):
+        RecordEpisodes(gym.make("CartPole-v1"), tmp_path)
+    with pytest.raises(DemosError, match="quality"):
+        RecordEpisodes(CorridorEnv(), tmp_path, quality=0)
+    wrong: Any = CorridorEnv("state")
+    wrong.action_layout = wrong.observation_layout
+    wrong.action_space = gym.spaces.Box(-1.0, 1.0, (3,))
+    with pytest.raises(DemosError, match="its layout has 2 numbers"):
+        RecordEpisodes(wrong, tmp_path)

@@ -1,0 +1,42 @@
+"""A finger that moves its joints about."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINTS
+from shapechanger.envs.finger.babble import FingerBabble
+from shapechanger.errors import UnknownName
+from shapechanger.layout import Feature, Layout
+from tests.identify.logs import recorded
+
+
+@pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
+@pytest.mark.parametrize("finger_seed", [0, 7])
+def test_every_joint_moves_far_and_on_its_own(actions: str, finger_seed: int) -> None:
+    """Through half of its range and more, also where the finger is not the nominal one."""
+    log, _ = recorded(10.0, gap="real-like", finger_seed=finger_seed, actions=actions)
+    low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
+    assert ((high - low) > 0.5 * (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])).all()
+    correlation = np.corrcoef(log.angles.T) - np.eye(4)
+    assert np.abs(correlation).max() < 0.8
+    assert (log.tensions > 1.0).mean() > 0.9  # No tendon hangs slack for long.
+
+
+def test_a_seed_is_a_motion() -> None:
+    """The same seed leads the same way, another one elsewhere."""
+    layout = Layout(tuple(Feature(f"{name}/angle", "rad") for name in JOINTS))
+    first, same, other = (FingerBabble(layout, seed=seed) for seed in (1, 1, 2))
+    still = np.zeros(4)
+    np.testing.assert_array_equal(first(still), same(still))
+    assert np.abs(first.posture(1.0) - other.posture(1.0)).max() > 0.01
+    for t in np.linspace(0.0, 10.0, 50):
+        assert (first.posture(t) > JOINT_RANGE[:, 0]).all()
+        assert (first.posture(t) < JOINT_RANGE[:, 1]).all()
+
+
+def test_another_layout_is_refused() -> None:
+    """The angle that is missing is named."""
+    with pytest.raises(UnknownName, match="MCP_flexion/angle"):
+        FingerBabble(Layout((Feature("thigh/angle", "rad"),)))

@@ -1,0 +1,149 @@
+"""Fingers that differ: drawn from what is stated, and always able to hold themselves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.finger import NOMINAL
+from shapechanger.embodiments.finger.balance import spans_all_torques
+from shapechanger.envs.finger import FingerReachEnv
+from shapechanger.envs.finger.gap import GAPS, Gap, gap_as_asked
+from shapechanger.errors import FingerError, UnknownName
+
+_REAL_LIKE = GAPS["real-like"]
+_PLAIN = ("strength", "tendon_friction", "backlash", "motor_lag", "command_delay")
+_NOISES = ("joint_noise", "tension_noise")
+_LOGARITHMIC = ("tendon_stiffness", "motor_kg")
+
+
+def _but(**changes: Any) -> Gap:
+    return msgspec.structs.replace(_REAL_LIKE, **changes)
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_each_number_is_drawn_from_its_range(name: str) -> None:
+    """All of it: the ends of wide ranges are approached, and none is passed."""
+    gap = GAPS[name]
+    rng = np.random.default_rng(0)
+    drawn = [gap.draw(rng) for _ in range(100)]
+    for field in (*_PLAIN[1:], *_NOISES, *_LOGARITHMIC):
+        low, high = getattr(gap, field)
+        values = np.array([getattr(finger, field) for finger in drawn])
+        slack = 1e-12 * high
+        assert (values >= low - slack).all()
+        assert (values <= high + slack).all()
+        if high > low:
+            assert np.ptp(values) > 0.8 * (high - low)
+    low, high = gap.strength
+    strengths = np.array([f.most_tension for f in drawn]) / NOMINAL.most_tension
+    assert (strengths >= low).all()
+    assert (strengths <= high).all()
+    np.testing.assert_allclose(np.ptp(strengths, axis=1), 0.0, atol=1e-12)
+    for field in ("joint_stiffness", "joint_damping", "joint_friction"):
+        low, high = gap.joint_factor
+        factors = np.array([getattr(f, field) for f in drawn]) / getattr(NOMINAL, field)
+        assert (factors >= low).all()
+        assert (factors <= high).all()
+        assert abs(np.log(factors).mean()) < 0.1
+    nominal = NOMINAL.arms
+    arms = np.array([f.arms for f in drawn])
+    # Where a tendon passes no joint, it passes none in any finger.
+    assert (arms[:, nominal == 0.0] == 0.0).all()
+    errors = arms[:, nominal != 0.0] / nominal[nominal != 0.0] - 1.0
+    assert (np.abs(errors) <= gap.arm_error + 1e-12).all()
+    assert np.abs(errors).max() > 0.95 * gap.arm_error
+
+
+def test_a_draw_that_could_not_hold_itself_is_drawn_again() -> None:
+    """With arms off by up to 60 % most could not; each that comes out can."""
+    gap = _but(arm_error=0.6)
+    rng = np.random.default_rng(0)
+    assert all(spans_all_torques(gap.draw(rng).arms) for _ in range(40))
+    raw = NOMINAL.arms * (1.0 + rng.uniform(-0.6, 0.6, (200, 7, 4)))
+    assert 0.02 < np.mean([spans_all_torques(arms) for arms in raw]) < 0.9
+
+
+def test_a_gap_in_which_hardly_any_finger_holds_itself_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After its tries, with the number to make smaller."""
+    monkeypatch.setattr("shapechanger.envs.finger.gap.spans_all_torques", lambda _: False)
+    with pytest.raises(FingerError, match=r"off by 90%, hardly any .* make arm_error smaller"):
+        _but(arm_error=0.9).draw(np.random.default_rng(0))
+
+
+def test_the_same_numbers_give_the_same_finger() -> None:
+    """And others another."""
+    one, two, other = (_REAL_LIKE.draw(np.random.default_rng(s)) for s in (5, 5, 6))
+    assert one == two != other
+
+
+def test_a_finger_seed_is_one_finger() -> None:
+    """Whatever the seeds of episodes, in every env; another seed is another finger."""
+    one = FingerReachEnv(gap="real-like", finger_seed=3)
+    before = one.parameters
+    one.reset(seed=1)
+    one.reset(seed=2)
+    assert one.parameters == before
+    assert FingerReachEnv(gap="real-like", finger_seed=3).parameters == before
+    assert FingerReachEnv(gap="real-like", finger_seed=4).parameters != before
+    assert before == _REAL_LIKE.draw(np.random.default_rng(3))
+
+
+def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
+    """By the seed of the episode alone."""
+    env, other = FingerReachEnv(gap="wide"), FingerReachEnv(gap="wide")
+    drawn = []
+    for seed in (1, 2, None):
+        env.reset(seed=seed)
+        drawn.append(env.parameters)
+    assert len({finger.to_json() for finger in drawn}) == 3
+    other.reset(seed=7)
+    other.reset(seed=1)
+    assert other.parameters == drawn[0]
+
+
+def test_a_gap_is_given_in_three_ways() -> None:
+    """By name, as it is, and as its ranges."""
+    assert gap_as_asked("real-like") is _REAL_LIKE
+    assert gap_as_asked(_REAL_LIKE) is _REAL_LIKE
+    assert gap_as_asked(msgspec.to_builtins(_REAL_LIKE)) == _REAL_LIKE
+    assert gap_as_asked(msgspec.json.decode(msgspec.json.encode(_REAL_LIKE))) == _REAL_LIKE
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"arm_error": 1.0}, "arm_error must be 0 to below 1, got 1.0."),
+        ({"arm_error": math.nan}, "arm_error must be 0 to below 1, got nan."),
+        ({"motor_lag": (0.03, 0.01)}, r"motor_lag: the range \(0.03, 0.01\) is empty"),
+        ({"joint_noise": (-0.1, 0.1)}, r"joint_noise: the range \(-0.1, 0.1\) is .* below zero"),
+        ({"backlash": (0.0, math.nan)}, "backlash: the range"),
+        ({"backlash": (0.0, math.inf)}, "backlash: the range .* infinite"),
+        ({"joint_factor": (0.0, 1.0)}, "joint_factor: the range .* must begin above zero"),
+        ({"motor_kg": (0.0, 1.0)}, "motor_kg: the range .* must begin above zero"),
+    ],
+)
+def test_ranges_that_are_none_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """Whether they come as numbers or as a mapping: by name, with what was given."""
+    with pytest.raises(FingerError, match=sentence):
+        Gap(**{**msgspec.structs.asdict(_REAL_LIKE), **changes})
+    with pytest.raises(FingerError, match=sentence):
+        gap_as_asked({**msgspec.to_builtins(_REAL_LIKE), **changes})
+
+
+def test_what_is_no_gap_is_refused() -> None:
+    """A name of none, a mapping that lacks a range, or has one too much, and a number."""
+    with pytest.raises(UnknownName, match=r"'reallike'. Did you mean 'real-like'"):
+        gap_as_asked("reallike")
+    with pytest.raises(FingerError, match="missing required field `joint_factor`"):
+        gap_as_asked({"arm_error": 0.1})
+    with pytest.raises(FingerError, match="unknown field `fricton`"):
+        gap_as_asked({**msgspec.to_builtins(_REAL_LIKE), "fricton": (0.0, 1.0)})
+    with pytest.raises(FingerError, match="Expected `object`, got `int`"):
+        gap_as_asked(3)  # pyright: ignore[reportArgumentType]

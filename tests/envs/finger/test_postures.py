@@ -1,0 +1,79 @@
+"""Targets that can be held, and starts."""
+
+from __future__ import annotations
+
+import itertools
+
+import mujoco
+import numpy as np
+
+from shapechanger.embodiments.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+)
+from shapechanger.embodiments.finger.balance import hold
+from shapechanger.envs.finger.postures import can_hold, draw_posture, draw_start, moving_torque
+from tests.embodiments.finger.commands import made
+
+_STILL = np.zeros(4)
+_LOW, _HIGH = JOINT_RANGE.T
+
+
+def test_postures_are_away_from_limits_and_can_be_held() -> None:
+    """A tenth of each joint's range, for targets as for starts; and no two are the same."""
+    rng = np.random.default_rng(0)
+    inner = 0.1 * (_HIGH - _LOW) - 1e-12
+    for draw in (draw_posture, draw_start):
+        postures = np.array([draw(rng) for _ in range(100)])
+        assert (postures >= _LOW + inner).all()
+        assert (postures <= _HIGH - inner).all()
+        assert all(can_hold(posture) for posture in postures)
+        assert (np.ptp(postures, axis=0) > 0.1).all()
+
+
+def test_tensions_that_hold_a_posture_hold_it() -> None:
+    """In the simulator, with its weight: after a second each joint is where it was."""
+    model = made()
+    rng = np.random.default_rng(0)
+    most = np.array(MOST_TENSION_N)
+    for _ in range(10):
+        posture = draw_posture(rng)
+        torque = moving_torque(posture, _STILL, _STILL)
+        tensions, is_enough = hold(MOMENT_ARMS, torque, LEAST_TENSION_N, most)
+        assert is_enough
+        data = mujoco.MjData(model)
+        data.qpos[:] = posture
+        middle, half = 0.5 * (most + LEAST_TENSION_N), 0.5 * (most - LEAST_TENSION_N)
+        data.ctrl[:] = data.act[:] = (tensions - middle) / half
+        mujoco.mj_step(model, data, 500)
+        np.testing.assert_allclose(data.qpos, posture, atol=np.radians(0.5))
+
+
+def test_torques_are_those_that_move_it() -> None:
+    """Given to the joints without friction, they accelerate them as was asked."""
+    model = made()
+    model.dof_frictionloss[:] = 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        angles = draw_posture(rng)
+        speed, acceleration = rng.uniform(-2.0, 2.0, 4), rng.uniform(-50.0, 50.0, 4)
+        friction = np.array([1.0, 1.0, 0.7, 0.4]) * 1e-3 * np.tanh(speed / 0.1)
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = angles, speed
+        data.act[:] = -1.0
+        least = MOMENT_ARMS.T @ np.full(7, LEAST_TENSION_N)
+        asked = moving_torque(angles, speed, acceleration)
+        data.qfrc_applied[:] = asked - friction - least
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(data.qacc, acceleration, atol=1e-6)
+
+
+def test_every_posture_of_the_joints_can_be_held() -> None:
+    """Up to all limits; what its tissue pulls harder at than all tendons do cannot."""
+    rng = np.random.default_rng(0)
+    assert all(can_hold(angles) for angles in rng.uniform(_LOW, _HIGH, (200, 4)))
+    assert all(can_hold(np.array(corner)) for corner in itertools.product(*JOINT_RANGE))
+    assert not can_hold(JOINT_REST + np.array([20.0, 0.0, 0.0, 0.0]))

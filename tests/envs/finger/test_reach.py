@@ -1,0 +1,286 @@
+"""`Finger-v1`: what an episode is, what it tells, and what it refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+
+from shapechanger.embodiments.finger import NOMINAL
+from shapechanger.embodiments.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
+from shapechanger.envs.finger import FingerReachEnv
+from shapechanger.envs.finger.gap import GAPS
+from shapechanger.envs.finger.inverse import angles_for
+from shapechanger.envs.finger.oracle import FingerOracle
+from shapechanger.envs.finger.postures import can_hold
+from shapechanger.errors import BadAction, FingerError, UnknownName
+from shapechanger.tasks.finger import fingertip
+
+_NOTHING = np.zeros(7, np.float32)
+_REST = JOINT_REST.tolist()
+
+
+def _state(env: FingerReachEnv) -> np.ndarray:
+    data = env.plant.data
+    return np.concatenate([data.qpos, data.qvel, data.act, data.ctrl, [data.time]])
+
+
+def test_targets_can_be_held_away_from_limits() -> None:
+    """Each is the fingertip of a posture a tenth of the ranges from every limit."""
+    env = FingerReachEnv()
+    low, high = JOINT_RANGE.T
+    margin = 0.1 * (high - low)
+    targets = []
+    for seed in range(60):
+        _, info = env.reset(seed=seed)
+        angles, off = angles_for(info["target"])
+        assert off < 1e-5
+        # One finger reaches a point in more than one way: this is one that can be held.
+        assert can_hold(angles)
+        assert (angles > low + 0.3 * margin).all()
+        assert (angles < high - 0.3 * margin).all()
+        targets.append(info["target"])
+        start = env.plant.angles
+        assert (start >= low + margin - 1e-12).all()
+        assert (start <= high - margin + 1e-12).all()
+    assert (np.ptp(targets, axis=0) > 0.03).all()
+
+
+def test_success_is_to_stay_for_a_fifth_of_a_second() -> None:
+    """Ten steps without a break within 5 mm, and not nine; leaving ends it."""
+    env = FingerReachEnv()
+    env.reset(seed=0)
+    oracle = FingerOracle(env.observation_layout)
+    seen, info = env.reset(options={"posture": _REST, "target": _REST})
+    assert info["distance"] < 1e-9
+    assert not info["is_success"]
+    for step in range(1, 13):
+        seen, _, _, _, info = env.step(oracle(seen))
+        assert info["distance"] < 0.005
+        assert info["is_success"] == (step >= 10)
+    while info["distance"] < 0.005:
+        assert info["is_success"]
+        _, _, _, _, info = env.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+    assert not info["is_success"]
+    assert not env.reset(seed=0)[1]["is_success"]
+
+
+def test_observations_are_what_their_names_say() -> None:
+    """Of the finger itself where it is nominal: angles, speeds, tensions, places."""
+    env = FingerReachEnv()
+    env.reset(seed=1)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        seen, _, _, _, info = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        named = dict(zip(env.observation_layout.names, seen, strict=True))
+        data = env.plant.data
+        assert named["PIP_flexion/angle"] == data.joint("PIP_flexion").qpos[0]
+        assert named["DIP_flexion/velocity"] == data.joint("DIP_flexion").qvel[0]
+        for i, tendon in enumerate(TENDONS):
+            assert named[f"{tendon}/tension"] == -data.actuator_force[i]
+            assert named[f"{tendon}/command"] == data.ctrl[i]
+        tip = np.array([named[f"fingertip/{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(tip, env.plant.fingertip, atol=1e-12)
+        way = np.array([named[f"target/d{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(tip + way, info["target"], atol=1e-12)
+        assert info["distance"] == pytest.approx(np.linalg.norm(way))
+
+
+def test_the_reward_is_the_sum_of_its_terms() -> None:
+    """Nearness to the target, minus the mean square of tensions over their largest."""
+    env = FingerReachEnv(reward={"nearness": 10.0})
+    env.reset(seed=0)
+    _, reward, _, _, info = env.step(_NOTHING)
+    assert reward == info["reward_nearness"] + info["reward_effort"]
+    share = env.plant.data.actuator_force / np.array(NOMINAL.most_tension)
+    assert info["reward_effort"] == pytest.approx(-0.02 * np.mean(share**2))
+    assert 0.0 < info["reward_nearness"] <= 0.2
+    assert "diverged" not in info
+
+
+def test_goals_are_rewarded_as_compute_reward_does() -> None:
+    """By each step, and by all of them at once; 0 within 5 mm and -1 elsewhere."""
+    env = FingerReachEnv(goal=True)
+    plain = FingerReachEnv()
+    plain.reset(seed=0)
+    oracle = FingerOracle(plain.observation_layout)
+    achieved, desired, rewards = [], [], []
+    for seed in range(2):
+        seen, _ = env.reset(seed=seed)
+        oracle.reset()
+        for _ in range(25):
+            flat = gym.spaces.flatten(env.observation_space, seen)
+            by_name = dict(zip(env.observation_layout.names, flat, strict=True))
+            ordered = [by_name.get(name, 0.0) for name in plain.observation_layout.names]
+            seen, reward, _, _, info = env.step(oracle(np.array(ordered)))
+            assert reward == info["reward_goal"]
+            assert reward == env.compute_reward(seen["achieved_goal"], seen["desired_goal"], info)
+            achieved.append(seen["achieved_goal"])
+            desired.append(seen["desired_goal"])
+            rewards.append(reward)
+    assert set(rewards) == {0.0, -1.0}
+    together = env.compute_reward(np.array(achieved), np.array(desired), [{}] * len(rewards))
+    np.testing.assert_array_equal(together, rewards)
+    square = env.compute_reward(np.zeros((3, 2, 3)), np.full((3, 2, 3), 0.0028), None)
+    np.testing.assert_array_equal(square, np.zeros((3, 2)))
+    assert env.compute_reward(np.zeros(3), np.array([0.0051, 0.0, 0.0]), None) == -1.0
+
+
+def test_goals_and_numbers_tell_the_same() -> None:
+    """What a Dict holds is what the Box holds."""
+    box, goal = FingerReachEnv(), FingerReachEnv(goal=True)
+    numbers, _ = box.reset(seed=4)
+    parts, _ = goal.reset(seed=4)
+    assert goal.observation_space.contains(parts)
+    np.testing.assert_array_equal(numbers[:32], parts["observation"])
+    np.testing.assert_array_equal(numbers[32:35], parts["desired_goal"])
+    np.testing.assert_array_equal(numbers[29:32], parts["achieved_goal"])
+
+
+@pytest.mark.parametrize(
+    ("action", "sentence"),
+    [
+        (np.array([0, 0, 0, np.nan, 0, 0, 0]), "takes finite actions, got nan for EDC/command"),
+        (np.array([np.inf, 0, 0, 0, 0, 0, 0]), "takes finite actions, got inf for FDP/command"),
+        (np.zeros(6), r"takes actions of shape \(7,\), got \(6,\)"),
+        (np.array(["a"] * 7), "takes numbers as actions"),
+    ],
+)
+def test_what_is_no_action_moves_nothing(action: Any, sentence: str) -> None:
+    """It is refused by the tendon's name, and the episode goes on as if it had not been."""
+    env = FingerReachEnv()
+    env.reset(seed=0)
+    env.step(_NOTHING)
+    before = _state(env)
+    with pytest.raises(BadAction, match=sentence):
+        env.step(action)
+    np.testing.assert_array_equal(_state(env), before)
+
+
+def test_a_step_needs_a_reset() -> None:
+    """As everywhere in Gymnasium."""
+    with pytest.raises(gym.error.ResetNeeded, match=r"Call reset\(\)"):
+        FingerReachEnv().step(_NOTHING)
+
+
+def test_options_say_where_to_start_and_where_to_go() -> None:
+    """In angles or as a place; what is left out is drawn."""
+    env = FingerReachEnv()
+    _, info = env.reset(seed=0, options={"posture": [0.5, 0.1, 0.6, 0.3]})
+    np.testing.assert_array_equal(env.plant.angles, [0.5, 0.1, 0.6, 0.3])
+    other = env.reset(options={"posture": [0.5, 0.1, 0.6, 0.3]})[1]
+    assert (info["target"] != other["target"]).all()
+    info = env.reset(options={"target": _REST})[1]
+    np.testing.assert_allclose(info["target"], fingertip(JOINT_REST, PHALANX_LENGTH_M))
+    assert (env.plant.angles != JOINT_REST).all()
+    info = env.reset(options={"target": (0.05, 0.01, -0.04)})[1]
+    np.testing.assert_array_equal(info["target"], (0.05, 0.01, -0.04))
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "sentence"),
+    [
+        ({"postur": _REST}, UnknownName, "'postur'. Did you mean 'posture'"),
+        ({"path": "circle"}, UnknownName, "There are: posture, target"),
+        ({"posture": [0.0, 0.0]}, FingerError, "four angles in rad, MCP_flexion, .*; got"),
+        ({"posture": [2.0, 0.0, 0.0, 0.0]}, FingerError, r"within \[-0.349.* and \[1.571"),
+        ({"posture": [np.nan] * 4}, FingerError, "A posture is four angles"),
+        ({"target": [0.1, 0.2]}, FingerError, "three finite numbers, m, or four angles"),
+        ({"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
+    ],
+)
+def test_options_that_are_none_are_refused(
+    options: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    """With what there is, and what was given."""
+    with pytest.raises(error, match=sentence):
+        FingerReachEnv().reset(seed=0, options=options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "sentence"),
+    [
+        ({"actions": "tensions"}, UnknownName, "'tensions'. Did you mean 'tension'"),
+        ({"gap": "reel-like"}, UnknownName, "'reel-like'. Did you mean 'real-like'"),
+        ({"gap": "wide", "parameters": NOMINAL}, FingerError, "or is drawn from a gap: give one"),
+        ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
+        ({"parameters": "{}x"}, FingerError, "These are no parameters of a finger"),
+        ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),
+        ({"render_mode": "rgb"}, UnknownName, "No render mode matches 'rgb'"),
+    ],
+)
+def test_arguments_that_are_none_are_refused(
+    arguments: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    """By name, with the nearest spelling where one is near."""
+    with pytest.raises(error, match=sentence):
+        FingerReachEnv(**arguments)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        NOMINAL.replace(tendon_friction=1.0),
+        {"tendon_friction": 1.0},
+        NOMINAL.replace(tendon_friction=1.0).to_json(),
+    ],
+    ids=["parameters", "by name", "JSON"],
+)
+def test_a_spec_makes_the_env_again(parameters: Any) -> None:
+    """As JSON, as whoever records data or makes a vector of envs writes it down."""
+    wanted = NOMINAL.replace(tendon_friction=1.0)
+    with gym.make("shapechanger/Finger-v1", parameters=parameters, actions="length") as env:
+        assert env.unwrapped.parameters == wanted
+        spec = EnvSpec.from_json(env.spec.to_json())
+    with gym.make(spec) as again:
+        assert again.unwrapped.parameters == wanted
+        assert again.spec.kwargs["actions"] == "length"
+
+
+def test_a_gap_survives_in_a_spec() -> None:
+    """A spec is JSON, whatever the gap was given as; a finger_seed without a gap means nothing."""
+    with gym.make("shapechanger/Finger-v1", gap=GAPS["wide"], finger_seed=2) as env:
+        parameters = env.unwrapped.parameters
+        spec = EnvSpec.from_json(env.spec.to_json())
+    with gym.make(spec) as again:
+        assert again.unwrapped.parameters == parameters
+    with pytest.raises(FingerError, match="give a gap, too"):
+        FingerReachEnv(finger_seed=2)
+
+
+def test_noise_is_in_what_is_sensed_and_not_in_where_it_is() -> None:
+    """Angles are off by the standard deviation that the finger has; its distance is true."""
+    env = FingerReachEnv(parameters={"joint_noise": 0.02, "tension_noise": 0.3})
+    env.reset(seed=0)
+    off, tensions = [], []
+    for _ in range(100):
+        seen, _, _, _, info = env.step(_NOTHING)
+        off.append(seen[:4] - env.plant.angles)
+        tensions.append(seen[8:15] + env.plant.data.actuator_force)
+        true = np.linalg.norm(env.plant.fingertip - info["target"])
+        assert info["distance"] == pytest.approx(true)
+    assert np.std(off) == pytest.approx(0.02, rel=0.15)
+    assert np.std(tensions) == pytest.approx(0.3, rel=0.15)
+
+
+@pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
+def test_an_episode_begins_at_rest_however_late_commands_come(actions: str) -> None:
+    """Until the first one arrives each tendon is just taut; no episode knows of the last one."""
+    for parameters in ({}, {"command_delay": 0.040}):
+        env = FingerReachEnv(actions=actions, parameters=parameters)
+        for _ in range(2):
+            env.reset(seed=0, options={"posture": _REST})
+            still = env.plant.data.ctrl.astype(np.float32)
+            env.step(still)
+            assert np.abs(env.plant.data.actuator_force).max() < 1.5
+            assert np.degrees(np.abs(env.plant.angles - JOINT_REST)).max() < 2.0
+            for _ in range(5):
+                env.step(np.ones(7, np.float32))

@@ -1,0 +1,43 @@
+"""Velocities of joints whose angles are measured."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shapechanger.embodiments.finger import NOMINAL, drive_of
+from shapechanger.embodiments.finger.anatomy import JOINT_REST
+from shapechanger.envs.finger.plant import FingerPlant
+from shapechanger.envs.finger.velocities import JointVelocities
+
+
+def test_a_steady_speed_is_found_with_a_lag_of_40_ms() -> None:
+    """After each period of 20 ms what is missing is exp(-1/2) of what it was."""
+    velocities = JointVelocities(0.020)
+    said = [velocities.of(np.array([0.02 * i, -0.04 * i])) for i in range(4)]
+    left = [math.exp(-i / 2) for i in range(4)]
+    np.testing.assert_allclose(said, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
+    velocities.forget()
+    np.testing.assert_array_equal(velocities.of(np.array([9.0, 9.0])), np.zeros(2))
+
+
+def test_what_is_given_is_not_changed_later() -> None:
+    """Whoever hands in an array may use it again."""
+    velocities, angles = JointVelocities(0.020), np.zeros(1)
+    first = velocities.of(angles)
+    angles[:] = 1.0
+    second = velocities.of(angles)
+    np.testing.assert_array_equal(first, np.zeros(1))
+    assert second[0] > 0.0
+
+
+def test_a_finger_with_noisy_joints_has_these_velocities() -> None:
+    """So simulation and rig say the same of the same angles."""
+    noisy = NOMINAL.replace(joint_noise=0.01)
+    plant = FingerPlant(noisy, drive_of("tension", noisy), 0.020)
+    velocities, rng = JointVelocities(0.020), np.random.default_rng(0)
+    senses = plant.place(JOINT_REST, rng)
+    for _ in range(5):
+        np.testing.assert_array_equal(senses.velocities, velocities.of(senses.angles))
+        senses = plant.act(np.full(7, -0.5), rng)

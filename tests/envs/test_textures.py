@@ -1,0 +1,37 @@
+"""Textures where nobody looks take less memory, and nothing else is another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+
+_PIXELS = ("tex_data", "tex_adr", "tex_width", "tex_height")
+
+
+def _model(**arguments: Any) -> Any:
+    with gym.make("shapechanger/Ant-v1", **arguments) as env:
+        return env.unwrapped.model
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_only_pixels_are_fewer_where_nobody_looks() -> None:
+    """All other numbers are those of an env that draws."""
+    plain, drawn = _model(), _model(render_mode="rgb_array")
+    assert plain.ntexdata < 0.3 * drawn.ntexdata
+    for name in dir(drawn):
+        value = getattr(drawn, name)
+        if isinstance(value, np.ndarray) and name not in _PIXELS and name[0] != "_":
+            np.testing.assert_array_equal(getattr(plain, name), value, err_msg=name)
+
+
+def test_floors_keep_their_edges() -> None:
+    """The checks of a floor would be seen to blur; bodies and skies are of one colour."""
+    model = _model()
+    flat = model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D
+    assert model.tex_width[flat].tolist() == [100]
+    assert model.tex_width[~flat].tolist() == [50, 63]

@@ -1,0 +1,232 @@
+"""A page of a robot's console, as a person uses it, and what the twin's pins do meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from typing import Any, Final, Self
+
+from playwright.sync_api import Browser, Page, TimeoutError
+
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.twin.ledger import Transition
+from shapechanger.twin.oracle import propelled
+from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.wiring import Wiring
+from tests.twin.robots import until
+
+__all__ = ["CHROMIUM_ARGUMENTS", "DESK", "PHONE", "PHONE_ON_ITS_SIDE", "Console", "Pins"]
+
+CHROMIUM_ARGUMENTS: Final = ["--no-sandbox", "--disable-gpu"]
+
+DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}
+PHONE: Final[dict[str, Any]] = {
+    "viewport": {"width": 390, "height": 844},
+    "has_touch": True,
+    "is_mobile": True,
+}
+PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "height": 390}}
+
+# Bytes of a ledger: some minutes of a robot.
+_RECENT: Final = 1_000_000
+
+_PRESSES: Final = 6
+_PRESSED_S: Final = 10.0
+# What Chromium says of an answer or a connection that a test itself brought about.
+_BROUGHT_ABOUT: Final = ("net::ERR_", "WebSocket connection to")
+
+
+class Console:
+    """A page in a browser of its own.
+
+    Args:
+        browser: Where.
+        robot: Whose page.
+        key: What is put into the address; the robot's own if not given, "" for nothing.
+        script: What runs before the page's own scripts.
+        options: Of the browser's context, such as `PHONE`.
+
+    Attributes:
+        page: The page.
+        complaints: Errors of its scripts and of the browser, such as a breach of the policy.
+        asked: The addresses that it asked for.
+    """
+
+    def __init__(
+        self,
+        browser: Browser,
+        robot: RunningRobot,
+        *,
+        key: str | None = None,
+        script: str = "",
+        address: str = "",
+        **options: Any,
+    ) -> None:
+        self._context = browser.new_context(ignore_https_errors=True, **(DESK | options))
+        self._context.set_default_timeout(60_000)
+        self.page: Page = self._context.new_page()
+        self.complaints: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("console", lambda said: self._hear(said.type, said.text))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        if script:
+            self.page.add_init_script(script)
+        self._robot = robot
+        self.address = address or f"https://127.0.0.1:{robot.port}/"
+        key = robot.known.key if key is None else key
+        self.page.goto(self.address + (f"#key={key}" if key else ""))
+
+    def __enter__(self) -> Self:
+        """The page itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End it."""
+        self._context.close()
+
+    def _hear(self, kind: str, text: str) -> None:
+        if kind == "error" and not any(words in text for words in _BROUGHT_ABOUT):
+            self.complaints.append(text)
+
+    def await_state(self, seconds: float = 60.0, /, **state: str) -> None:
+        """Wait until the page says so, such as `robot="armed"`."""
+        wanted = "".join(f"[data-{name}='{value}']" for name, value in state.items())
+        self.page.locator(f"body{wanted}").wait_for(timeout=1000 * seconds)
+
+    def arm(self) -> None:
+        """Arm the robot, as who drives it.
+
+        On a busy machine the robot's answer may come too late, and the page wants the key again.
+        """
+        self.await_state(link="open", view="cockpit")
+        self.page.locator("body[data-robot='disarmed'], body[data-robot='emergency']").wait_for()
+        for _ in range(_PRESSES):
+            self.page.keyboard.press("e")
+            with contextlib.suppress(TimeoutError):
+                self.await_state(_PRESSED_S, robot="armed", driver="me")
+                return
+        raise AssertionError("The robot was not armed, though E was pressed.")
+
+    def drive(self, key: str, pins: Pins, way: float = 0.0) -> None:
+        """Hold a key until the robot was propelled, this way if one is given.
+
+        On a busy machine the page may hear nothing for so long that it wants a key pressed anew.
+        """
+        pins.forget()
+        for _ in range(_PRESSES):
+            self.page.keyboard.down(key)
+            try:
+                until(lambda: pins.moves(way), _PRESSED_S)
+            except AssertionError:
+                self.page.keyboard.up(key)
+                with self._robot.operator() as operator:
+                    operator.place(0)  # In twin time it may have come to a wall by now.
+            else:
+                return
+        raise AssertionError(f"Nothing moved, though {key} was held: {self.state_of_robot()}")
+
+    def state_of_robot(self) -> str:
+        """What the robot itself says, for whoever wonders why it does not do as it is told."""
+        with self._robot.client(frames=False) as observer:
+            seen = observer.ask().message
+        log = self.page.locator("#log").inner_text().splitlines()
+        state = [round(number, 2) for number in seen.state]
+        return (
+            f"{seen.stop_reason!r}, commanded {seen.commanded}, applied {seen.action_applied}, "
+            f"armed {seen.armed}, state {state}; the page's log: {log[:8]}"
+        )
+
+    def stop(self) -> None:
+        """Stop the robot, and see that it did."""
+        self.page.keyboard.press("Space")
+        self.await_state(robot="emergency")
+
+    def await_words(self, where: str, words: str) -> None:
+        """Wait until an element says something."""
+        self.page.locator(where, has_text=words).first.wait_for(timeout=60_000)
+
+    def pixels(self) -> list[int]:
+        """What the canvas shows."""
+        return self.page.evaluate(
+            "() => { const c = document.getElementById('picture');"
+            " return Array.from(c.getContext('2d').getImageData(0, 0, c.width, c.height).data); }"
+        )
+
+
+class Pins:
+    """What the outputs of a robot's twin do, by its ledger alone.
+
+    Unlike `read_ledger` this reads each line once, and of those before it only the last: it looks
+    often, and the ledger of a robot that many tests share gets long.
+    """
+
+    def __init__(self, robot: RunningRobot) -> None:
+        profile = next(robot.folder.glob("*.toml"))
+        self._path = robot.ledger_path
+        self._wiring = Wiring(load_profile(profile).guard_plan())
+        with robot.operator() as operator:
+            self._levels = operator.levels()
+        self._read = max(0, self._path.stat().st_size - _RECENT)
+        self._lines: list[Transition] = []
+        self._pushes: list[float] = []
+        self.forget()
+
+    def propels(self) -> float:
+        """How much what propels does now, -1 to 1; 0 for at rest."""
+        self._look()
+        return self._push()
+
+    def forget(self) -> None:
+        """Count motion from here on."""
+        now = self.propels()
+        self._pushes = [now] if now else []
+
+    def await_motion(self, way: float = 0.0) -> None:
+        """Wait until the robot was propelled, this way if one is given."""
+        until(lambda: self.moves(way), 60.0)
+
+    def moves(self, way: float = 0.0) -> bool:
+        """Whether it was propelled since it was last found at rest, this way if one is given.
+
+        A busy machine looks so seldom that a robot in twin time may be at a wall by then.
+        """
+        self._look()
+        return any(push * (way or push) > 0.0 for push in self._pushes)
+
+    def await_rest(self) -> None:
+        """Wait until nothing propels it."""
+        until(lambda: self.propels() == 0.0, 60.0)
+        self.forget()
+
+    def last_rest_ns(self) -> float:
+        """When it last came to rest, or will by what is in the ledger; infinite for never."""
+        self._look()
+        ledger = sorted(self._lines, key=lambda line: line.t)
+        return max((i.end_ns for i in propelled(ledger, self._wiring)), default=-math.inf)
+
+    def _look(self) -> None:
+        with self._path.open("rb") as file:
+            file.seek(self._read)
+            if self._read and not self._lines:
+                self._read += len(file.readline())  # What is left of a line.
+            whole, newline, _ = file.read().rpartition(b"\n")
+        self._read += len(whole) + len(newline)
+        for line in whole.splitlines():
+            fields = json.loads(line)
+            if fields["kind"] == "input":
+                continue  # The edges of the encoder are many, and no output.
+            known = {key: fields[key] for key in fields if key in Transition.__slots__}
+            self._lines.append(Transition(**known))
+            self._levels.apply(self._lines[-1])
+            push = self._push()
+            if push:
+                self._pushes.append(push)
+
+    def _push(self) -> float:
+        """What the outputs do after the last line that was read."""
+        if not self._lines:
+            return 0.0
+        outputs = self._wiring.read(self._levels, self._lines[-1].t)
+        return max((outputs[name].value or 0.0 for name in self._wiring.propelling), key=abs)

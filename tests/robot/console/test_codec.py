@@ -1,0 +1,113 @@
+"""The page and the robot mean the same by the same bytes, and make the same proof."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from shapechanger.link import messages as m
+from shapechanger.link.proof import make_proof, new_key, parse_key
+from shapechanger.twin.running import RunningRobot
+from tests.robot.console.browser import Console
+
+Visit = Callable[..., Console]
+
+# The values that the page decodes and encodes again; integers beyond 2^53 are BigInt there.
+_AGAIN = """async (texts) => {
+  const { decode, encode } = await import("/console/codec.js");
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const text = (bytes) => btoa(Array.from(bytes, (b) => String.fromCharCode(b)).join(""));
+  return texts.map((each) => {
+    try { return text(encode(decode(bytes(each)))); } catch (error) { return `${error.name}`; }
+  });
+}"""
+
+_VALUES: list[Any] = [
+    None,
+    True,
+    False,
+    *(sign * (2**power + step) for power in range(64) for step in (-1, 0) for sign in (1, -1)),
+    2**64 - 1,
+    -(2**63),
+    0.1,
+    -1e300,
+    math.inf,
+    "",
+    "Grüße, 机器人 🤖",
+    *("x" * n for n in (31, 32, 255, 256, 65535, 65536)),
+    *(b"\xff" * n for n in (0, 1, 255, 256, 65535, 65536)),
+    *([n % 7] * n for n in (0, 15, 16, 65536)),
+    *({f"{i}": i for i in range(n)} for n in (0, 15, 16, 65536)),
+    {"__proto__": {"constructor": [1, {"a": None}]}},
+]
+
+
+def _again(console: Console, *packed: bytes) -> list[str]:
+    return console.page.evaluate(_AGAIN, [base64.b64encode(each).decode() for each in packed])
+
+
+def test_every_value_comes_back_as_it_was(car: RunningRobot, visit: Visit) -> None:
+    """Each width of integers, texts, bytes, arrays and maps, to the last nanosecond."""
+    console = visit(car, key="")
+    packed = [msgspec.msgpack.encode(value) for value in _VALUES if abs(_number(value)) < 2**64]
+    for one, text in zip(packed, _again(console, *packed), strict=True):
+        value = msgspec.msgpack.decode(one)
+        assert msgspec.msgpack.decode(base64.b64decode(text)) == value
+
+
+def test_a_message_of_each_side_is_understood(car: RunningRobot, visit: Visit) -> None:
+    """What the page says is a message to the robot, and what the robot says keeps its meaning."""
+    console = visit(car, key="")
+    said = [
+        m.Hello(version=m.VERSION, proof=b"x" * 32, name="Ada", role="person"),
+        m.Command(seq=2**53, answers=1, values=(0.25, -1.0), scale=1.0),
+        m.Arm(answers=3, emergency=2),
+        m.EmergencyStop(reason="Space was pressed."),
+    ]
+    back = _again(console, *(m.encode(each) for each in said))
+    assert [m.decode_client_message(base64.b64decode(each)) for each in back] == said
+    pong = m.Pong(token=1, now_ns=2**62 + 1)
+    (text,) = _again(console, m.encode(pong))
+    assert m.decode_robot_message(base64.b64decode(text)) == pong
+
+
+def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
+    """Cut off, too long, too deep, or of a kind that no message has."""
+    console = visit(car, key="")
+    whole = m.encode(m.Pong(token=1, now_ns=2**40))
+    broken = [whole[:-1], whole + b"\xc0", b"", b"\x91" * 100 + b"\xc0", b"\xc1", b"\xd4\x00\x00"]
+    broken += [b"\xdd\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\x81\x01\x02"]
+    assert _again(console, *broken) == ["RangeError"] * len(broken)
+
+
+def test_the_proof_is_the_robots(car: RunningRobot, visit: Visit) -> None:
+    """For keys as people write them, and with a certificate or without."""
+    console = visit(car, key="")
+    cases = [(new_key(), bytes(range(32)), certificate) for certificate in (b"", b"\x01" * 32)]
+    for key, nonce, certificate in cases:
+        made = console.page.evaluate(
+            """async ([key, nonce, certificate]) => {
+              const { fromHex, makeProof, parseKey } = await import("/console/proof.js");
+              const proof = await makeProof(
+                parseKey(key), fromHex(nonce), fromHex(certificate), "person");
+              return [Array.from(parseKey(key)), Array.from(proof)];
+            }""",
+            [key.lower().replace("-", " "), nonce.hex(), certificate.hex()],
+        )
+        proof = make_proof(parse_key(key), nonce, certificate, "person")
+        assert made == [list(parse_key(key)), list(proof)]
+
+
+def test_the_page_speaks_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
+    """It would be refused otherwise."""
+    console = visit(car, key="")
+    version = "async () => (await import('/console/link.js')).VERSION"
+    assert console.page.evaluate(version) == m.VERSION
+
+
+def _number(value: Any) -> float:
+    return value if isinstance(value, int) else 0

@@ -1,0 +1,247 @@
+"""A person sees and drives a robot with the page, and it stops whenever they cannot any more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Error
+
+from shapechanger.twin.running import RunningRobot
+from tests.robot.console.browser import PHONE, Console, Pins
+from tests.twin.robots import until
+
+Visit = Callable[..., Console]
+
+# ms that the guard may be late: one of its ticks, and what the one-shot of the enable line adds.
+_SLACK_MS = 60.0
+_DEADLINE_MS = 250.0
+_MINUS = "\N{MINUS SIGN}"
+
+
+@pytest.fixture(autouse=True)
+def _at_the_start(car: RunningRobot) -> None:
+    """There is room ahead."""
+    with car.operator() as operator:
+        operator.place(0)
+
+
+def test_the_picture_moves(car: RunningRobot, visit: Visit) -> None:
+    """The canvas holds the camera's picture, and another one soon after."""
+    console = visit(car)
+    console.await_state(picture="live")
+    before = console.pixels()
+    assert len(before) == 160 * 120 * 4
+    assert len(set(before)) > 10
+    until(lambda: console.pixels() != before, 60.0)
+
+
+def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit) -> None:
+    """Each way, and at rest at once after key-up."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    for key, way in (("s", -1.0), ("ArrowDown", -1.0), ("w", 1.0)):
+        assert pins.propels() == 0.0
+        console.drive(key, pins, way)
+        console.page.keyboard.up(key)
+        pins.await_rest()
+    console.stop()
+
+
+def test_a_page_that_loses_the_focus_drives_no_more(car: RunningRobot, visit: Visit) -> None:
+    """What was held must be pressed again."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.drive("w", pins)
+    console.page.evaluate("window.dispatchEvent(new Event('blur'))")
+    pins.await_rest()
+    console.await_state(robot="armed")
+    console.page.keyboard.up("w")
+    console.drive("w", pins)
+    console.page.keyboard.up("w")
+    console.stop()
+
+
+def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> None:
+    """Nobody sees what the robot does."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.drive("w", pins)
+    console.page.evaluate(
+        "Object.defineProperty(document, 'hidden', {configurable: true, value: true});"
+        "document.dispatchEvent(new Event('visibilitychange'))"
+    )
+    pins.await_rest()
+    console.page.evaluate(
+        "delete document.hidden; document.dispatchEvent(new Event('visibilitychange'))"
+    )
+    console.await_state(robot="disarmed")
+
+
+@pytest.mark.parametrize("how", ["close", "leave", "crash"])
+def test_closing_the_tab_stops_the_robot_within_the_deadline(
+    hasty_car: RunningRobot, visit: Visit, how: str
+) -> None:
+    """By the ledger, counted from the last command that arrived; however the page ends."""
+    console, pins = visit(hasty_car), Pins(hasty_car)
+    console.arm()
+    console.drive("w", pins)
+    with hasty_car.client(frames=False) as observer:
+        commands = [observer.ask().message.command_ns or 0]
+        if how == "close":
+            console.page.close()
+        elif how == "leave":
+            console.page.goto("about:blank")
+        else:
+            # The process of the page is gone without a word.
+            with pytest.raises(Error, match="crash"):
+                console.page.goto("chrome://crash")
+
+        def rests() -> bool:
+            commands.append(observer.ask().message.command_ns or 0)
+            return pins.propels() == 0.0
+
+        until(rests, 60.0)
+        assert max(commands) > 0
+        late_ms = (pins.last_rest_ns() - max(commands)) / 1e6
+        assert late_ms <= _DEADLINE_MS + _SLACK_MS
+        until(lambda: not observer.ask().message.armed, 60.0)
+
+
+@pytest.mark.parametrize("key", ["Space", "Escape"])
+@pytest.mark.parametrize("focus", ["#stage", "#hand", "#cap", "#leave", "#log"])
+def test_space_and_escape_stop_everything_wherever_the_focus_is(
+    car: RunningRobot, visit: Visit, key: str, focus: str
+) -> None:
+    """Neither presses a button that has the focus, and only arming again ends the stop."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.drive("w", pins)
+    console.page.focus(focus)
+    console.page.keyboard.press(key)
+    pins.await_rest()
+    console.await_state(robot="emergency", view="cockpit", driver="me")
+    console.page.keyboard.up("w")
+
+
+def test_the_stop_button_stops_when_it_is_pressed_down(car: RunningRobot, visit: Visit) -> None:
+    """Not only when it is let go; and the click that follows is no second stop."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.drive("w", pins)
+    console.page.hover("#stop")
+    console.page.mouse.down()
+    pins.await_rest()
+    console.await_state(robot="emergency")
+    with car.client(frames=False) as observer:
+        stops = observer.ask().message.emergencies
+        console.page.mouse.up()
+        console.await_words("#log", "STOP was pressed.")
+        console.page.keyboard.press("x")
+        console.arm()
+        assert observer.ask().message.emergencies == stops
+    console.stop()
+
+
+def test_a_mouse_and_a_finger_drive_with_the_stick(car: RunningRobot, visit: Visit) -> None:
+    """It springs back, and a finger on it scrolls nothing."""
+    pins = Pins(car)
+    for how in ({}, PHONE):
+        console = visit(car, **how)
+        console.arm()
+        console.page.locator("#pad").scroll_into_view_if_needed()
+        box = console.page.locator("#pad").bounding_box()
+        assert box is not None
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        if how:
+            touch = console.page.context.new_cdp_session(console.page)
+            before = console.page.evaluate("scrollY")
+            for kind, dy in (("touchStart", 0.0), ("touchMove", 0.4)):
+                point = {"x": x, "y": y + dy * box["height"]}
+                touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
+            pins.await_motion(-1.0)
+            touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+            assert console.page.evaluate("scrollY") == before
+        else:
+            console.page.mouse.move(x, y)
+            console.page.mouse.down()
+            console.page.mouse.move(x, y + 0.4 * box["height"])
+            pins.await_motion(-1.0)
+            console.page.mouse.up()
+        pins.await_rest()
+        console.stop()
+        console.page.close()
+
+
+_PAD = """
+globalThis.pad = { connected: true, axes: [0, 0, 0, 0], buttons:
+  Array.from({ length: 16 }, () => ({ pressed: false, value: 0 })) };
+navigator.getGamepads = () => [globalThis.pad];
+"""
+
+
+def test_a_gamepad_drives_once_its_sticks_have_been_at_rest(
+    car: RunningRobot, visit: Visit
+) -> None:
+    """A stick that is held while the robot is armed moves nothing; its B stops everything."""
+    console, pins = visit(car, script=_PAD), Pins(car)
+    console.await_state(link="open")
+    console.page.evaluate("pad.axes[1] = 1")
+    console.arm()
+    seen = console.page.locator("#facts").inner_text()
+    until(lambda: console.page.locator("#facts").inner_text() != seen, 60.0)
+    assert pins.propels() == 0.0
+    console.page.evaluate("pad.axes[1] = 0.05")
+    until(lambda: console.page.evaluate("pad.axes[1]") == 0.05, 60.0)
+    console.page.wait_for_timeout(200)
+    console.page.evaluate("pad.axes[1] = 1")
+    pins.await_motion(-1.0)
+    console.page.evaluate("pad.buttons[1] = { pressed: true, value: 1 }")
+    console.await_state(robot="emergency")
+    pins.await_rest()
+
+
+def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
+    """How it is held at first is the middle; tilted away it drives forward, and back it rests."""
+    console, pins = visit(car, **PHONE), Pins(car)
+    console.arm()
+    browser = console.page.context.new_cdp_session(console.page)
+    console.page.evaluate("addEventListener('deviceorientation', (e) => { tilted = e.beta; })")
+
+    def tilt(beta: float) -> None:
+        turned = {"alpha": 0.0, "beta": beta, "gamma": 0.0}
+        browser.send("DeviceOrientation.setDeviceOrientationOverride", turned)
+        until(lambda: abs(console.page.evaluate("globalThis.tilted ?? 0") - beta) < 0.1, 60.0)
+
+    tilt(45.0)
+    console.page.get_by_role("button", name="Tilt to drive").click()
+    tilt(44.0)
+    assert pins.propels() == 0.0
+    tilt(15.0)
+    pins.await_motion(1.0)
+    tilt(45.0)
+    pins.await_rest()
+    tilt(75.0)
+    pins.await_motion(-1.0)
+    console.page.get_by_role("button", name="Tilt to drive").click()
+    pins.await_rest()
+    console.stop()
+
+
+def test_the_cap_limits_what_is_commanded(car: RunningRobot, visit: Visit) -> None:
+    """The robot shows the command times the cap; keys change it."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    for _ in range(3):
+        console.page.keyboard.press("-")
+    console.await_words("#cap-shown", "20 %")
+    console.page.keyboard.down("s")
+    console.await_words("#actions", f"{_MINUS}0.20 → {_MINUS}0.20")
+    pins.await_motion(-1.0)
+    console.page.keyboard.up("s")
+    console.page.keyboard.down("a")
+    console.await_words(
+        "#pad-info", f"A steering of {_MINUS}0.20 moves nothing here: raise the cap."
+    )
+    console.page.keyboard.up("a")
+    console.stop()

@@ -1,0 +1,42 @@
+"""The files of the page as they lie in the package."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.console.files import ENTRY, console_files
+
+
+def test_the_page_names_only_files_that_are_there() -> None:
+    """Scripts, styles and what they import."""
+    files = console_files()
+    for name, file in files.items():
+        text = file.body.decode()
+        named = re.findall(r'(?:src|href)="([^"]+)"|from "([^"]+)"', text)
+        for path in (one or other for one, other in named):
+            assert path.startswith(("/console/", "./")), (name, path)
+            assert path.rpartition("/")[2] in files, (name, path)
+
+
+def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
+    """The policy would forbid it in the browser; here it is seen without one."""
+    for name, file in console_files().items():
+        text = file.body.decode()
+        outside = set(re.findall(r"https?://[^\s\"'`)]+", text))
+        assert outside <= {"http://127.0.0.1.", "http://www.w3.org/2000/svg"}, name
+        if name == ENTRY:
+            assert "style=" not in text
+            assert not re.search(r"\son\w+=", text)
+            assert "<style" not in text
+
+
+def test_a_page_that_is_not_there_is_said_in_words(tmp_path: Path) -> None:
+    """As after an installation that went wrong."""
+    with pytest.raises(RobotError, match=r"There is no index.html"):
+        console_files(tmp_path)
+    with pytest.raises(RobotError, match="cannot be read"):
+        console_files(tmp_path / "nowhere")

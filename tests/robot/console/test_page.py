@@ -1,0 +1,193 @@
+"""Who may see what, what the page asks for, and whether everybody can use it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import ssl
+import urllib.request
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Route
+
+from shapechanger.link.proof import new_key
+from shapechanger.twin.running import RunningRobot
+from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
+
+Visit = Callable[..., Console]
+
+
+def test_somebody_without_the_key_sees_the_form_and_the_name(
+    car: RunningRobot, visit: Visit
+) -> None:
+    """And nothing else of the robot."""
+    console = visit(car, key="")
+    console.await_words("#robot", "test-car")
+    assert console.page.locator("#key-form").is_visible()
+    assert console.page.locator("#cockpit").is_hidden()
+    assert console.page.evaluate("document.title") == "test-car"
+    trusting = ssl._create_unverified_context()
+    url = f"{console.address}console/robot.json"
+    with urllib.request.urlopen(url, context=trusting) as answer:
+        said = set(json.load(answer))
+    assert said == {"robot", "version", "certificate", "open"}
+
+
+def test_the_key_leaves_the_address_at_once_and_is_kept_only_if_asked(
+    car: RunningRobot, visit: Visit
+) -> None:
+    """A picture of the screen, or the history, shows no key."""
+    console = visit(car)
+    console.await_state(link="open", view="cockpit")
+    assert console.page.url == console.address
+    assert console.page.evaluate("sessionStorage.length + localStorage.length") == 0
+    console.page.focus("#keep")
+    console.page.keyboard.press("Enter")
+    console.page.reload()
+    console.await_state(link="open", view="cockpit")
+    console.page.click("#leave")
+    console.page.reload()
+    console.await_words("#connection", "Not connected.")
+    assert console.page.locator("#key-form").is_visible()
+
+
+def test_a_wrong_key_says_what_is_wrong_and_loses_nothing(car: RunningRobot, visit: Visit) -> None:
+    """Neither what is no key at all, nor the key of another robot; then the right one is taken."""
+    console = visit(car, key="ABCD-EFGH")
+    trouble = "#key-trouble"
+    console.await_words(trouble, "A key has 26 letters and numbers, this one has 8.")
+    assert console.page.input_value("#key") == "ABCD-EFGH"
+    other = new_key()
+    console.page.fill("#key", other.lower())
+    console.page.fill("#name", "Ada")
+    console.page.keyboard.press("Enter")
+    console.await_words(trouble, "Wrong key.")
+    assert console.page.input_value("#key") == other.lower()
+    assert console.page.input_value("#name") == "Ada"
+    console.page.fill("#key", "!" * 26)
+    console.page.keyboard.press("Enter")
+    console.await_words(trouble, "only the letters A to Z and the numbers 2 to 7")
+    console.page.fill("#key", car.known.key.replace("-", " ").lower())
+    console.page.click("#enter")
+    console.await_state(link="open", view="cockpit")
+
+
+def test_the_page_asks_nobody_but_the_robot(car: RunningRobot, visit: Visit) -> None:
+    """No outside resource, and nothing that the policy forbids (the page would complain)."""
+    console = visit(car)
+    console.await_state(picture="live")
+    assert console.asked
+    assert all(url.startswith(console.address) for url in console.asked)
+
+
+def test_every_control_has_a_name_and_a_place(car: RunningRobot, visit: Visit) -> None:
+    """As a screen reader hears it; with landmarks, and STOP first in the order of the focus."""
+    console = visit(car)
+    console.await_state(picture="live")
+    session = console.page.context.new_cdp_session(console.page)
+    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
+    heard = [
+        (node.get("role", {}).get("value"), node.get("name", {}).get("value", ""))
+        for node in nodes
+        if not node["ignored"]
+    ]
+    controls = {"button", "slider", "textbox", "checkbox", "application", "log", "image"}
+    named = {(role, name) for role, name in heard if role in controls}
+    assert [role for role, name in named if not name.strip()] == []
+    assert len([role for role, _ in named if role == "button"]) >= 8
+    roles = {role for role, _ in heard}
+    assert {"banner", "main", "status", "log", "heading"} <= roles
+    first = console.page.evaluate(
+        "[...document.querySelectorAll('button, input, [tabindex]')]"
+        ".find((e) => e.checkVisibility()).id"
+    )
+    assert first == "stop"
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE, PHONE_ON_ITS_SIDE])
+def test_nothing_overlaps_and_targets_are_large(
+    car: RunningRobot, visit: Visit, size: dict[str, Any]
+) -> None:
+    """At the sizes of a desk and of a phone; nothing is wider than the screen."""
+    console = visit(car, **size)
+    console.await_state(picture="live")
+    page = console.page
+    width = size["viewport"]["width"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    boxes = page.evaluate(
+        """() => [...document.querySelectorAll('#cockpit button, #cockpit input, #picture, #pad')]
+          .filter((e) => e.checkVisibility())
+          .map((e) => [e.id, ...Object.values(e.getBoundingClientRect().toJSON()).slice(0, 4)])"""
+    )
+    assert len(boxes) >= 9
+    for name, _, _, w, h in boxes:
+        assert (w >= 40 and h >= 32) or name == "", name
+    if size is not PHONE_ON_ITS_SIDE and size is not DESK:
+        # What sticks to the edge of an upright phone lies over what is scrolled below it.
+        boxes = [box for box in boxes if box[0] not in ("stop", "arm", "hand")]
+    for (one, x, y, w, h), (other, u, v, s, t) in itertools.combinations(boxes, 2):
+        apart = x + w <= u + 1 or u + s <= x + 1 or y + h <= v + 1 or v + t <= y + 1
+        assert apart, (one, other)
+    picture = next(box for box in boxes if box[0] == "picture")
+    assert picture[3] * picture[4] >= 0.25 * width * size["viewport"]["height"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_can_be_read(car: RunningRobot, visit: Visit, scheme: str) -> None:
+    """A contrast of 4.5 at least between each text and what is behind it (WCAG 2.2, 1.4.3)."""
+    console = visit(car, color_scheme=scheme, reduced_motion="reduce")
+    console.await_state(picture="live")
+    poor = console.page.evaluate(
+        """() => {
+          const rgb = (text) => text.match(/[\\d.]+/g).map(Number);
+          const linear = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+          const light = ([r, g, b]) =>
+            0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+          const behind = (e) => {
+            for (; e; e = e.parentElement) {
+              const colour = rgb(getComputedStyle(e).backgroundColor);
+              if (colour.length < 4 || colour[3] > 0.5) return colour;
+            }
+            return [255, 255, 255];
+          };
+          return [...document.querySelectorAll('body *')].filter((e) =>
+            e.checkVisibility() && !e.closest(':disabled') && ![...e.querySelectorAll('*')].length
+            && e.textContent.trim())
+            .map((e) => {
+              const a = light(rgb(getComputedStyle(e).color)), b = light(behind(e));
+              const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+              return [e.id || e.className || e.tagName, ratio];
+            }).filter(([, ratio]) => ratio < 4.5);
+        }"""
+    )
+    assert poor == []
+
+
+def test_less_motion_is_no_motion(car: RunningRobot, visit: Visit) -> None:
+    """Whoever asks for less sees nothing that moves by itself, besides the picture."""
+    console = visit(car, reduced_motion="reduce")
+    console.await_state(link="open", view="cockpit")
+    console.page.evaluate("document.body.dataset.recording = 'true'")
+    assert console.page.evaluate("document.getAnimations().length") == 0
+
+
+def test_a_part_that_does_not_come_is_asked_for_again(chromium: Browser, car: RunningRobot) -> None:
+    """By loading the page anew, with the key still in hand."""
+    context = chromium.new_context(ignore_https_errors=True)
+    page = context.new_page()
+    lost: list[str] = []
+
+    def lose_once(route: Route) -> None:
+        if lost:
+            route.continue_()
+        else:
+            lost.append(route.request.url)
+            route.abort()
+
+    page.route("**/codec.js", lose_once)
+    page.goto(f"https://127.0.0.1:{car.port}/#key={car.known.key}")
+    page.locator("body[data-link='open'][data-view='cockpit']").wait_for()
+    assert len(lost) == 1
+    context.close()

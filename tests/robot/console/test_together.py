@@ -1,0 +1,245 @@
+"""Several who want the robot, a page that is slow, a robot that starts afresh, and recordings."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from shapechanger.demos.episodes import episodes_of, read_episode
+from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.remote.client import RobotClient
+from shapechanger.robot.profile import load
+from shapechanger.twin.running import RunningRobot, run_robot
+from tests.robot.console.browser import Console, Pins
+from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
+from tests.twin.robots import until
+
+Visit = Callable[..., Console]
+
+_DEADLINE_MS = 250.0
+_SLACK_MS = 60.0
+_SHIPPED = Path(load.__file__).parent / "shipped"
+
+
+@pytest.fixture(autouse=True)
+def _at_the_start(car: RunningRobot) -> None:
+    """There is room ahead."""
+    with car.operator() as operator:
+        operator.place(0)
+
+
+@contextlib.contextmanager
+def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
+    """A program that commands whenever it may; whether it drives now."""
+    drives, ended = threading.Event(), threading.Event()
+
+    def run() -> None:
+        with car.client(name="Expert", frames=False) as client:
+            until(lambda: _is_given(client), 60.0)
+            seen = client.ask().message
+            with contextlib.suppress(LinkError):
+                client.arm()
+            while not ended.is_set():
+                if seen.mine:
+                    client.command((0.0, throttle), answers=seen.seq)
+                else:
+                    client.acknowledge()
+                seen = client.observation(seen.seq).message
+                (drives.set if seen.mine and seen.armed else drives.clear)()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield drives
+    finally:
+        ended.set()
+        thread.join()
+
+
+def _is_given(client: RobotClient) -> bool:
+    """Whether a program may command: not until the robot heard that a page has left."""
+    with contextlib.suppress(RobotRefused):
+        client.take()
+        return True
+    return False
+
+
+def test_a_second_person_cannot_take_the_robot_from_the_first(
+    car: RunningRobot, visit: Visit
+) -> None:
+    """They are told who has it; but they can stop it."""
+    first, second, pins = visit(car), visit(car), Pins(car)
+    first.arm()
+    second.await_state(link="open", driver="person")
+    second.page.keyboard.press("e")
+    second.await_words("#log", "a person cannot take it from a person")
+    second.page.keyboard.down("s")
+    first.drive("w", pins, 1.0)
+    second.page.keyboard.up("s")
+    second.stop()
+    pins.await_rest()
+    first.await_state(robot="emergency", driver="me")
+    first.page.keyboard.up("w")
+
+
+def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit: Visit) -> None:
+    """At once, without arming again; what the program wants is seen, and it can have it back."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.page.keyboard.press("x")
+    console.await_state(robot="disarmed")
+    console.page.click("#leave")
+    with _program(car, throttle=0.3) as drives:
+        console.page.click("#enter")
+        console.await_state(link="open", driver="program")
+        if not drives.is_set():
+            console.page.keyboard.press("p")
+        pins.await_motion(1.0)
+        console.await_words("#actions", "+0.30")
+        console.page.locator("#legend-wanted").wait_for()
+        console.drive("s", pins, -1.0)
+        console.await_state(driver="me", robot="armed")
+        console.page.keyboard.up("s")
+        pins.await_rest()
+        console.stop()
+
+
+def test_a_slow_page_stops_its_robot_and_delays_nobody(
+    hasty_car: RunningRobot, visit: Visit
+) -> None:
+    """While its main thread hangs for two seconds, others are served; then nothing goes on."""
+    console, pins = visit(hasty_car), Pins(hasty_car)
+    console.arm()
+    console.drive("w", pins)
+    with hasty_car.client(frames=False) as observer:
+        console.page.evaluate(
+            "setTimeout(() => { const end = performance.now() + 2000;"
+            " while (performance.now() < end); document.body.dataset.hung = 'over'; })"
+        )
+        commands, seen = [0], 0
+
+        def rests() -> bool:
+            commands.append(observer.ask().message.command_ns or 0)
+            return pins.propels() == 0.0
+
+        until(rests, 60.0)
+        late_ms = (pins.last_rest_ns() - max(commands)) / 1e6
+        assert late_ms <= _DEADLINE_MS + _SLACK_MS
+        # Whoever else looks gets as many observations as ever: some before the page comes back.
+        while seen < 10:
+            observer.ask()
+            seen += 1
+    console.await_state(hung="over", robot="armed")
+    console.await_words("#log", "let go, and press again")
+    assert pins.propels() == 0.0
+    console.page.keyboard.up("w")
+    console.drive("w", pins)
+    console.page.keyboard.up("w")
+    console.stop()
+
+
+def test_a_page_comes_back_after_a_restart_and_drives_nothing(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    """It says so, tries again by itself, and waits to be armed."""
+    with socket.create_server(("127.0.0.1", 0)) as found:
+        port = found.getsockname()[1]
+    arguments = (*IN_A_ROOM, "--port", str(port))
+    profile = write_profile(tmp_path, PATIENT_CAR)
+    with (
+        run_robot(profile, folder=tmp_path, arguments=arguments) as robot,
+        Console(chromium, robot) as console,
+    ):
+        console.arm()
+        console.page.keyboard.down("w")
+        pins = Pins(robot)
+        pins.await_motion()
+        robot.forget_ready()
+        os.kill(robot.pid_of("daemon"), signal.SIGKILL)
+        console.await_state(link="waiting", robot="lost")
+        console.await_words("#connection", "Trying again")
+        robot.await_restart()
+        console.await_state(link="open")
+        console.page.locator("body[data-robot='emergency'], body[data-robot='disarmed']").wait_for()
+        assert pins.propels() == 0.0
+        console.await_words("#log", "Nothing moves until you arm it.")
+        console.page.keyboard.up("w")
+        console.arm()
+        console.drive("w", pins)
+        console.page.keyboard.up("w")
+        console.stop()
+
+
+def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
+    car: RunningRobot, visit: Visit, recordings: Path
+) -> None:
+    """The steps are on the robot's disk, with pictures, and the page shows them again."""
+    console, pins = visit(car), Pins(car)
+    console.arm()
+    console.page.keyboard.press("r")
+    console.await_state(recording="true")
+    console.drive("w", pins)
+    console.page.keyboard.press("m")
+    console.await_words("#recorder-state", "1 mark")
+    console.page.keyboard.up("w")
+    console.page.keyboard.press("u")
+    console.await_words("#recorder-state", "undone")
+    steps = int(str(console.page.text_content("#recorder-state")).split()[1])
+    console.page.keyboard.down("s")
+    until(
+        lambda: int(str(console.page.text_content("#recorder-state")).split()[1]) > steps + 5, 60.0
+    )
+    console.page.keyboard.up("s")
+    console.page.keyboard.press("r")
+    console.await_state(recording="false")
+    console.await_words("#recorder-state", "Recorded")
+    (path,) = episodes_of(recordings)
+    until(lambda: read_episode(path).closed, 60.0)
+    episode = read_episode(path)
+    assert len(episode.marks) == 1
+    assert 0 < len(episode.kept) < len(episode.steps)
+    assert any(step.action[1] < 0.0 for step in episode.kept)
+    assert all(episode.jpeg(step) for step in episode.steps)
+
+    console.page.click("#browse")
+    console.page.locator("#episode-list button").first.click()
+    console.await_words("#episodes-state", "All of it is here.")
+    console.page.fill("#scrub", str(len(episode.steps) - 1))
+    console.await_words("#step-state", "person:")
+    console.page.click("#range-from")
+    console.page.click("#judge-bad")
+    until(lambda: len(read_episode(path).kept) == len(episode.kept) - 1, 60.0)
+    console.await_words("#step-state", "bad")
+    console.page.click("#judge-good")
+    until(lambda: len(read_episode(path).kept) == len(episode.kept), 60.0)
+    console.page.keyboard.press("Space")
+    console.await_state(robot="emergency")
+
+
+def test_a_finger_is_driven_by_sliders_that_hold(chromium: Browser, tmp_path: Path) -> None:
+    """Seven tendons begin where they are, and each goes where its slider is put."""
+    (tmp_path / "finger.toml").write_text((_SHIPPED / "finger-pwm.toml").read_text())
+    with (
+        run_robot(tmp_path / "finger.toml", folder=tmp_path, arguments=IN_A_ROOM) as robot,
+        Console(chromium, robot) as console,
+        robot.client(frames=False) as observer,
+    ):
+        console.arm()
+        assert console.page.locator("#actions input").count() == 7
+        assert console.page.locator("#pad").is_hidden()
+        for _ in range(5):
+            assert observer.ask().message.action_applied == pytest.approx((0.1,) * 7)
+        console.page.locator("#actions input").nth(3).fill("0.5")
+        wanted = (0.1, 0.1, 0.1, 0.5, 0.1, 0.1, 0.1)
+        until(
+            lambda: observer.ask().message.action_applied == pytest.approx(wanted, abs=0.01), 60.0
+        )
+        console.stop()

@@ -1,0 +1,183 @@
+"""What was recorded, as others see it: the same bytes, bounded, and nothing outside the folder."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, drop, keep, read_episode
+from shapechanger.link.messages import (
+    MAX_EPISODES,
+    MAX_PIECE,
+    Browse,
+    Fetch,
+    Judge,
+    Piece,
+    Recordings,
+    Refused,
+)
+from shapechanger.robot.daemon.library import Answer, Library, Question
+from shapechanger.robot.daemon.summaries import Summaries
+from tests.robot.daemon.plans import ACTIONS, picture
+
+HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
+Ask = Callable[[Question], Answer]
+
+
+@pytest.fixture
+def ask(tmp_path: Path) -> Iterator[Ask]:
+    """Ask about the recordings of a folder, and wait for the answer."""
+    library = Library(tmp_path, lambda work: work())
+
+    def asked(question: Question) -> Answer:
+        answers: list[Answer] = []
+        answered = threading.Event()
+        library.ask(question, lambda answer: (answers.append(answer), answered.set()))
+        assert answered.wait(20.0)
+        return answers[0]
+
+    yield asked
+    library.close()
+
+
+def record(folder: Path, count: int, outcome: str = "") -> Path:
+    """An episode with a new picture at every second step, and a mark."""
+    with EpisodeWriter.create(folder, HEADER) as writer:
+        for number in range(count):
+            jpeg = picture(number) if number % 2 == 0 else None
+            writer.add(Step(action=(0.0, number / count), driver="person"), jpeg)
+            if number == 1:
+                writer.mark("é ☃")
+        writer.close(outcome)
+    return writer.path
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 100_000])
+def test_the_pieces_put_together_are_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
+    """To the last byte, however many lines are asked for at a time."""
+    path = record(tmp_path, 60)
+    lines, shown, pictures = b"", None, []
+    at, total = 0, 1
+    while at < total:
+        piece = ask(Fetch(episode=path.name, first=at, count=count))
+        assert isinstance(piece, Piece)
+        assert 1 <= len(piece.lines) <= count
+        assert piece.header.encode() == (path / "episode.json").read_bytes()
+        for line, jpeg in zip(piece.lines, piece.frames, strict=True):
+            lines += line.encode() + b"\n"
+            if '"kind":"step"' in line:
+                shown = jpeg or shown
+                pictures.append(shown)
+        at, total = at + len(piece.lines), piece.total
+    assert lines == (path / "steps.jsonl").read_bytes()
+    episode = read_episode(path)
+    assert pictures == [episode.jpeg(step) for step in episode.steps]
+
+
+def test_a_piece_is_cut_where_it_would_be_too_large(ask: Ask, tmp_path: Path) -> None:
+    """One that is large by itself comes alone."""
+    large = b"\xff\xd8" + bytes(MAX_PIECE)
+    with EpisodeWriter.create(tmp_path, HEADER) as writer:
+        for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
+            writer.add(Step(action=(0.0, 0.0), driver="person"), jpeg)
+    name = writer.path.name
+    pieces = [ask(Fetch(episode=name, first=first)) for first in range(4)]
+    assert [len(p.lines) for p in pieces if isinstance(p, Piece)] == [1, 1, 1]
+    assert isinstance(pieces[3], Refused)
+    assert "too large" in pieces[3].reason
+
+
+@given(
+    count=st.integers(0, 40),
+    said=st.lists(st.tuples(st.booleans(), st.integers(0, 39), st.integers(0, 39)), max_size=5),
+)
+@settings(max_examples=25)
+def test_a_summary_says_what_reading_the_whole_episode_says(
+    tmp_path_factory: pytest.TempPathFactory, count: int, said: list[tuple[bool, int, int]]
+) -> None:
+    """Though it does not read it all; and again after each judgement."""
+    folder = tmp_path_factory.mktemp("kept")
+    path = record(folder, count, "time")
+    summaries = Summaries(folder)
+    for good, one, other in [(True, 0, 0), *said]:
+        first, last = sorted((one, other))
+        if last < count:
+            (keep if good else drop)(path, first, last, "bad")
+        episode, summary = read_episode(path), summaries.summary(path.name)
+        assert (summary.steps, summary.kept) == (len(episode.steps), len(episode.kept))
+        assert summary.seconds == episode.seconds
+        assert (summary.closed, summary.outcome) == (episode.closed, episode.outcome)
+        assert (summary.created, summary.driver) == (episode.header.created, "Ada")
+
+
+def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
+    """The rest is asked for by the last one; what is no episode is not in it."""
+    (tmp_path / "notes.txt").touch()
+    (tmp_path / "empty").mkdir()
+    (tmp_path / ".hidden").mkdir()
+    (tmp_path / ".hidden" / "steps.jsonl").touch()
+    first = record(tmp_path, 1)
+    for number in range(1, MAX_EPISODES + 3):
+        other = tmp_path / f"{first.name[:-4]}{number + 1:04d}"
+        other.mkdir()
+        for name in ("episode.json", "steps.jsonl"):
+            (other / name).write_bytes((first / name).read_bytes())
+    newest = ask(Browse())
+    assert isinstance(newest, Recordings)
+    ids = [episode.id for episode in newest.episodes]
+    assert newest.more
+    assert len(ids) == MAX_EPISODES
+    assert ids == sorted(ids, reverse=True)
+    rest = ask(Browse(before=ids[-1]))
+    assert isinstance(rest, Recordings)
+    assert not rest.more
+    assert [episode.id for episode in rest.episodes][-1] == first.name
+    assert len(rest.episodes) == 3
+
+
+def test_nothing_outside_the_folder_is_shown(ask: Ask, tmp_path: Path) -> None:
+    """Not by a name, which the message itself refuses, nor by a link."""
+    elsewhere = record(tmp_path / "elsewhere", 2)
+    (tmp_path / "linked").symlink_to(elsewhere)
+    for name in ("linked", "elsewhere", f"elsewhere/{elsewhere.name}", "..", ".", ""):
+        for question in (Fetch(episode=name), Judge(episode=name, first=0, last=0)):
+            answer = ask(question)
+            assert isinstance(answer, Refused)
+            assert "There is no episode" in answer.reason
+    assert ask(Browse()) == Recordings(episodes=())
+    assert len(read_episode(elsewhere).kept) == 2
+
+
+def test_a_line_cannot_name_a_file_elsewhere(ask: Ask, tmp_path: Path) -> None:
+    """However it came onto the disk."""
+    path = record(tmp_path, 1)
+    (tmp_path / "secret.jpg").write_bytes(b"secret")
+    (path / "steps.jsonl").write_text(
+        '{"kind":"step","step":0,"frame":["../../secret.jpg",6,""]}\n'
+    )
+    answer = ask(Fetch(episode=path.name))
+    assert isinstance(answer, Refused)
+    assert "damaged" in answer.reason
+
+
+def test_what_is_damaged_is_said_and_the_rest_is_shown(ask: Ask, tmp_path: Path) -> None:
+    """In the list and in the answer; a last line that is cut off is not there yet."""
+    path = record(tmp_path, 4)
+    with (path / "steps.jsonl").open("ab") as file:
+        file.write(b'{"kind":"drop","first":0,"la')
+    piece = ask(Fetch(episode=path.name))
+    assert isinstance(piece, Piece)
+    assert (piece.total, len(piece.lines)) == (5, 5)
+    (path / "frames" / "000002.jpg").unlink()
+    missing = ask(Fetch(episode=path.name))
+    assert isinstance(missing, Refused)
+    assert "000002.jpg" in missing.reason
+    (path / "episode.json").write_text("{")
+    found = ask(Browse())
+    assert isinstance(found, Recordings)
+    assert "cannot be read" in found.episodes[0].outcome

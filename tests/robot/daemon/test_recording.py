@@ -1,0 +1,420 @@
+"""Recording on a daemon over real sockets: who may, what is written, and what others are told."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, read_episode
+from shapechanger.link.messages import (
+    MAX_PIECE,
+    Acknowledge,
+    Browse,
+    Command,
+    EpisodeSummary,
+    Event,
+    Fetch,
+    Judge,
+    Mark,
+    Observation,
+    Piece,
+    Ping,
+    Pong,
+    Record,
+    RecorderState,
+    Recordings,
+    Refused,
+    Suggest,
+    Undo,
+    encode,
+)
+from shapechanger.robot.daemon.credentials import make_credentials
+from tests.robot.daemon.plans import ACTIONS, car_plan, picture
+from tests.robot.daemon.running import Client, Running, running, until
+
+
+@pytest.fixture
+def play(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """Run a script against a daemon that keeps recordings."""
+
+    def played(script: Any, **plan: Any) -> None:
+        async def run() -> None:
+            fields = {"recordings": str(tmp_path / "kept"), "arming": "anyone"} | plan
+            async with running(car_plan(**fields), monkeypatch) as robot:
+                await script(robot)
+
+        asyncio.run(run())
+
+    return played
+
+
+async def recording(client: Client, on: bool = True) -> RecorderState:
+    """Begin or end, and wait until the disk says so."""
+    await client.say(Record(on=on, name="corridor"))
+    while True:
+        state = await client.expect(RecorderState)
+        if state.recording == on and state.episode:
+            return state
+
+
+async def drive(robot: Running, client: Client, first: int, count: int) -> list[Observation]:
+    """Command so many times, each in answer to an observation with a new picture."""
+    seen: list[Observation] = []
+    for seq in range(first, first + count):
+        robot.show()
+        await until(lambda: robot.daemon._cockpit.newest is not None, "there is a picture")
+        answered = await client.observe()
+        seen.append(answered)
+        await client.say(Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5))
+        await client.expect(Observation)
+    return seen
+
+
+def only(folder: Path) -> Path:
+    """The one episode of a recording."""
+    (episode,) = (path for path in folder.iterdir() if not path.name.startswith("."))
+    return episode
+
+
+def test_a_step_is_what_was_seen_and_what_was_decided_on_seeing_it(
+    play: Any, tmp_path: Path
+) -> None:
+    """With the picture as the camera gave it, what the outputs did, and the robot's times."""
+    seen: list[Observation] = []
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person", name="Grace") as person:
+            await person.obtain()
+            await robot.arm(person)
+            await until(lambda: robot.guard.state.armed, "it is armed")
+            await until(lambda: robot.daemon._cockpit.state.armed, "that is known")
+            began = await recording(person)
+            assert (began.steps, began.dropped, began.text) == (0, 0, "")
+            seen.extend(await drive(robot, person, 1, 12))
+            await person.say(Mark(text="a corner\n"))
+            while (state := await person.expect(RecorderState)).marks == 0:
+                pass
+            assert state.steps == 12
+            ended = await recording(person, on=False)
+            assert (ended.steps, ended.marks, ended.episode) == (12, 1, began.episode)
+
+    play(script)
+    episode = read_episode(only(tmp_path / "kept"))
+    assert episode.closed
+    assert episode.outcome == ""
+    header = episode.header
+    assert (header.driver, header.robot, header.body) == ("Grace", "test car", "car")
+    assert (header.clock, header.image_size, header.control_hz) == ("real", (160, 120), 20.0)
+    assert header.notes == {"name": "corridor", "recorded_by": "Grace"}
+    assert [mark.text for mark in episode.marks] == ["a corner"]
+    assert len(episode.steps) == len(seen) == 12
+    for number, (step, observation) in enumerate(zip(episode.steps, seen, strict=True), 1):
+        assert step.action == (0.05, 0.5 * (number / 100))
+        assert step.applied == step.action
+        assert step.driver == "person"
+        assert step.captured_ns == observation.captured_ns
+        assert step.decided_ns > observation.sent_ns  # type: ignore[operator]
+        assert step.wanted is None
+        assert episode.jpeg(step) in {picture(n) for n in range(1, 13)}
+    assert len({step.frame for step in episode.steps}) > 6
+
+
+def test_nothing_is_recorded_while_the_outputs_are_at_rest(play: Any, tmp_path: Path) -> None:
+    """A robot that stands disarmed shows nothing that could be learned."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person:
+            await person.obtain()
+            await recording(person)
+            await drive(robot, person, 1, 3)
+            assert (await recording(person, on=False)).steps == 0
+
+    play(script)
+    assert read_episode(only(tmp_path / "kept")).steps == ()
+
+
+def test_an_episode_goes_on_when_another_one_drives(play: Any, tmp_path: Path) -> None:
+    """Each step tells who decided it, and what the program wanted while a person drove."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person, robot.client(name="net") as program:
+            await program.obtain()
+            await robot.arm(program)
+            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await recording(person)
+            await drive(robot, program, 1, 3)
+            await person.obtain()
+            suggestion = await program.observe()
+            await program.say(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
+            assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
+            (answered,) = await drive(robot, person, 1, 1)
+            assert (answered.suggested, answered.suggested_by) == ((-1.0, 5.0), "net")
+            assert (answered.holder_role, answered.mine) == ("person", True)
+            assert (await person.observe()).commanded == (0.05, 0.005)
+            assert (await recording(person, on=False)).steps == 4
+
+    play(script, deadline_ms=60_000, control_hz=200.0)
+    steps = read_episode(only(tmp_path / "kept")).steps
+    assert [step.driver for step in steps] == ["program", "program", "program", "person"]
+    assert [step.wanted for step in steps] == [None, None, None, (-1.0, 5.0)]
+
+
+def test_undo_drops_what_was_recorded_last(play: Any, tmp_path: Path) -> None:
+    """It stays on the disk and does not count; with nothing left, that is said."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person:
+            await robot.armed(person)
+            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await recording(person)
+            await drive(robot, person, 1, 5)
+            await person.say(Undo(seconds=3_600.0))
+            while (await person.expect(RecorderState)).dropped != 5:
+                pass
+            await person.say(Undo())
+            assert (await person.expect(Refused)).reason == "There is nothing to undo."
+            await recording(person, on=False)
+            for nothing in (Undo(), Mark(), Record(on=False)):
+                await person.say(nothing)
+                assert (await person.expect(Refused)).reason == "Nothing is being recorded."
+
+    play(script)
+    episode = read_episode(only(tmp_path / "kept"))
+    assert (len(episode.steps), episode.kept) == (5, ())
+
+
+def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
+    """A program may look at what was recorded."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as program:
+            for wish in (
+                Record(on=True),
+                Record(on=False),
+                Mark(),
+                Undo(),
+                Judge(episode="x", first=0, last=0),
+            ):
+                await program.say(wish)
+                assert "Only a person" in (await program.expect(Refused)).reason
+            await program.say(Browse())
+            assert (await program.expect(Recordings)) == Recordings(episodes=())
+
+    play(script)
+    assert not (tmp_path / "kept").exists()
+
+
+def test_a_robot_without_a_folder_says_so(play: Any) -> None:
+    """In its welcome, and to whoever asks all the same."""
+
+    async def script(robot: Running) -> None:
+        async with robot.connect() as person:
+            assert (await person.greet(role="person")).can_record is False
+            for wish in (Record(on=True), Browse(), Fetch(episode="x")):
+                await person.say(wish)
+                assert "without a folder" in (await person.expect(Refused)).reason
+
+    play(script, recordings="")
+
+
+def test_recording_is_refused_in_words_where_the_disk_says_no(play: Any, tmp_path: Path) -> None:
+    """To whoever asked; and to everybody, that nothing is recorded."""
+    (tmp_path / "kept").write_text("in the way")
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person, robot.client() as program:
+            await person.say(Record(on=True))
+            assert "Cannot write" in (await person.expect(Refused)).reason
+            assert "Cannot write" in (await program.expect(RecorderState)).text
+            assert not (await person.expect(RecorderState)).recording
+
+    play(script)
+
+
+def test_recording_ends_by_itself_with_a_sentence_and_the_robot_drives_on(
+    play: Any, tmp_path: Path
+) -> None:
+    """Somebody takes the folder away in the middle of it."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person:
+            await robot.armed(person)
+            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await recording(person)
+            await drive(robot, person, 1, 2)
+            frames = only(tmp_path / "kept") / "frames"
+            frames.rename(frames.with_name("elsewhere"))
+            seq = 3
+            while robot.daemon._cockpit.recorder.on:
+                await drive(robot, person, seq, 1)
+                seq += 1
+            told = [m for m in person.heard if isinstance(m, RecorderState)]
+            while not told[-1].text:
+                told.append(await person.expect(RecorderState))
+            assert "Cannot write" in told[-1].text
+            assert not told[-1].recording
+            assert (await person.drive(seq)).applied_seq == seq
+            await recording(person)  # And the next one begins.
+
+    play(script)
+
+
+def test_two_cannot_record_into_one_folder(play: Any, tmp_path: Path) -> None:
+    """Not two persons on one robot, and not two robots."""
+    header = EpisodeHeader(action_layout=ACTIONS.to_json())
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as one, robot.client(role="person") as two:
+            with EpisodeWriter.create(tmp_path / "kept", header):
+                await one.say(Record(on=True))
+                assert "already" in (await one.expect(Refused)).reason
+            await recording(one)
+            await two.say(Record(on=True))
+            assert "recorded already" in (await two.expect(Refused)).reason
+            await recording(two, on=False)
+
+    play(script)
+
+
+def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -> None:
+    """Nobody would be left who could end it; a program that drives on is told."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as program:
+            async with robot.client(role="person") as one:
+                async with robot.client(role="person") as two:
+                    await recording(two)
+                async with robot.client(role="person") as late:
+                    assert (await late.expect(RecorderState)).recording
+            del one
+            while not (state := await program.expect(RecorderState)).text:
+                assert state.recording
+            assert "last person" in state.text
+
+    play(script)
+    assert "last person" in read_episode(only(tmp_path / "kept")).outcome
+
+
+def test_everybody_is_told_each_second(play: Any) -> None:
+    """How many steps there are by now."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person, robot.client() as program:
+            await robot.armed(person)
+            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await recording(person)
+            await drive(robot, person, 1, 3)
+            await program.say(Acknowledge())
+            while (await program.expect(RecorderState)).steps < 2:
+                pass
+
+    play(script)
+
+
+def test_the_episode_is_closed_when_the_daemon_ends(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Properly, as if a person had ended it."""
+
+    async def run() -> None:
+        async with (
+            running(car_plan(recordings=str(tmp_path)), monkeypatch) as robot,
+            robot.client(role="person") as person,
+        ):
+            await robot.armed(person)
+            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await recording(person)
+            await drive(robot, person, 1, 4)
+            robot.daemon.end()
+            await robot.task
+
+    asyncio.run(run())
+    episode = read_episode(only(tmp_path))
+    assert (episode.closed, episode.outcome, len(episode.steps)) == (True, "", 4)
+
+
+def test_what_was_recorded_can_be_seen_fetched_and_judged(play: Any, tmp_path: Path) -> None:
+    """The list, the lines and pictures as they are on the disk, and steps that are bad."""
+    header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
+    with EpisodeWriter.create(tmp_path / "kept", header) as writer:
+        for number in range(30):
+            jpeg = picture(number) if number % 3 == 0 else None
+            writer.add(Step(action=(0.0, number / 30), driver="person"), jpeg)
+        name = writer.path.name
+
+    async def script(robot: Running) -> None:
+        async with robot.client(role="person") as person:
+            await person.say(Browse())
+            (summary,) = (await person.expect(Recordings)).episodes
+            assert summary == EpisodeSummary(
+                id=name,
+                steps=30,
+                kept=30,
+                seconds=3.0,
+                closed=True,
+                created=summary.created,
+                driver="Ada",
+                outcome="",
+            )
+            await person.say(Judge(episode=name, first=10, last=14))
+            (summary,) = (await person.expect(Recordings)).episodes
+            assert (summary.kept, summary.seconds) == (25, 2.5)
+            await person.say(Judge(episode=name, first=12, last=12, keep=True))
+            assert (await person.expect(Recordings)).episodes[0].kept == 26
+            await person.say(Judge(episode=name, first=0, last=99))
+            assert "has the steps 0 to 29" in (await person.expect(Refused)).reason
+            await person.say(Fetch(episode=name, first=28, count=100))
+            piece = await person.expect(Piece)
+            assert (piece.first, piece.total, len(piece.lines)) == (28, 32, 4)
+            assert piece.frames == (picture(27), None, None, None)
+            assert json.loads(piece.header)["driver"] == "Ada"
+            await person.say(Fetch(episode=name, first=32))
+            assert (await person.expect(Piece)).lines == ()
+            await person.say(Fetch(episode="20260101T000000Z-0001"))
+            assert "There is no episode" in (await person.expect(Refused)).reason
+
+    play(script)
+
+
+def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> None:
+    """Answers are large, so who asks many at once cannot fill the robot's memory."""
+    header = EpisodeHeader(action_layout=ACTIONS.to_json())
+    with EpisodeWriter.create(tmp_path / "kept", header) as writer:
+        for number in range(200):
+            writer.add(Step(action=(0.0, 0.5), driver="person"), picture(number))
+        name = writer.path.name
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as program:
+            for _ in range(40):
+                await program.say(Fetch(episode=name))
+            await program.say(Browse())
+            refused = await program.expect(Refused)
+            assert "one question" in refused.reason
+            await program.say(Ping(token=1))
+            await program.expect(Pong)
+            pieces = [m for m in program.heard if isinstance(m, Piece)]
+            assert all(0 < len(encode(piece)) < MAX_PIECE + 100_000 for piece in pieces)
+            assert len(pieces) < 40
+
+    play(script)
+
+
+def test_who_is_only_told_things_stays_for_all_of_them(play: Any, tmp_path: Path) -> None:
+    """Over TLS, too, where a message that has left once seemed to wait for the next one."""
+    made = make_credentials(tmp_path / "credentials", "test car")
+    secured = {"certificate": str(made.certificate), "private_key": str(made.private_key)}
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as program:
+            for number in range(6):
+                robot.daemon._cockpit.event("news", str(number))
+                while (heard := await program.expect(Event)).name != "news":
+                    pass
+                assert heard.text == str(number)
+
+    play(script, **secured)

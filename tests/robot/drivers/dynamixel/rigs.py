@@ -1,0 +1,83 @@
+"""A rig of seven tendons on a twin's line, and its driver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.dynamixel.state import BusState
+from shapechanger.twin.servos.line import Line
+from shapechanger.twin.servos.port import LinePort
+from shapechanger.twin.servos.servo import Servo, ServoPlan
+
+NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
+"""The tendons; their servos have the ids 1 to 7."""
+
+CYCLE_NS = 10_000_000
+"""Time between two cycles."""
+
+MODEL = "XL330-M077"
+
+
+def servo(name: str, **changes: Any) -> ServoSettings:
+    """The settings of one of the seven."""
+    plain = ServoSettings(
+        name=name,
+        id=NAMES.index(name) + 1,
+        model=MODEL,
+        spool_radius_m=0.005,
+        most_tension_n=20.0,
+        pretension_n=2.0,
+        homing_n=3.0,
+    )
+    return replace(plain, **changes)
+
+
+def settings(**changes: Any) -> BusSettings:
+    """The settings of the bus."""
+    return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
+
+
+class Rig:
+    """The line, the port and the driver, whose clocks go together.
+
+    Args:
+        bus: Its settings.
+        plans: Its servos; None for seven as in the settings.
+    """
+
+    def __init__(
+        self, bus: BusSettings | None = None, plans: list[ServoPlan] | None = None
+    ) -> None:
+        self.settings = settings() if bus is None else bus
+        if plans is None:
+            plans = [ServoPlan(one.id, MODEL, angle=2.0 * one.id) for one in self.settings.servos]
+        self.line = Line(plans)
+        self.port = LinePort(self.line)
+        self.bus = ServoBus(self.settings, lambda _: self.port)
+
+    def start(self) -> Rig:
+        """Set it up and hold it, with the zeros where the spools are."""
+        self.bus.set_up()
+        self.bus.set_zeros({name: self.twin(name).register(132) for name in NAMES})
+        self.bus.hold()
+        return self
+
+    def twin(self, name: str) -> Servo:
+        """The simulated servo of a tendon."""
+        return self.line.servos[NAMES.index(name) + 1]
+
+    def run(self, tension: float | None, cycles: int = 1, **others: float) -> BusState:
+        """Pull all tendons alike, but for some, for so many cycles; the last state."""
+        assert cycles > 0
+        for _ in range(cycles):
+            tensions = None if tension is None else dict.fromkeys(NAMES, tension) | others
+            state = self.bus.cycle(tensions, self.line.now_ns)
+            self.line.advance(CYCLE_NS)
+        return state
+
+    def pulls(self) -> list[float]:
+        """The current that each simulated servo is told to let flow, A."""
+        return [one.pulls_a for one in self.line.servos.values()]

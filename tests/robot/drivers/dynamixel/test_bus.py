@@ -1,0 +1,221 @@
+"""The driver with seven servos that are well."""
+
+import math
+
+import pytest
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.twin.servos.servo import ServoPlan
+from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, servo, settings
+
+
+def test_all_that_are_missing_are_named() -> None:
+    """Who wires a rig wants to know of each at once."""
+    rig = Rig()
+    rig.twin("FDS").faults.mute = rig.twin("PI").faults.deaf = True
+    words = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
+    with pytest.raises(RobotError, match=words):
+        rig.bus.set_up()
+
+
+def test_another_model_is_refused() -> None:
+    """The wrong model would pull with the wrong strength."""
+    plans = [ServoPlan(i, "XL330-M288" if i == 3 else MODEL) for i in range(1, 8)]
+    with pytest.raises(RobotError, match=r"EIP \(id 3\) is no XL330-M077.* is 1200, not 1190"):
+        Rig(plans=plans).bus.set_up()
+
+
+def test_firmware_without_a_watchdog_is_refused() -> None:
+    """A servo that does not stop by itself is not let near a finger."""
+    bus = settings(servos=(servo("FDP", model="XM430-W210", pretension_n=2.0),))
+    with pytest.raises(RobotError, match="firmware 37; its own watchdog needs 38"):
+        Rig(bus, [ServoPlan(1, "XM430-W210", firmware=37)]).bus.set_up()
+
+
+def test_servos_are_ready_and_slack_before_they_have_torque() -> None:
+    """Mode, caps, goal and watchdog are there first, and a change of mode leaves no goal behind."""
+    rig = Rig()
+    rig.bus.set_up()
+    for one in rig.line.servos.values():
+        assert not one.has_torque
+        registers = [one.register(at) for at in (9, 10, 11, 38, 98, 102)]
+        assert registers == [0, 0, 0, 683, 5, 0]  # 683 counts of 0.0293 N are 19.98 N.
+    rig.bus.hold()
+    assert all(one.has_torque for one in rig.line.servos.values())
+    assert rig.pulls() == [0.0] * 7
+
+
+def test_the_torque_comes_last() -> None:
+    """Each servo hears its goal and its watchdog before its torque, whatever it had before."""
+    rig = Rig()
+    rig.bus.set_up()
+    rig.port.sent.clear()
+    rig.bus.hold()
+    written = [(p[4], int.from_bytes(p[8:10], "little")) for p in rig.port.sent if p[7] == 3]
+    for servo_id in range(1, 8):
+        assert [at for one, at in written if one == servo_id] == [98, 102, 98, 64]
+
+
+def test_what_lasts_is_not_written_twice() -> None:
+    """EEPROM wears out: a second start writes none of it."""
+    rig = Rig()
+    rig.bus.set_up()
+    rig.port.sent.clear()
+    rig.bus.set_up()
+    written = [p[8] for p in rig.port.sent if p[7] in (3, 0x83)]
+    assert written
+    assert all(at >= 64 for at in written)
+
+
+def test_nothing_is_held_before_it_is_set_up() -> None:
+    """The caps are not there yet."""
+    with pytest.raises(RobotError, match="not held: they are not set up"):
+        Rig().bus.hold()
+
+
+def test_a_cycle_pulls_and_tells() -> None:
+    """The tendon gets the tension that was asked for, to a count and the gears' friction."""
+    rig = Rig().start()
+    state = rig.run(6.0, 150)
+    said = state.servos["EDC"]
+    assert state.reason == ""
+    assert set(state.servos) == set(NAMES)
+    assert said.goal_n == pytest.approx(6.0, abs=0.03)
+    assert said.tension_n == pytest.approx(6.0, abs=0.03)
+    assert rig.twin("EDC").motor.tension == pytest.approx(6.0, abs=1.05)  # 1 N of friction.
+    assert said.length_m is not None
+    assert said.length_m == pytest.approx(-rig.twin("EDC").motor.tension / 300.0, abs=1e-3)
+    assert said.voltage_v == pytest.approx(5.0)
+
+
+def test_a_spool_that_is_wound_the_other_way_pulls_too() -> None:
+    """Direction turns the current, the speed and the length round."""
+    bus = settings(servos=tuple(servo(name, direction=-1) for name in NAMES))
+    rig = Rig(bus)
+    for one in rig.line.servos.values():
+        one.plan.tendon.direction = -1
+    state = rig.start().run(6.0, 150)
+    assert min(rig.pulls()) == pytest.approx(-0.205, abs=0.001)
+    assert state.servos["PI"].tension_n == pytest.approx(6.0, abs=0.03)
+    assert rig.twin("PI").motor.tension > 4.0
+    assert (state.servos["PI"].length_m or 0.0) < -0.01
+
+
+def test_tensions_are_kept_between_pretension_and_cap() -> None:
+    """More is capped and said to be; less is the pretension."""
+    rig = Rig().start()
+    state = rig.run(500.0, LUM=-3.0)
+    assert state.servos["FDP"].is_capped
+    assert state.servos["FDP"].goal_n == pytest.approx(20.0, abs=0.03)
+    assert not state.servos["LUM"].is_capped
+    assert state.servos["LUM"].goal_n == pytest.approx(2.0, abs=0.03)
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_moves_nothing(wrong: float) -> None:
+    """Not even the tendons before it in the list."""
+    rig = Rig().start()
+    rig.run(4.0)
+    before, sent = rig.pulls(), len(rig.port.sent)
+    with pytest.raises(RobotError, match=r"Servo DI \(id 6\) cannot pull"):
+        rig.run(9.0, DI=wrong)
+    assert (rig.pulls(), len(rig.port.sent)) == (before, sent)
+    rig.run(None)
+    assert rig.pulls() == before  # Nor later.
+
+
+def test_a_tension_too_few_or_too_many_is_refused() -> None:
+    """A tendon that nobody spoke of, and one that does not exist."""
+    rig = Rig().start()
+    with pytest.raises(RobotError, match="no tension for EIP, EDC"):
+        rig.bus.cycle(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0), 0)
+    with pytest.raises(UnknownName, match="Did you mean 'EDC'"):
+        rig.run(3.0, EDX=3.0)
+
+
+def test_a_stop_goes_down_to_the_pretension_and_lets_go() -> None:
+    """Within the time it was given, and never up."""
+    rig = Rig().start()
+    rig.run(12.0, 50)
+    rig.bus.stop(rig.line.now_ns)
+    goals: list[float] = []
+    for _ in range(40):
+        state = rig.run(None)
+        goals.append(state.servos["FDS"].goal_n)
+        if state.mode == "off":
+            break
+    assert len(goals) == 31  # 300 ms.
+    assert goals == sorted(goals, reverse=True)
+    assert goals[0] == pytest.approx(12.0, abs=0.03)
+    assert goals[15] == pytest.approx(7.0, abs=0.03)
+    assert not any(one.has_torque for one in rig.line.servos.values())
+
+
+def test_a_command_does_not_end_a_stop() -> None:
+    """Who stops, stops."""
+    rig = Rig().start()
+    rig.run(12.0, 5)
+    rig.bus.stop(rig.line.now_ns)
+    state = rig.run(12.0, 31)
+    assert state.mode == "off"
+    rig.run(12.0, 5)
+    assert rig.pulls() == [0.0] * 7
+
+
+def test_a_stop_before_the_first_pull_does_not_pull() -> None:
+    """Slack tendons stay slack."""
+    rig = Rig().start()
+    rig.bus.stop(rig.line.now_ns)
+    rig.run(None, 5)
+    assert rig.pulls() == [0.0] * 7
+
+
+def test_it_can_be_held_again_after_a_stop() -> None:
+    """And then it pulls as before."""
+    rig = Rig().start()
+    rig.run(5.0, 5)
+    rig.bus.stop(rig.line.now_ns)
+    rig.run(None, 31)
+    rig.bus.hold()
+    assert rig.run(5.0, 20).reason == ""
+    assert min(rig.pulls()) > 0.1
+
+
+def test_close_leaves_no_torque() -> None:
+    """And lets go of the port."""
+    rig = Rig().start()
+    rig.run(5.0, 5)
+    rig.bus.close()
+    assert not any(one.has_torque for one in rig.line.servos.values())
+    assert rig.port.is_closed
+
+
+def test_a_cycle_costs_three_packets() -> None:
+    """Goals, present values and one register that shows whether they obey: 390 bytes or less.
+
+    At 1 Mbaud these take 3.9 ms, so 100 cycles a second leave the bus some rest.
+    """
+    rig = Rig().start()
+    rig.run(5.0)
+    rig.port.sent.clear()
+    busy_ns = rig.line.busy_ns
+    rig.run(5.0, 4)
+    assert [p[7] for p in rig.port.sent] == [0x83, 0x82, 0x82] * 4
+    assert (rig.line.busy_ns - busy_ns) / 4 < 0.45 * CYCLE_NS
+
+
+def test_what_is_told_acts_without_a_cycle() -> None:
+    """One packet, nothing asked; and only while the servos are held."""
+    rig = Rig()
+    rig.bus.set_up()
+    rig.port.sent.clear()
+    rig.bus.tell(dict.fromkeys(NAMES, 6.0))
+    assert rig.port.sent == []
+    rig.bus.hold()
+    rig.port.sent.clear()
+    rig.bus.tell(dict.fromkeys(NAMES, 6.0))
+    assert [packet[7] for packet in rig.port.sent] == [0x83]
+    assert rig.pulls() == pytest.approx([0.205] * 7, abs=0.001)
+    rig.port.is_gone = True
+    rig.bus.tell(dict.fromkeys(NAMES, 7.0))
+    assert "is gone" in rig.bus.cycle(None, rig.line.now_ns).reason

@@ -1,0 +1,269 @@
+"""Each thing that can go wrong: what is said, and what happens to the tendons."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.state import BusState
+from shapechanger.twin.servos.servo import ServoPlan
+from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
+
+
+def _hot(rig: Rig) -> None:
+    rig.twin("EIP").motor.temperature = 68.0
+
+
+def _switched_off_by_heat(rig: Rig) -> None:
+    rig.twin("EIP").motor.temperature = 75.0
+
+
+def _low(rig: Rig) -> None:
+    # Its own limit is at 3.5 V too, but this one is told to bear less.
+    rig.twin("EIP").volts = 3.4
+
+
+def _overloaded(rig: Rig) -> None:
+    rig.twin("EIP").overload()
+
+
+def _mute(rig: Rig) -> None:
+    rig.twin("EIP").faults.mute = True
+
+
+def _deaf(rig: Rig) -> None:
+    rig.twin("EIP").faults.deaf = True
+
+
+def _late(rig: Rig) -> None:
+    rig.twin("EIP").faults.late_ns = 8_000_000
+
+
+def _damaged(rig: Rig) -> None:
+    rig.twin("EIP").faults.bad_crc = True
+
+
+def _snapped(rig: Rig) -> None:
+    rig.twin("EIP").plan.tendon.snapped = True
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (_hot, "has 68 C, more than 65 C"),
+        (_switched_off_by_heat, "switched itself off: it is overheated. Only a reboot"),
+        (_low, "switched itself off: its voltage is out of range"),
+        (_overloaded, "switched itself off: it is overloaded"),
+        (_mute, "does not answer, 5 cycles in a row"),
+        (_deaf, "does not answer, 5 cycles in a row"),
+        (_late, "answers too late, 5 cycles in a row"),
+        (_damaged, "does not answer, 5 cycles in a row"),
+        (_snapped, "has lost its tendon: it winds in at"),
+    ],
+)
+def test_a_fault_of_one_stops_all(fault: Callable[[Rig], None], words: str) -> None:
+    """It has its sentence, the others go down in their time, and in the end nobody pulls."""
+    rig = Rig(settings(most_missed=5)).start()
+    rig.run(10.0, 20)
+    fault(rig)
+    state = _until(rig, lambda s: s.mode != "held")
+    assert list(state.faults) == ["EIP"]
+    assert state.faults["EIP"].startswith("Servo EIP (id 3) ")
+    assert words in state.faults["EIP"]
+    rig.run(None)
+    # The one at fault pulls nothing any more; the others have only begun to go down.
+    if not rig.twin("EIP").faults.deaf:
+        assert rig.twin("EIP").pulls_a == 0.0
+    assert rig.twin("FDP").pulls_a > 0.3
+    _until(rig, lambda s: s.mode in ("off", "silent"))
+    rig.line.advance(100_000_000)  # The watchdog of who cannot be reached.
+    assert rig.pulls() == [0.0] * 7
+
+
+def _until(rig: Rig, holds: Callable[[BusState], bool], cycles: int = 120) -> BusState:
+    for _ in range(cycles):
+        if holds(state := rig.run(10.0)):
+            return state
+    raise AssertionError(f"It never came so far: {state}")
+
+
+def test_the_others_are_heard_while_one_is_silent() -> None:
+    """Servos behind a silent one are asked again without it; nothing old is said again."""
+    rig = Rig().start()
+    rig.run(4.0, 3)
+    rig.twin("FDS").faults.mute = True
+    state = rig.run(4.0)
+    assert set(state.servos) == set(NAMES) - {"FDS"}
+    assert state.missed == {**dict.fromkeys(NAMES, 0), "FDS": 1}
+    assert state.mode == "held"
+
+
+def test_a_silent_servo_costs_one_more_question_in_a_cycle() -> None:
+    """Each costs the wait for an answer, during which nothing can be stopped."""
+    rig = Rig(settings(most_missed=50)).start()
+    rig.twin("FDS").faults.mute = True
+    rig.run(4.0)
+    rig.port.sent.clear()
+    rig.run(4.0, 4)
+    assert [len(p) for p in rig.port.sent if p[7] == 0x82 and p[8] == 126] == [20, 15] * 4
+
+
+def test_a_short_silence_is_forgiven() -> None:
+    """A plug that shakes for three cycles stops nothing, and is forgotten."""
+    rig = Rig().start()
+    rig.twin("FDS").faults.mute = True
+    rig.run(4.0, 3)
+    rig.twin("FDS").faults.mute = False
+    state = rig.run(4.0, 3)
+    assert state.missed["FDS"] == 0
+    assert set(state.servos) == set(NAMES)
+    assert state.reason == ""
+
+
+def test_three_silent_servos_are_each_found() -> None:
+    """Whichever they are."""
+    rig = Rig().start()
+    for name in ("FDP", "EDC", "PI"):
+        rig.twin(name).faults.mute = True
+    state = rig.run(4.0, 8)
+    assert set(state.faults) == {"FDP", "EDC", "PI"}
+
+
+def test_a_mute_servo_is_left_to_its_watchdog() -> None:
+    """It may still hear, but does not confirm: so nobody is spoken to any more."""
+    rig = Rig().start()
+    rig.run(10.0, 5)
+    rig.twin("EIP").faults.deaf = True
+    state = _until(rig, lambda s: s.mode == "silent")
+    assert "EIP did not confirm to let go, so nothing is sent any more" in state.faults[""]
+    rig.port.sent.clear()
+    rig.run(10.0, 3)
+    assert rig.port.sent == []
+
+
+@pytest.mark.parametrize(
+    ("most_missed", "words"),
+    [
+        (50, "was started afresh, as by a dip of its power, and has lost its zero"),
+        (5, "does not answer, 5 cycles in a row"),
+    ],
+)
+def test_a_dip_of_the_power_takes_the_zero(most_missed: int, words: str) -> None:
+    """Turns are forgotten with the power: no length from before is told, not even once."""
+    rig = Rig(settings(most_missed=most_missed)).start()
+    rig.run(4.0, 5)
+    rig.twin("EIP").lose_power()
+    state = _until(rig, lambda s: "EIP" in s.servos)
+    assert state.servos["EIP"].length_m is None
+    assert words in state.faults["EIP"]
+    assert "EIP" not in rig.bus.zeros
+    assert "FDP" in rig.bus.zeros
+
+
+def test_after_a_fault_nothing_is_held_until_it_is_set_up_again() -> None:
+    """And then all is as before."""
+    rig = Rig().start()
+    rig.twin("EIP").faults.mute = True
+    _until(rig, lambda s: s.mode != "held")
+    with pytest.raises(RobotError, match=r"not held: Servo EIP \(id 3\) does not answer"):
+        rig.bus.hold()
+    rig.twin("EIP").faults.mute = False
+    rig.bus.set_up()
+    rig.bus.hold()
+    assert rig.run(4.0, 10).reason == ""
+
+
+def test_who_switched_itself_off_needs_a_reboot() -> None:
+    """Setting up says so, and a reboot does it."""
+    rig = Rig().start()
+    rig.twin("EIP").overload()
+    _until(rig, lambda s: s.mode == "off")
+    with pytest.raises(RobotError, match=r"EIP .* it is overloaded. Only a reboot"):
+        rig.bus.set_up()
+    rig.bus.reboot("EIP")
+    assert "EIP" not in rig.bus.zeros
+    rig.line.advance(400_000_000)
+    rig.bus.set_up()
+    rig.bus.hold()
+    assert rig.run(4.0, 10).reason == ""
+
+
+def test_nothing_is_rebooted_while_it_is_held() -> None:
+    """A tendon would be let go while the others pull."""
+    rig = Rig().start()
+    with pytest.raises(RobotError, match="not started afresh while the bus is held"):
+        rig.bus.reboot("EIP")
+
+
+@pytest.mark.parametrize("on_trip", ["coast", "release"])
+def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "release"]) -> None:
+    """After 100 ms without a word no servo pulls, and the next cycle says why."""
+    plans = [ServoPlan(i, MODEL, on_trip=on_trip) for i in range(1, 8)]
+    rig = Rig(plans=plans).start()
+    rig.run(10.0, 20)
+    rig.line.advance(89_000_000)
+    assert min(rig.pulls()) > 0.3
+    rig.line.advance(2_000_000)
+    assert rig.pulls() == [0.0] * 7
+    state = rig.run(10.0, 4)
+    assert set(state.faults) == set(NAMES)
+    words = "was stopped by its own watchdog, for it heard nothing for 100 ms"
+    assert words in state.faults["DI"] or "has let go by itself" in state.faults["DI"]
+    assert rig.pulls() == [0.0] * 7
+    assert _until(rig, lambda s: s.mode == "off").mode == "off"
+
+
+def test_a_cut_cable_ends_in_the_watchdogs() -> None:
+    """Nobody can be told anything, and nobody has to be."""
+    rig = Rig().start()
+    rig.run(10.0, 20)
+    rig.port.is_cut = True
+    rig.run(10.0, 11)
+    assert rig.pulls() == [0.0] * 7
+
+
+def test_a_device_that_is_gone_is_said_and_ends_in_the_watchdogs() -> None:
+    """An adapter that was pulled out raises in everything."""
+    rig = Rig().start()
+    rig.run(10.0, 20)
+    rig.port.is_gone = True
+    state = rig.bus.cycle(dict.fromkeys(NAMES, 10.0), rig.line.now_ns)
+    assert state.faults[""].startswith("The bus at the twin is gone: ")
+    assert state.mode == "stopping"
+    rig.line.advance(10 * CYCLE_NS)
+    assert rig.pulls() == [0.0] * 7
+    for i in range(40):
+        state = rig.bus.cycle(None, rig.line.now_ns + i * CYCLE_NS)
+    assert state.mode == "silent"
+
+
+def test_a_goal_that_a_servo_does_not_take_is_noticed() -> None:
+    """A sync write has no answer; so the goals are read back now and then."""
+    rig = Rig().start()
+    rig.run(4.0, 4)
+    taken = rig.twin("PI").write
+    rig.twin("PI").write = lambda at, data: None if at == 102 else taken(at, data)  # type: ignore[method-assign]
+    state = rig.run(8.0, 8)
+    assert "Servo PI (id 7) keeps to a goal of 136 counts, and was told 273" in state.reason
+
+
+def test_the_fast_way_is_given_up_where_it_does_not_work() -> None:
+    """A servo too old for it is read the plain way, without a fault."""
+    plans = [ServoPlan(i, MODEL, fast=i != 4) for i in range(1, 8)]
+    rig = Rig(settings(fast=True), plans).start()
+    state = rig.run(4.0, 5)
+    assert set(state.servos) == set(NAMES)
+    rig.port.sent.clear()
+    rig.run(4.0)
+    assert 0x8A not in [p[7] for p in rig.port.sent]
+    assert state.reason == ""
+
+
+def test_the_fast_way_says_the_same() -> None:
+    """All of them in one packet."""
+    plain, fast = Rig().start(), Rig(settings(fast=True)).start()
+    said = [rig.run(6.0, 30) for rig in (plain, fast)]
+    assert said[0] == said[1]
+    assert 0x8A in [p[7] for p in fast.port.sent]
+    assert 0x8A not in [p[7] for p in plain.port.sent]

@@ -1,0 +1,66 @@
+"""Whatever bytes are on the bus, neither side breaks."""
+
+import math
+
+from hypothesis import HealthCheck, given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError
+from shapechanger.twin.servos.packets import packed, status
+from tests.robot.drivers.dynamixel.rigs import NAMES, Rig
+
+_ids = st.integers(0, 255)
+# Bytes alone rarely look like a packet; so also packets with anything in them, and cut ones.
+_noise = st.one_of(
+    st.binary(max_size=60),
+    st.builds(packed, _ids, st.integers(0, 255), st.binary(max_size=40)),
+    st.builds(status, _ids, st.integers(0, 255), st.binary(max_size=40)),
+    st.builds(lambda p, n: p[:n], st.builds(status, _ids, st.just(0)), st.integers(0, 11)),
+    st.binary(min_size=3, max_size=9).map(lambda tail: b"\xff\xff\xfd\x00" + tail),
+)
+_slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+
+
+@_slow
+@given(noise=st.lists(_noise, max_size=5), tension=st.floats(-50, 50))
+def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: float) -> None:
+    """The driver gets on, and no servo is ever told more than its cap."""
+    rig = Rig().start()
+    cap = 683e-3
+    for data in noise:
+        rig.port.inject(data)
+        state = rig.run(tension)
+        assert all(0.0 <= one <= cap for one in rig.pulls())
+        for said in state.servos.values():
+            assert math.isfinite(said.tension_n)
+    rig.bus.close()
+
+
+@_slow
+@given(noise=st.lists(_noise, max_size=2))
+def test_noise_never_breaks_the_start(noise: list[bytes]) -> None:
+    """It starts, or says in a sentence why not."""
+    rig = Rig()
+    said: list[str] = []
+    for data in noise:
+        rig.port.inject(data)
+        try:
+            rig.bus.set_up()
+        except RobotError as error:
+            said.append(str(error))
+    assert all(one.endswith(".") for one in said)
+    rig.bus.set_up()  # Without noise it does.
+
+
+@_slow
+@given(noise=st.lists(_noise, max_size=8))
+def test_noise_never_breaks_the_twin(noise: list[bytes]) -> None:
+    """Servos may obey what looks like an instruction, and go on."""
+    rig = Rig()
+    for data in noise:
+        rig.line.receive(data)
+        rig.line.advance(1_000_000)
+        rig.line.send()
+    assert all(math.isfinite(one.motor.angle) for one in rig.line.servos.values())
+    assert len(rig.line.servos) == len(NAMES)

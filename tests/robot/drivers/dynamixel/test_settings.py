@@ -1,0 +1,62 @@
+"""Settings that cannot be."""
+
+from typing import Any
+
+import pytest
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from tests.robot.drivers.dynamixel.rigs import servo, settings
+
+_NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"id": 253}, "its id must be 0 to 252, not 253"),
+        ({"direction": 0}, "its direction must be 1 or -1, not 0"),
+        ({"spool_radius_m": 0.0}, "its spool radius must be above 0, not 0"),
+        ({"spool_radius_m": _NAN}, "its spool radius must be above 0, not nan"),
+        ({"torque_constant": -1.0}, "its torque constant must be above 0, not -1"),
+        ({"most_tension_n": 60.0}, "its most tension must be 0.029 to 51 N with this spool"),
+        ({"most_tension_n": _NAN}, "its most tension must be above 0, not nan"),
+        ({"pretension_n": 21.0}, "its pretension must be 0.029 to 20 N, not 21 N"),
+        ({"pretension_n": 0.01}, "its pretension must be 0.029 to 20 N, not 0.01 N"),
+        ({"homing_n": 30.0}, "its tension for homing must be 0.029 to 20 N, not 30 N"),
+        ({"shortest_m": 0.0}, "its shortest length must be below 0, not 0 m"),
+    ],
+)
+def test_a_servo_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
+    """Each mistake has its sentence, before anything moves."""
+    with pytest.raises(RobotError, match=words):
+        servo("FDP", **changes)
+
+
+def test_an_unknown_model_names_the_nearest() -> None:
+    """A slip of the pen is put right."""
+    with pytest.raises(UnknownName, match="Did you mean 'XL330-M077'"):
+        servo("FDP", model="XL330-M77")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"servos": ()}, "needs at least one servo"),
+        ({"servos": (servo("FDP"), servo("FDS", id=1))}, "has 2 servos of id 1"),
+        ({"servos": (servo("FDP"), servo("FDP", id=2))}, "has 2 servos of name FDP"),
+        ({"watchdog_ms": 0}, "watchdog_ms must be 20 to 2540 in steps of 20, not 0"),
+        ({"watchdog_ms": 50}, "watchdog_ms must be 20 to 2540 in steps of 20, not 50"),
+        ({"most_missed": 0}, "most_missed must be 1 or more, not 0"),
+        ({"answer_ms": _NAN}, "answer_ms must be 0.1 or more, not nan"),
+    ],
+)
+def test_a_bus_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
+    """A bus without a watchdog is no bus to hold a finger with."""
+    with pytest.raises(RobotError, match=words):
+        settings(**changes)
+
+
+def test_the_watchdog_cannot_be_forgotten() -> None:
+    """Who says nothing about it has one."""
+    assert BusSettings("x", (servo("FDP"),)).watchdog_ms == 100

@@ -1,0 +1,77 @@
+"""What a profile says of a servo bus."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile import load_profile, shipped_profiles
+from tests.robot.profile.texts import changed, read
+
+_TEXT = shipped_profiles()["finger"].read_text()
+_SENSOR = _TEXT[_TEXT.index("[sensor.tendons]") : _TEXT.index("[sensor.joints]")]
+_BUS = _TEXT[_TEXT.index("[servo_bus]") : _TEXT.index("[action.FDP]")]
+
+
+def test_every_output_knows_its_bus_and_the_sensor_its_tendons() -> None:
+    """The guard needs no table but theirs."""
+    plan = load_profile(shipped_profiles()["finger"]).guard_plan()
+    assert {output.settings["device"] for output in plan.outputs} == {"/dev/ttyUSB0"}
+    assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]
+    sensor, _ = plan.sensors
+    assert sensor.measures == "tendons"
+    assert sensor.settings["tendons"] == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
+    assert GuardPlan.from_json(json.dumps(json.loads(plan.to_json()))) == plan
+
+
+def test_layouts_say_newtons_and_metres() -> None:
+    """From pretension, at 0, to the most, at 1; and length, speed and tension of each tendon."""
+    profile = load_profile(shipped_profiles()["finger"])
+    action = profile.action_layout()["FDP"]
+    assert (action.low, action.high, action.gain, action.gain_unit) == (0.0, 1.0, 14.0, "N")
+    assert profile.action_layout()["LUM"].gain == pytest.approx(5.4)
+    state = profile.state_layout()
+    assert state.names[:2] == ("FDP/length", "FDS/length")
+    assert [state[f"PI/{what}"].unit for what in ("length", "speed", "tension")] == [
+        "m",
+        "m/s",
+        "N",
+    ]
+    assert state["PI/tension"].high == 15.0
+    assert state.size == 32
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (_TEXT.replace(_BUS, ""), r"\[output.FDP\] is on a bus: add \[servo_bus\]"),
+        (_TEXT.replace(_SENSOR, ""), "servos need one sensor with the driver dynamixel"),
+        (_TEXT + _SENSOR.replace("tendons", "others"), "servos need one sensor"),
+        (changed('then = "release"', 'then = "hold"', _TEXT), 'must be "release"'),
+        (
+            changed("\nid = 2\n", "\nid = 1\n", _TEXT),
+            r"has 2 servos of id 1",
+        ),
+        (
+            _TEXT.replace("pretension_n = 1.0", "pretension_n = 30.0", 1),
+            "line 50: .*pretension must be",
+        ),
+        (changed("watchdog_ms = 100", "watchdog_ms = 90", _TEXT), "steps of 20, not 90"),
+        (_TEXT.replace("XL330-M077", "XL330-M078", 1), "did you mean 'XL330-M077'"),
+        (
+            shipped_profiles()["car"].read_text() + "\n[servo_bus]\n",
+            "needs an output with the driver dynamixel",
+        ),
+        (
+            shipped_profiles()["car"].read_text() + "\n" + _SENSOR,
+            r"\[sensor.tendons\] needs outputs with the driver dynamixel",
+        ),
+    ],
+)
+def test_a_bus_that_cannot_be_is_refused(text: str, words: str) -> None:
+    """In one sentence, with the line."""
+    with pytest.raises(ProfileError, match=words):
+        read(text)

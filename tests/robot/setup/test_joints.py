@@ -1,0 +1,135 @@
+"""Where encoders stand while a finger is straight, and how their magnets sit."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.as5600 import As5600, connect_encoders
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.setup.doctor import examine_robot
+from shapechanger.robot.setup.joints import find_joint_zeros
+from shapechanger.twin.chips.as5600 import Magnet
+from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.world.driving import DrivingWorld
+
+_PLAN = load_profile(find_profile("finger")).guard_plan()
+_ZEROS = [1234, 4095, 0, 2]
+
+
+class _Straight(DrivingWorld):
+    """Joints that somebody holds straight, with a hand that trembles."""
+
+    def __init__(self, tremble: float = 0.0) -> None:
+        super().__init__({"tendon"}, (160, 120), seed=0)
+        self._tremble = tremble
+
+    def measured_angle(self, joint: str) -> float:
+        self._tremble = -self._tremble
+        return self._tremble
+
+
+def _board(tremble: float = 0.0) -> LocalBoard:
+    """Encoders that really stand at those zeros."""
+    sensors = tuple(
+        replace(s, settings={**s.settings, "zeros": _ZEROS}) if s.driver == "as5600" else s
+        for s in _PLAN.sensors
+    )
+    return LocalBoard(Wiring(replace(_PLAN, sensors=sensors)), _Straight(tremble))
+
+
+@pytest.mark.parametrize("tremble", [0.0, 0.02])
+def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
+    """By the names that the profile's tables have, also around the count 0."""
+    zeros = find_joint_zeros(_PLAN, _board(tremble).hardware, lambda: None)
+    names = ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"]
+    assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
+
+
+def test_a_magnet_that_is_gone_has_no_zero() -> None:
+    """It is named. A robot without encoders has none to find."""
+    board = _board()
+    board.pins.encoder("DIP_flexion").set_magnet("gone")
+    with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
+        find_joint_zeros(_PLAN, board.hardware, lambda: None)
+    car = load_profile(find_profile("car")).guard_plan()
+    assert find_joint_zeros(car, board.hardware, lambda: None) == {}
+
+
+def _found(root: Path, plan: GuardPlan, board: LocalBoard, port: int = 0) -> dict[str, list[str]]:
+    def connect(sensor: SensorPlan) -> As5600:
+        return connect_encoders(sensor, board.hardware)
+
+    found: dict[str, list[str]] = {}
+    for one in examine_robot(plan, None, port, root, encoders=connect):
+        found.setdefault(one.check, []).append(f"{one.level}: {one.sentence}")
+    return found
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A computer with an I2C bus of 400 kHz."""
+    (tmp_path / "dev").mkdir()
+    (tmp_path / "dev/i2c-1").touch()
+    (tmp_path / "boot").mkdir()
+    (tmp_path / "boot/config.txt").write_text("dtparam=i2c_arm=on,i2c_arm_baudrate=400000\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [
+        ("", "good: That of PIP_flexion sees its magnet."),
+        ("gone", "missing: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
+        ("weak", "missing: The magnet of PIP_flexion is too far from its encoder."),
+        ("strong", "missing: The magnet of PIP_flexion is too near to its encoder."),
+    ],
+)
+def test_the_doctor_says_how_each_magnet_sits(root: Path, how: Magnet, says: str) -> None:
+    """The others are well."""
+    board = _board()
+    board.pins.encoder("PIP_flexion").set_magnet(how)
+    said = _found(root, _PLAN, board)["encoders"]
+    assert said[2] == says
+    assert [one.partition(":")[0] for one in said[:2]] == ["good"] * 2
+
+
+def test_the_doctor_names_a_chip_that_does_not_answer(root: Path) -> None:
+    """The multiplexer, for each joint behind it."""
+    board = _board()
+    board.pins.dead_chips.add((1, 0x70))
+    said = _found(root, _PLAN, board)["encoders"]
+    assert len(said) == 4
+    assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in said)
+
+
+def test_the_doctor_asks_no_encoder_of_a_robot_that_is_served(root: Path) -> None:
+    """A channel that it opens would give the guard the angle of another joint."""
+    with socket.socket() as taken:
+        taken.bind(("", 0))
+        taken.listen()
+        said = _found(root, _PLAN, _board(), port=taken.getsockname()[1])["encoders"]
+    assert said == ["unknown: The robot may be served now, so nobody else asks its encoders."]
+
+
+@pytest.mark.parametrize(
+    ("config", "says"),
+    [
+        ("dtparam=i2c_arm_baudrate=1000000", "good"),
+        ("dtparam=i2c_arm=on", "missing"),
+        ("#dtparam=i2c_arm_baudrate=400000", "missing"),
+        ("dtparam=i2c_arm_baudrate=100000", "missing"),
+    ],
+)
+def test_the_doctor_asks_for_a_fast_bus(root: Path, config: str, says: str) -> None:
+    """Only of a robot with encoders."""
+    (root / "boot/config.txt").write_text(config)
+    assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(says)
+    car = load_profile(find_profile("car")).guard_plan()
+    assert "I2C speed" not in _found(root, car, _board())

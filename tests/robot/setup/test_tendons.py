@@ -1,0 +1,54 @@
+"""Where servos stand while a finger is straight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.setup.tendons import find_zeros
+from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.world.driving import DrivingWorld
+
+
+def _board(plan: GuardPlan) -> LocalBoard:
+    # Springs in place of a finger that somebody holds.
+    return LocalBoard(Wiring(plan), DrivingWorld({"tendon"}, (160, 120), seed=0))
+
+
+def _plan(zero: int) -> GuardPlan:
+    plan = load_profile(find_profile("finger")).guard_plan()
+    outputs = tuple(replace(o, settings={**o.settings, "zero": zero}) for o in plan.outputs)
+    return replace(plan, outputs=outputs)
+
+
+def test_zeros_are_where_nothing_moves_any_more() -> None:
+    """And all servos have let go afterwards."""
+    board = _board(_plan(5000))
+    zeros = find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
+    # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
+    assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
+    assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
+    assert board.rig is not None
+    assert not any(servo.has_torque for servo in board.rig.line.servos.values())
+
+
+def test_a_tendon_that_came_off_has_no_zero() -> None:
+    """It is named, and all servos let go."""
+    board = _board(_plan(0))
+    assert board.rig is not None
+    board.rig.break_servo("EIP", "snapped")
+    with pytest.raises(RobotError, match="EIP"):
+        find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
+    assert not any(servo.has_torque for servo in board.rig.line.servos.values())
+
+
+def test_a_car_has_no_tendons() -> None:
+    """Whoever asks is told."""
+    plan = load_profile(find_profile("car")).guard_plan()
+    with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
+        find_zeros(plan, _board(_plan(0)).hardware, lambda: None)

@@ -1,0 +1,79 @@
+"""Where the fingertip is: against the simulator, against differences, and by hand."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, PHALANX_LENGTH_M
+from shapechanger.embodiments.finger.model import FINGERTIP
+from shapechanger.tasks.finger import fingertip, fingertip_jacobian
+from tests.embodiments.finger.commands import made
+
+_RIGHT = np.pi / 2
+# Any posture, also those that no human joint takes.
+_ANGLES = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
+
+
+def test_some_places_by_hand() -> None:
+    """Straight, each joint bent at a right angle, and spread to the thumb."""
+    phalanges = (4.0, 2.0, 1.0)
+    expected = {
+        (0.0, 0.0, 0.0, 0.0): (7.0, 0.0, 0.0),
+        (_RIGHT, 0.0, 0.0, 0.0): (0.0, 0.0, -7.0),
+        (0.0, _RIGHT, 0.0, 0.0): (0.0, 7.0, 0.0),
+        (0.0, 0.0, _RIGHT, 0.0): (4.0, 0.0, -3.0),
+        (0.0, 0.0, 0.0, _RIGHT): (6.0, 0.0, -1.0),
+        (0.0, 0.0, _RIGHT, _RIGHT): (3.0, 0.0, -2.0),
+    }
+    for angles, place in expected.items():
+        np.testing.assert_allclose(fingertip(angles, phalanges), place, atol=1e-12)
+
+
+def test_it_is_where_the_simulator_has_it() -> None:
+    """At random angles, many at once as one by one."""
+    model = made()
+    data = mujoco.MjData(model)
+    angles = np.random.default_rng(0).uniform(*JOINT_RANGE.T, (200, 4))
+    places = []
+    for q in angles:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        places.append(data.site_xpos[model.site(FINGERTIP).id].copy())
+    np.testing.assert_allclose(fingertip(angles, PHALANX_LENGTH_M), places, atol=1e-12)
+    one_by_one = [fingertip(q, PHALANX_LENGTH_M) for q in angles]
+    np.testing.assert_allclose(fingertip(angles, PHALANX_LENGTH_M), one_by_one, atol=1e-15)
+    shaped = fingertip(angles.reshape(4, 50, 4), PHALANX_LENGTH_M)
+    assert shaped.shape == (4, 50, 3)
+
+
+@given(angles=_ANGLES)
+def test_the_jacobian_is_what_differences_say(angles: tuple[float, ...]) -> None:
+    """At any angles, to what central differences are good for."""
+    step = 1e-6
+    moved = np.array(angles) + step * np.concatenate([np.eye(4), -np.eye(4)])
+    there, back = fingertip(moved, PHALANX_LENGTH_M).reshape(2, 4, 3)
+    expected = ((there - back) / (2.0 * step)).T
+    found = fingertip_jacobian(angles, PHALANX_LENGTH_M)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@given(angles=_ANGLES)
+def test_no_posture_reaches_beyond_the_finger(angles: tuple[float, ...]) -> None:
+    """And flexing the knuckle turns the place around it."""
+    place = fingertip(angles, PHALANX_LENGTH_M)
+    assert np.linalg.norm(place) <= sum(PHALANX_LENGTH_M) + 1e-12
+    straight = fingertip((0.0, *angles[1:]), PHALANX_LENGTH_M)
+    assert np.linalg.norm(place) == pytest.approx(np.linalg.norm(straight))
+    assert place[1] == straight[1]
+
+
+def test_jacobians_of_many_are_those_of_each() -> None:
+    """Shape (..., 3, 4)."""
+    angles = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 3, 4))
+    found = fingertip_jacobian(angles, PHALANX_LENGTH_M)
+    assert found.shape == (2, 3, 3, 4)
+    np.testing.assert_allclose(found[1, 2], fingertip_jacobian(angles[1, 2], PHALANX_LENGTH_M))

@@ -1,0 +1,199 @@
+"""What holds for every path, whatever it is made of."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Sequence
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from shapechanger.errors import PathError
+from shapechanger.tasks.paths import (
+    FASTEST_MPS,
+    KINDS,
+    Path,
+    as_path,
+    circle,
+    curve_3d,
+    figure_eight,
+    from_callable,
+    from_csv,
+    line,
+    sample,
+)
+from shapechanger.tasks.paths.spline import Spline
+
+# The same examples every time, so that a failure can be looked at twice.
+law = settings(max_examples=40)
+
+SIZES = st.floats(0.002, 0.04)
+RATES = st.floats(0.1, 2.0)
+PHASES = st.floats(-7.0, 7.0)
+PLACES = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
+NORMALS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: math.hypot(*n) > 1e-3)
+
+
+def wave(t: float) -> tuple[float, float, float]:
+    """Some function of time that repeats after 2 s."""
+    return 0.05 + 0.01 * math.sin(math.pi * t), 0.003 * math.cos(2 * math.pi * t), -0.04
+
+
+def recording(closed: bool, seed: int) -> Path:
+    """A walk with uneven steps of 8 to 30 ms."""
+    rng = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.008, 0.03, 40))])
+    points = np.cumsum(rng.normal(0.0, 1e-3, (41, 3)), axis=0)
+    if closed:
+        points[-1] = points[0]
+    return Path(Spline.through(times, points, closed), float(times[-1]), closed)
+
+
+shapes = st.one_of(
+    st.builds(circle, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(figure_eight, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(curve_3d, SIZES, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(
+        lambda start, way, hz: line(start, tuple(np.add(start, way)), hz),
+        PLACES,
+        st.tuples(*[SIZES] * 3),
+        RATES,
+    ),
+)
+closed_paths = st.one_of(
+    shapes,
+    st.just(from_callable(wave, period_s=2.0)),
+    st.builds(recording, st.just(True), st.integers(0, 20)),
+)
+ending_paths = st.one_of(
+    st.builds(lambda s: from_callable(wave, duration_s=s), st.floats(0.5, 3.0)),
+    st.builds(recording, st.just(False), st.integers(0, 20)),
+)
+
+
+@law
+@given(path=st.one_of(closed_paths, ending_paths), part=st.floats(0.05, 0.95))
+def test_velocity_and_acceleration_are_derivatives(path: Path, part: float) -> None:
+    """The reward looks at speeds: they must be those of the positions."""
+    t, h = part * path.duration_s, 1e-5
+    velocity = (path.at(t + h) - path.at(t - h)) / (2 * h)
+    np.testing.assert_allclose(path.velocity(t), velocity, rtol=1e-5, atol=1e-5)
+    acceleration = (path.velocity(t + h) - path.velocity(t - h)) / (2 * h)
+    # A spline's acceleration has corners, next to which a difference sees both sides.
+    atol = 0.05 if isinstance(path.motion, Spline) else 1e-5
+    np.testing.assert_allclose(path.acceleration(t), acceleration, rtol=1e-3, atol=atol)
+
+
+@law
+@given(path=closed_paths, part=st.floats(0.0, 1.0), rounds=st.integers(-3, 50))
+def test_a_closed_path_repeats(path: Path, part: float, rounds: int) -> None:
+    """Round after round the point comes to the same places at the same speeds, before 0 s too."""
+    assert path.period_s == path.duration_s
+    t = part * path.period_s
+    np.testing.assert_allclose(path.at(t + rounds * path.period_s), path.at(t), atol=1e-9)
+    np.testing.assert_allclose(
+        path.velocity(t + rounds * path.period_s), path.velocity(t), atol=1e-7
+    )
+
+
+@law
+@given(path=closed_paths)
+def test_nothing_jerks_where_a_round_ends(path: Path) -> None:
+    """Across the seam position, velocity and acceleration are continuous."""
+    before, after = path.duration_s - 1e-9, path.duration_s + 1e-9
+    np.testing.assert_allclose(path.at(before), path.at(after), atol=1e-8)
+    np.testing.assert_allclose(path.velocity(before), path.velocity(after), atol=1e-6)
+    np.testing.assert_allclose(path.acceleration(before), path.acceleration(after), atol=1e-2)
+
+
+@law
+@given(path=ending_paths, later=st.floats(0.01, 100.0))
+def test_a_path_that_ends_stays_where_it_ended(path: Path, later: float) -> None:
+    """The fingertip is to hold the last point, and waits at the first."""
+    assert path.period_s is None
+    for t, end in ((path.duration_s + later, path.duration_s), (-later, 0.0)):
+        np.testing.assert_array_equal(path.at(t), path.at(end))
+        np.testing.assert_array_equal(path.velocity(t), np.zeros(3))
+        np.testing.assert_array_equal(path.acceleration(t), np.zeros(3))
+    assert np.linalg.norm(path.velocity(path.duration_s / 2)) > 0
+
+
+@law
+@given(
+    path=st.one_of(closed_paths, ending_paths),
+    times=st.lists(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), max_size=4),
+)
+def test_many_times_are_as_one_by_one(path: Path, times: Sequence[Sequence[float]]) -> None:
+    """An env asks for one time, a check for thousands, in any shape."""
+    t = np.reshape(np.array(times, dtype=np.float64), (-1, 3))
+    for ask in (path.at, path.velocity, path.acceleration):
+        answer = ask(t)
+        assert (answer.shape, answer.dtype) == ((*t.shape, 3), np.float64)
+        for place in np.ndindex(t.shape):
+            alone = ask(float(t[place]))
+            assert alone.shape == (3,)
+            np.testing.assert_allclose(answer[place], alone, rtol=1e-12, atol=1e-12)
+
+
+@law
+@given(path=shapes)
+def test_no_shape_is_too_fast(path: Path) -> None:
+    """What is refused of recordings is refused of shapes."""
+    speeds = np.linalg.norm(path.velocity(np.linspace(0.0, path.duration_s, 500)), axis=1)
+    assert speeds.max() <= FASTEST_MPS + 1e-9
+
+
+@law
+@given(path=shapes, digits=st.sampled_from([6, 12]))
+def test_a_path_survives_a_csv(
+    path: Path, digits: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Written to whole micrometres and read back it is the same to 0.01 mm, and still closed."""
+    times, points = sample(path, hz=100.0)
+    rows = [
+        ",".join(f"{value:.{digits}f}" for value in (t, *point))
+        for t, point in zip(times, points, strict=True)
+    ]
+    file = tmp_path_factory.mktemp("paths") / "path.csv"
+    file.write_text("\n".join(["t,x,y,z", *rows, ""]))
+    read = from_csv(file)
+    assert read.closed
+    np.testing.assert_allclose(read.at(times), points, rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(read.period_s, path.period_s, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)], ids=repr
+)
+def test_paths_cross_between_processes(path: Path) -> None:
+    """A vector env sends its arguments to its workers."""
+    copy = pickle.loads(pickle.dumps(path))
+    times = np.linspace(-1.0, 3.0, 50)
+    np.testing.assert_array_equal(copy.at(times), path.at(times))
+    assert (copy.duration_s, copy.closed) == (path.duration_s, path.closed)
+
+
+@pytest.mark.parametrize("path", [circle(), recording(False, 2), from_callable(wave)])
+def test_answers_share_no_memory_with_the_path(path: Path) -> None:
+    """Whoever writes into an answer must not bend the path."""
+    before = path.at([0.0, 0.3])
+    for answer in (path.at([0.0, 0.3]), path.velocity([0.0, 0.3]), path.acceleration([0.0, 0.3])):
+        answer += 1.0
+    np.testing.assert_array_equal(path.at([0.0, 0.3]), before)
+
+
+@pytest.mark.parametrize("t", [math.nan, math.inf, [0.0, -math.inf]])
+def test_times_are_finite(t: float | list[float]) -> None:
+    """A NaN in is an error, not a NaN in the reward."""
+    with pytest.raises(PathError, match=r"^A path is asked for finite times in s, got NaN"):
+        circle().at(t)
+
+
+def test_equal_shapes_are_equal() -> None:
+    """Shapes are values: they can be compared and be keys; a recording is only itself."""
+    assert circle(hz=1.0) == circle(hz=1.0) != circle(hz=1.1)
+    assert len({line(), line(), figure_eight()}) == 2
+    assert (same := recording(False, 3)) == same != recording(False, 3)

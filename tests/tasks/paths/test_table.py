@@ -1,0 +1,154 @@
+"""Paths from CSV files: what is read, and the one sentence for what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import PathError
+from shapechanger.tasks.paths import from_csv
+
+GOOD = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0,0\n0.2,0.07,0.01,0\n0.3,0.08,0.01,0\n"
+
+
+@pytest.fixture
+def write(tmp_path: File) -> Callable[[str], File]:
+    """Puts a text into a file."""
+
+    def put(text: str) -> File:
+        file = tmp_path / "path.csv"
+        file.write_bytes(text.encode())
+        return file
+
+    return put
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\n\n"),
+        "\ufeff" + GOOD,
+        GOOD.replace(",", " , "),
+        "z,t,y,x\n0,0,0,.05\n0,.1,0,6e-2\n0,.2,.01,.07\n0,.3,.01,.08",
+        '"t","x","y","z"\n7.5,0.05,0,0\n7.6,0.06,0,0\n7.7,0.07,0.01,0\n7.8,0.08,0.01,0\n',
+    ],
+    ids=["plain", "Windows", "empty lines", "mark", "spaces", "order", "later and quoted"],
+)
+def test_one_path_can_be_written_in_many_ways(write: Callable[[str], File], text: str) -> None:
+    """As editors, spreadsheets and trackers do; time counts from the first row."""
+    path = from_csv(str(write(text)))
+    assert path.period_s is None
+    assert path.duration_s == pytest.approx(0.3)
+    np.testing.assert_allclose(
+        path.at([0.0, 0.1, 0.2, 0.3]),
+        [[0.05, 0, 0], [0.06, 0, 0], [0.07, 0.01, 0], [0.08, 0.01, 0]],
+        atol=1e-12,
+    )
+
+
+def test_a_path_that_comes_back_repeats(write: Callable[[str], File]) -> None:
+    """An end within 0.1 mm of the beginning is the beginning, and both give way by half."""
+    rows = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0.01,0\n0.2,0.05,0.02,0\n0.3,{end},0,0\n"
+    closed = from_csv(write(rows.format(end=0.05009)))
+    assert closed.period_s == pytest.approx(0.3)
+    np.testing.assert_allclose(closed.at([0.0, 0.3]), [[0.050045, 0, 0]] * 2, atol=1e-12)
+    ending = from_csv(write(rows.format(end=0.05011)))
+    assert ending.period_s is None
+    np.testing.assert_allclose(ending.at(9.0), [0.05011, 0, 0], atol=1e-12)
+
+
+def test_three_rows_are_enough(write: Callable[[str], File]) -> None:
+    """Open or closed, with steps that differ by five times the median at most."""
+    ending = from_csv(write("t,x,y,z\n0,0,0,0\n0.1,0.1,0,0\n0.2,0.2,0,0\n"))
+    np.testing.assert_allclose(ending.at(0.15), [0.15, 0, 0], atol=1e-12)
+    closed = from_csv(write("t,x,y,z\n0,0,0,0\n0.1,0.1,0,0\n0.6,0,0,0\n"))
+    np.testing.assert_allclose(closed.velocity(0.0), closed.velocity(0.6), atol=1e-12)
+
+
+def lines(*rows: str) -> str:
+    """A file with the usual first line."""
+    return "\n".join(["t,x,y,z", *rows, ""])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "{file} is empty: the columns are t, x, y and z."),
+        ("\n\n", "{file} is empty: the columns are t, x, y and z."),
+        ("t,x,y\n0,0,0\n", "{file}, line 1 lacks z: the columns are t, x, y and z."),
+        (
+            "0,0,0,0\n1,0,0,0\n",
+            "{file}, line 1 lacks t, x, y, z and has '0', '0', '0', '0' too much: the columns are "
+            "t, x, y and z.",
+        ),
+        (
+            "t,x,y,z,grip\n",
+            "{file}, line 1 has 'grip' too much: the columns are t, x, y and z.",
+        ),
+        ("t,x,x,y,z\n", "{file}, line 1 has x twice: the columns are t, x, y and z."),
+        ("t,x,y,z\n", "{file} has too few rows: 0, and a path needs 3."),
+        (lines("0,0,0,0", "1,0,0,0"), "{file} has too few rows: 2, and a path needs 3."),
+        (
+            lines("0,0,0,0", "", "1,0,0"),
+            "{file}, line 4 has 3 cells, and there are four columns.",
+        ),
+        (lines("0,0,zero,0"), "{file}, line 2: y is 'zero', which is no number."),
+        (lines("0,0,0,0", "1,,0,0"), "{file}, line 3: x is '', which is no number."),
+        (lines("0,0,0,0", "1,0,0,nan"), "{file}, line 3: z is 'nan', which is not finite."),
+        (lines("0,0,0,0", "-inf,0,0,0"), "{file}, line 3: t is '-inf', which is not finite."),
+        (
+            lines("0,0,0,0", "0.2,0,0,0", "0.1,0,0,0"),
+            "{file}, line 4: time runs backwards, from 0.2 s to 0.1 s.",
+        ),
+        (
+            lines("5,0,0,0", "5.2,0,0,0", "", "5.2,0,0,0"),
+            "{file}, line 5: time stands still, from 5.2 s to 5.2 s.",
+        ),
+        (
+            lines("0,0,0,0", "0.1,0,0,0", "0.2,0,0,0", "0.8,0,0,0"),
+            "{file}, line 5: 0.6 s have passed since the row before, a gap: the median is 0.1 s, "
+            "and 5 times as much is allowed.",
+        ),
+        (
+            lines("0,0,0,0", "0.1,0,0,0", "0.2,0.3,0,0"),
+            "{file}, line 4: the point moves 0.3 m in 0.1 s, and no fingertip is faster than "
+            "2 m/s; t must be in s, and x, y, z in m.",
+        ),
+        (
+            lines("0,0,-1e308,0", "0.1,0,1e308,0", "0.2,0,0,0"),
+            "{file}, line 3: the point moves inf m in 0.1 s, and no fingertip is faster than "
+            "2 m/s; t must be in s, and x, y, z in m.",
+        ),
+        (
+            lines('0,0,0,"0'),
+            "{file}, line 2, is no line of a CSV: unexpected end of data.",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(
+    write: Callable[[str], File], text: str, said: str
+) -> None:
+    """Whoever made the file finds the place."""
+    file = write(text)
+    with pytest.raises(PathError) as caught:
+        from_csv(file)
+    assert str(caught.value) == said.format(file=file)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: File) -> None:
+    """Not there, a folder, or no text."""
+    missing, noise = tmp_path / "none.csv", tmp_path / "noise.csv"
+    noise.write_bytes(b"t,x,y,z\n\xff\xfe\n")
+    with pytest.raises(PathError) as caught:
+        from_csv(missing)
+    assert str(caught.value) == f"{missing} cannot be read: No such file or directory."
+    with pytest.raises(PathError) as caught:
+        from_csv(noise)
+    assert str(caught.value) == f"{noise} is no text in UTF-8: invalid start byte."
+    with pytest.raises(PathError, match="cannot be read: "):
+        from_csv(tmp_path)

@@ -1,0 +1,50 @@
+"""An env of which there is but one, as of a robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from shapechanger.envs.finger.reach import FingerReachEnv
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.evaluation import Evaluation
+from shapechanger.transfer.training import EVALUATION_SEED, train
+from tests.transfer.studies import TINY
+
+FINGER = EnvRef("shapechanger/Finger-v1")
+
+
+_STEPS = 100  # Of an episode.
+
+
+def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Made once; each rollout begins an episode of its own, and the budget is what it was."""
+    called: dict[int, list[int | str | None]] = {}
+    reset, step = FingerReachEnv.reset, FingerReachEnv.step
+
+    def counted_reset(
+        self: FingerReachEnv, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> Any:
+        called.setdefault(id(self), []).append(seed)
+        return reset(self, seed=seed, options=options)
+
+    def counted_step(self: FingerReachEnv, action: Any) -> Any:
+        called[id(self)].append("step")
+        return step(self, action)
+
+    monkeypatch.setattr(FingerReachEnv, "reset", counted_reset)
+    monkeypatch.setattr(FingerReachEnv, "step", counted_step)
+    monkeypatch.setattr(FingerReachEnv, "side_by_side", False, raising=False)
+    curve: list[Evaluation] = []
+    policy = train(FINGER, "tiny", TINY, 96, 0, on_evaluation=curve.append)
+    assert [evaluation.steps for evaluation in curve] == [0, 32, 64, 96]
+    assert policy.card.steps == 96
+    (calls,) = called.values()
+    # The last episodes of the evaluations; after each but the last one something is learned from.
+    ends = [i for i, call in enumerate(calls) if call == EVALUATION_SEED + TINY.eval_episodes - 1]
+    assert len(ends) == 4
+    for i in ends:
+        assert set(calls[i + 1 : i + 1 + _STEPS]) == {"step"}
+        assert calls[i + 1 + _STEPS :][:1] in ([], [None], [0])  # Never a step after the end.
+    assert calls[ends[-1] + 1 + _STEPS :] == []

@@ -1,0 +1,200 @@
+"""Servos on a line: registers, locks, watchdog, faults."""
+
+import pytest
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.twin.servos.line import Line
+from shapechanger.twin.servos.packets import packed, status
+from shapechanger.twin.servos.servo import ServoPlan
+
+MS = 1_000_000
+
+
+def _line(count: int = 1) -> Line:
+    return Line([ServoPlan(i + 1, "XL330-M077") for i in range(count)])
+
+
+def _ask(line: Line, servo_id: int, code: int, body: bytes = b"") -> bytes:
+    line.receive(packed(servo_id, code, body))
+    return line.send()
+
+
+def _write(line: Line, at: int, value: int, size: int = 1) -> int:
+    """The error of a write to servo 1."""
+    data = at.to_bytes(2, "little") + value.to_bytes(size, "little", signed=value < 0)
+    return _ask(line, 1, 3, data)[8]
+
+
+def _read(line: Line, at: int, size: int) -> tuple[int, bytes]:
+    """Error and data of a read from servo 1."""
+    answer = _ask(line, 1, 2, at.to_bytes(2, "little") + size.to_bytes(2, "little"))
+    return answer[8], answer[9:-2]
+
+
+def _pull(line: Line, counts: int = 200) -> None:
+    """Let servo 1 pull."""
+    errors = [_write(line, 11, 0), _write(line, 102, counts, 2), _write(line, 64, 1)]
+    assert errors == [0, 0, 0]
+
+
+def test_all_answer_a_ping_of_all_in_turn() -> None:
+    """With model number and firmware."""
+    said = b"".join(status(i, 0, b"\xa6\x04\x34") for i in (1, 2, 3))
+    assert _ask(_line(3), 0xFE, 1) == said
+
+
+def test_nobody_answers_for_an_id_that_is_not_there() -> None:
+    """As on a real bus."""
+    assert _ask(_line(), 9, 1) == b""
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "size", "error"),
+    [
+        (64, 2, 1, 4),  # Out of range.
+        (11, 2, 1, 4),  # No such mode.
+        (38, 1751, 2, 4),
+        (98, 128, 1, 4),
+        (102, 1, 1, 5),  # Half a register.
+        (126, 1, 2, 7),  # Read only.
+        (0, 1, 2, 7),
+        (99, 1, 1, 7),  # Nothing is there.
+        (146, 1, 1, 7),
+    ],
+)
+def test_what_cannot_be_written_is_refused(at: int, value: int, size: int, error: int) -> None:
+    """With the number that the manual gives it, and nothing changes."""
+    line = _line()
+    before = bytes(line.servos[1].register(64).to_bytes(1, "little"))
+    assert _write(line, at, value, size) == error
+    assert _read(line, 64, 1) == (0, before)
+
+
+def test_eeprom_is_locked_while_torque_is_on() -> None:
+    """And open again afterwards."""
+    line = _line()
+    assert [_write(line, at, v) for at, v in ((64, 1), (9, 0), (64, 0), (9, 0))] == [0, 7, 0, 0]
+
+
+def test_a_goal_beyond_the_current_limit_is_refused() -> None:
+    """In both directions; the limit itself is not."""
+    line = _line()
+    assert _write(line, 11, 0) == 0
+    assert _write(line, 38, 100, 2) == 0
+    assert [_write(line, 102, value, 2) for value in (101, -101, 100, -100)] == [6, 6, 0, 0]
+
+
+def test_a_change_of_the_mode_sets_the_goal_to_the_limit() -> None:
+    """The trap of the manual: who switches torque on next gets all of it."""
+    line = _line()
+    assert _write(line, 102, 0, 2) == 0
+    assert _write(line, 11, 0) == 0
+    assert _read(line, 102, 2) == (0, (1750).to_bytes(2, "little"))
+
+
+def test_a_silent_host_trips_the_watchdog() -> None:
+    """After its time the current is gone, goals are refused, and 0 clears it."""
+    line = _line()
+    _pull(line)
+    assert _write(line, 98, 5) == 0
+    line.advance(99 * MS)
+    assert line.servos[1].pulls_a == pytest.approx(0.2)
+    line.advance(2 * MS)
+    assert line.servos[1].pulls_a == 0.0
+    assert _read(line, 98, 1) == (0, b"\xff")
+    assert _write(line, 102, 10, 2) == 4
+    assert _write(line, 98, 0) == 0
+    assert _write(line, 102, 10, 2) == 0
+
+
+def test_any_packet_feeds_the_watchdog_and_a_damaged_one_does_not() -> None:
+    """Assumed for packets to others; see the module."""
+    line = _line(2)
+    _pull(line)
+    assert _write(line, 98, 5) == 0
+    for _ in range(5):
+        line.advance(80 * MS)
+        _ask(line, 2, 1)
+    assert line.servos[1].pulls_a > 0.0
+    line.advance(80 * MS)
+    line.receive(packed(2, 1, b"")[:-1] + b"\x00")
+    line.advance(30 * MS)
+    assert line.servos[1].pulls_a == 0.0
+
+
+def test_without_torque_the_watchdog_sleeps() -> None:
+    """It begins to count when torque comes."""
+    line = _line()
+    assert _write(line, 98, 5) == 0
+    line.advance(500 * MS)
+    assert _read(line, 98, 1) == (0, b"\x05")
+    _pull(line)
+    line.advance(50 * MS)
+    assert line.servos[1].pulls_a > 0.0
+
+
+def test_an_error_of_the_hardware_takes_torque_until_a_reboot() -> None:
+    """Each answer carries the alert, and torque is refused."""
+    line = _line()
+    _pull(line)
+    line.servos[1].overload()
+    assert _ask(line, 1, 1)[8] == 0x80
+    assert _read(line, 70, 1) == (0x80, b"\x20")
+    assert _read(line, 64, 1) == (0x80, b"\x00")
+    assert _write(line, 64, 1) & 0x7F == 4
+    assert _ask(line, 1, 8) != b""
+    line.advance(299 * MS)
+    assert _ask(line, 1, 1) == b""  # It starts.
+    line.advance(2 * MS)
+    assert _read(line, 70, 1) == (0, b"\x00")
+    assert _write(line, 64, 1) == 0
+
+
+def test_a_reboot_keeps_the_eeprom_and_forgets_turns() -> None:
+    """Mode and limits stay; torque, watchdog and the count of turns do not."""
+    line = Line([ServoPlan(1, "XL330-M077", angle=100.0)])
+    assert _write(line, 38, 123, 2) == 0
+    assert _write(line, 98, 5) == 0
+    before = line.servos[1].register(132)
+    line.servos[1].lose_power()
+    line.advance(400 * MS)
+    assert (line.servos[1].register(38), line.servos[1].register(98)) == (123, 0)
+    after = line.servos[1].register(132)
+    assert 0 <= after < 4096
+    assert (before - after) % 4096 == 0
+
+
+def test_a_late_answer_comes_when_its_time_is_there() -> None:
+    """Neither before nor never."""
+    line = _line()
+    line.servos[1].faults.late_ns = 8 * MS
+    assert _ask(line, 1, 1) == b""
+    line.advance(7 * MS)
+    assert line.send() == b""
+    line.advance(2 * MS)
+    assert line.send() == status(1, 0, b"\xa6\x04\x34")
+
+
+def test_half_a_packet_is_dropped_after_a_while() -> None:
+    """Else what comes later would be taken for its end."""
+    line = _line()
+    line.receive(packed(1, 1, b"")[:7])
+    line.advance(20 * MS)
+    assert _ask(line, 1, 1) != b""
+
+
+def test_bytes_take_their_time_on_the_wire() -> None:
+    """10 bytes there, 14 back and 500 us of return delay, at 1 Mbaud."""
+    line = _line()
+    _ask(line, 1, 1)
+    assert line.busy_ns == 240_000 + 500_000
+
+
+def test_lines_that_cannot_be_are_refused() -> None:
+    """Two servos of one id, a baud rate or a model that does not exist."""
+    with pytest.raises(RobotError, match="same id"):
+        Line([ServoPlan(1), ServoPlan(1)])
+    with pytest.raises(RobotError, match="No servo has 12345 baud"):
+        Line([ServoPlan(1)], baud=12345)
+    with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
+        Line([ServoPlan(1, "XL330-M28")])

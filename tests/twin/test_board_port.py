@@ -1,0 +1,105 @@
+"""The driver's bytes over a board's socket, to servos in another process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.embodiments.finger import NOMINAL
+from shapechanger.errors import RobotError
+from shapechanger.robot.guard.outputs import Outputs
+from shapechanger.robot.guard.safe_pins import make_safe
+from shapechanger.robot.guard.sensors import Sensors
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.twin.hardware import TwinHardware, connect
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.place import Place
+from shapechanger.twin.start import RunningBoard, start_board
+from tests.twin.robots import CAR
+
+_PLAN = load_profile(find_profile("finger")).guard_plan()
+_PULL = (0.5, *(0.0,) * 6)
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
+    """A finger on the twin's clock."""
+    place = Place(finger=NOMINAL.to_json())
+    with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
+        yield started
+
+
+@pytest.fixture
+def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
+    """What a guard has of it."""
+    made = connect(board.socket_path)
+    yield made
+    made.close()
+
+
+def test_outputs_pull_and_the_sensor_hears(board: RunningBoard, hardware: TwinHardware) -> None:
+    """As in a guard: write, let time go by, read."""
+    outputs, sensors = Outputs(_PLAN, hardware), Sensors(_PLAN, hardware)
+    with Operator(board.socket_path) as operator:
+        for _ in range(20):
+            outputs.write(_PULL, hardware.clock.now_ns())
+            now_ns = operator.advance(0.01)
+            said = sensors.read(now_ns, 0.0)
+        assert said.failures == {}
+        assert said.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
+        assert operator.tensions()["FDP"] == pytest.approx(8.0, abs=1.5)  # Gears and speed.
+        outputs.release()
+        operator.advance(0.3)
+        assert operator.tensions()["FDP"] < 1.5
+        operator.break_servo("PI", "deaf")
+        failures = [sensors.read(operator.advance(0.01), 0.0).failures for _ in range(8)][-1]
+        assert "Servo PI (id 7) does not answer" in failures["tendons"]
+        operator.break_servo("PI", "")
+        operator.break_magnet("PIP_flexion")
+        seen = [sensors.read(operator.advance(0.01), 0.0) for _ in range(5)]
+        assert "PIP_flexion/angle" not in seen[0].quantities
+        assert "DIP_flexion/angle" in seen[0].quantities
+        assert "joints" not in seen[3].failures
+        assert "PIP_flexion, on channel 2, detects no magnet" in seen[4].failures["joints"]
+        operator.break_magnet("PIP_flexion", "")
+        assert "joints" not in sensors.read(operator.advance(0.01), 0.0).failures
+    sensors.close()
+    assert outputs.close(0) == []
+
+
+def test_what_makes_pins_safe_leaves_servos_alone(
+    board: RunningBoard, hardware: TwinHardware
+) -> None:
+    """A word to them would keep their watchdogs from letting go."""
+    outputs = Outputs(_PLAN, hardware)
+    with Operator(board.socket_path) as operator:
+        for _ in range(10):
+            outputs.write(_PULL, hardware.clock.now_ns())
+            operator.advance(0.01)
+        assert make_safe(_PLAN, hardware) == []
+        assert operator.tensions()["FDP"] > 4.0
+        operator.advance(0.5)
+        assert max(operator.tensions().values()) < 1.5
+    outputs.close(0)
+
+
+def test_a_bus_at_another_device_is_not_there(hardware: TwinHardware) -> None:
+    """Whoever mistypes it hears of it, as on the bench."""
+    outputs = tuple(
+        replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
+    )
+    with pytest.raises(RobotError, match="There is no /dev/ttyUSB7 at this twin"):
+        Outputs(replace(_PLAN, outputs=outputs), hardware)
+
+
+def test_a_car_has_no_servo_bus(tmp_path: Path) -> None:
+    """Neither has its operator."""
+    with (
+        start_board(CAR, "twin", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+        pytest.raises(RobotError, match="no servo bus"),
+    ):
+        operator.tensions()

@@ -1,0 +1,119 @@
+"""Encoders at joints, on the twin's bus."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shapechanger.embodiments.finger import JOINTS, NOMINAL
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.twin.chips.as5600 import As5600
+from shapechanger.twin.chips.tca9548a import Behind, Tca9548a
+from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.world.finger import FingerWorld
+from shapechanger.worlds.world import World
+
+_TURN = 2.0 * math.pi
+
+
+def _sensor(joints: tuple[str, ...] = JOINTS) -> SensorPlan:
+    n = len(joints)
+    settings = {
+        "bus": 1,
+        "mux": 0x70,
+        "joints": list(joints),
+        "channels": [7, 0, 3, 4][:n],
+        "zeros": [4090, 5, 2048, 1000][:n],
+        "directions": [1, -1, -1, 1][:n],
+    }
+    return SensorPlan("joints", "as5600", "joints", settings)  # pyright: ignore[reportArgumentType]
+
+
+def _board(world: World, sensor: SensorPlan) -> LocalBoard:
+    return LocalBoard(Wiring(GuardPlan("it", (), (), (sensor,))), world)
+
+
+def test_what_is_read_is_where_the_joints_are() -> None:
+    """To half a count of 4096, whatever is wired to which channel and turns which way."""
+    world = FingerWorld(NOMINAL, seed=2)
+    driver = open_driver(_sensor(), _board(world, _sensor()).hardware)
+    for seed in range(5):
+        world.place(seed)
+        truth = {name: v for name, v in world.truth().items() if name.endswith("/angle")}
+        assert driver.read(0, 0.0) == pytest.approx(truth, abs=0.51 * _TURN / 4096)
+
+
+def test_noise_is_that_of_the_parameters_and_of_the_seed() -> None:
+    """Each reading draws anew, and the same seed draws the same."""
+    noisy = NOMINAL.replace(joint_noise=0.02)
+    said: list[list[float]] = []
+    for _ in range(2):
+        world = FingerWorld(noisy, seed=2)
+        driver = open_driver(_sensor(), _board(world, _sensor()).hardware)
+        said.append([driver.read(0, 0.0)["PIP_flexion/angle"] for _ in range(400)])
+    assert said[0] == said[1]
+    assert np.std(said[0]) == pytest.approx(0.02, rel=0.1)
+    assert np.mean(said[0]) == pytest.approx(world.truth()["PIP_flexion/angle"], abs=0.004)
+
+
+def test_only_open_channels_are_heard() -> None:
+    """None at first; with two open, a line is low where either chip pulls it low."""
+    chips = [As5600("knee", lambda: 0.0, counts, 1) for counts in (0x0F3, 0x155)]
+    mux = Tca9548a({0: chips[0], 6: chips[1]})
+    behind = Behind(mux)
+    with pytest.raises(OSError, match="no chip answers"):
+        behind.read(0x0C, 2)
+    mux.write(1 << 6, [])
+    assert behind.read(0x0C, 2) == [0x01, 0x55]
+    mux.write(0x55, [1])  # The last byte counts.
+    assert behind.read(0x0B, 3) == [0x20, 0x00, 0xF3]
+    mux.write(0x41, [])
+    assert behind.read(0x0C, 2) == [0x00, 0x51]
+    mux.write(0x08, [])
+    with pytest.raises(OSError, match="no chip answers"):
+        behind.read(0x0C, 2)
+
+
+def test_the_two_bytes_of_an_angle_come_again_and_again() -> None:
+    """So that whoever stays on them reads newer ones; from the status on it counts on."""
+    chip = As5600("knee", lambda: 0.0, 0x0ABC, 1)
+    assert chip.read(0x0C, 4) == chip.read(0x0E, 4) == [0x0A, 0xBC, 0x0A, 0xBC]
+    assert chip.read(0x0B, 5) == [0x20, 0x0A, 0xBC, 0x0A, 0xBC]
+    assert chip.read(0x50, 2) == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("how", "seen"),
+    [
+        ("", (True, False, False)),
+        ("gone", (False, True, False)),
+        ("weak", (True, True, False)),
+        ("strong", (True, False, True)),
+    ],
+)
+def test_magnets_may_be_gone_too_far_or_too_near(how: str, seen: tuple[bool, ...]) -> None:
+    """The bits MD, ML and MH of the status."""
+    board = _board(FingerWorld(NOMINAL, seed=0), _sensor())
+    sensor = connect_encoders(_sensor(), board.hardware)
+    board.pins.encoder("PIP_flexion").set_magnet(how)  # pyright: ignore[reportArgumentType]
+    said = sensor.measure(sensor.encoders[2])
+    assert (said.detects_magnet, said.too_weak, said.too_strong) == seen
+
+
+def test_joints_that_are_not_there_are_told() -> None:
+    """By the world, by whoever breaks them, and where a world has none they stand at their zero."""
+    with pytest.raises(RobotError, match="and no knee"):
+        _board(FingerWorld(NOMINAL, seed=0), _sensor(("knee",)))
+    board = _board(DrivingWorld(frozenset(), (160, 120), 0), _sensor(("knee", "ankle")))
+    with pytest.raises(UnknownName, match=r"'kneee'\. Did you mean 'knee'"):
+        board.pins.encoder("kneee")
+    with pytest.raises(UnknownName, match="fault of a magnet"):
+        board.pins.encoder("knee").set_magnet("gonee")  # pyright: ignore[reportArgumentType]
+    driver = open_driver(_sensor(("knee", "ankle")), board.hardware)
+    assert driver.read(0, 0.0) == {"knee/angle": 0.0, "ankle/angle": 0.0}

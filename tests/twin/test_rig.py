@@ -1,0 +1,203 @@
+"""A finger's rig in this process: guard, driver and bytes as on the bench, bones in MuJoCo."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.embodiments.finger import JOINTS, NOMINAL, TENDONS
+from shapechanger.embodiments.finger.anatomy import JOINT_REST, MOMENT_ARMS
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Observation
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.twin.in_process import InProcessRobot
+from shapechanger.twin.rig import Rig, ServoFault
+from shapechanger.twin.world.finger import FingerWorld
+
+_REST = (0.0,) * 7
+_FLEX = (0.65, 0.65, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+# Torque for an ampere of an XL330-M077 on a spool of 10 mm, N.
+_N_PER_A = 0.215 / 1.47 / 0.010
+
+
+class _Bench:
+    """A rig that is armed."""
+
+    def __init__(self) -> None:
+        self.world = FingerWorld(NOMINAL, seed=3)
+        self.robot = InProcessRobot(load_profile(find_profile("finger")), self.world)
+        self.seen = self.robot.start()
+        self.names = Layout.from_json(self.robot.welcome.state_layout).names
+
+    @property
+    def rig(self) -> Rig:
+        assert self.robot.rig is not None
+        return self.robot.rig
+
+    def drive(self, values: tuple[float, ...], steps: int) -> Observation:
+        for _ in range(steps):
+            self.seen, _ = self.robot.step(values)
+        return self.seen
+
+    def state(self, what: str) -> NDArray[np.float64]:
+        return np.array([self.seen.state[self.names.index(f"{t}/{what}")] for t in TENDONS])
+
+
+@pytest.fixture
+def bench() -> Iterator[_Bench]:
+    """A rig that is armed; it ends with the test."""
+    made = _Bench()
+    yield made
+    made.robot.close()
+
+
+def test_nothing_pulls_before_the_first_command(bench: _Bench) -> None:
+    """Armed or not: no servo has torque while nobody commands."""
+    assert bench.seen.armed
+    assert not any(servo.has_torque for servo in bench.rig.line.servos.values())
+    assert max(bench.rig.tensions().values()) < 1.5  # Gears hold what hangs on them.
+
+
+def test_zero_is_the_pretension_and_one_the_most(bench: _Bench) -> None:
+    """Each servo has the current of its tension, to a count."""
+    bench.drive(_REST, 5)
+    pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.line.servos.values()]
+    assert pulls == pytest.approx([1.0] * 7, abs=0.02)
+    bench.drive((1.0, *_REST[1:]), 15)
+    assert bench.rig.servo("FDP").pulls_a * _N_PER_A == pytest.approx(15.0, abs=0.02)
+    assert bench.seen.action_applied == pytest.approx((1.0, *_REST[1:]))
+    assert bench.seen.stop_reason == ""
+
+
+def test_what_is_sensed_is_what_is(bench: _Bench) -> None:
+    """Lengths at the servos are those of the joints, up to the cables' stretch."""
+    bench.drive(_FLEX, 50)
+    angles = np.array([bench.world.truth()[f"{n}/angle"] for n in JOINTS])
+    assert angles[0] > JOINT_REST[0] + 0.2
+    stretch = np.array([bench.rig.tensions()[name] for name in TENDONS]) / 20e3
+    np.testing.assert_allclose(bench.state("length"), -MOMENT_ARMS @ angles - stretch, atol=2e-4)
+    assert bench.state("tension")[0] == pytest.approx(1.0 + 0.65 * 14.0, abs=0.1)
+    assert bench.seen.sources["FDP/length"] == "tendons"
+
+
+def test_the_same_commands_give_the_same_motion() -> None:
+    """A twin is a function of its seed."""
+    ends: list[tuple[float, ...]] = []
+    for _ in range(2):
+        bench = _Bench()
+        ends.append(bench.drive(_FLEX, 20).state)
+        bench.robot.close()
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("mute", "FDS .*does not answer"),
+        ("hot", "FDS .*(overheated|more than 65 C)"),
+        ("overload", "FDS .*overloaded"),
+        ("snapped", "FDS .*lost its tendon"),
+        ("power", "FDS .*(started afresh|does not answer)"),
+    ],
+)
+def test_a_servo_that_fails_takes_all_tendons_down(
+    bench: _Bench, how: ServoFault, words: str
+) -> None:
+    """To the pretension in 0.3 s, and then to nothing; commands go on, and move nothing."""
+    bench.drive(_FLEX, 25)
+    assert bench.rig.tensions()["FDP"] > 5.0
+    bench.rig.break_servo("FDS", how)
+    steps = 0
+    while not bench.seen.stop_reason:
+        bench.drive((1.0,) * 7 if how == "snapped" else _FLEX, 1)
+        steps += 1
+        assert steps < 40
+    assert re.search(words, bench.seen.stop_reason), bench.seen.stop_reason
+    bench.drive(_FLEX, 16)
+    others = [s for s in bench.rig.line.servos.values() if s is not bench.rig.servo("FDS")]
+    goal = max(abs(servo.pulls_a) for servo in others) * _N_PER_A
+    assert goal < 1.05
+    bench.drive(_FLEX, 20)
+    assert [servo.pulls_a for servo in others] == [0.0] * 6
+    tensions = bench.rig.tensions()
+    assert max(tensions.values()) < 2.0
+    assert bench.seen.stop_reason != ""
+
+
+def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
+    """As a servo that fails: to the pretension, to nothing, and disarmed until somebody looks."""
+    bench.drive(_FLEX, 25)
+    magnet = bench.robot.pins.encoder("PIP_flexion")
+    magnet.set_magnet("gone")
+    bench.drive(_FLEX, 2)
+    assert bench.seen.stop_reason == ""  # For a moment the joint is only absent.
+    assert bench.seen.sources["PIP_flexion/angle"] == "absent"
+    bench.drive(_FLEX, 2)
+    assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in bench.seen.stop_reason
+    assert not bench.seen.armed
+    bench.drive(_FLEX, 36)
+    assert [servo.pulls_a for servo in bench.rig.line.servos.values()] == [0.0] * 7
+    magnet.set_magnet("")
+    bench.drive(_FLEX, 5)
+    assert "no magnet" in bench.seen.stop_reason
+    bench.robot.arm()
+    bench.drive(_FLEX, 20)
+    assert bench.seen.stop_reason == ""
+
+
+def test_it_moves_again_when_it_is_armed_again(bench: _Bench) -> None:
+    """A servo that speaks again is no leave to move: somebody must look first."""
+    bench.drive(_FLEX, 10)
+    bench.rig.break_servo("FDS", "mute")
+    bench.drive(_FLEX, 40)
+    bench.rig.break_servo("FDS", "")
+    bench.drive(_FLEX, 10)
+    assert "does not answer" in bench.seen.stop_reason
+    bench.robot.arm()
+    bench.drive(_FLEX, 20)
+    assert bench.seen.stop_reason == ""
+    assert bench.rig.tensions()["FDP"] > 5.0
+
+
+def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
+    """Whoever arms it hears which one."""
+    bench.drive(_FLEX, 10)
+    bench.rig.break_servo("LUM", "mute")
+    bench.drive(_FLEX, 40)
+    with pytest.raises(RobotError, match=r"no servo answers as LUM \(id 5\)"):
+        bench.robot.arm()
+
+
+def test_a_silent_guard_lets_the_servos_let_go(bench: _Bench) -> None:
+    """Without any word for 100 ms each servo stops by itself."""
+    bench.drive(_FLEX, 25)
+    bench.rig.line.advance(90_000_000)
+    assert bench.rig.tensions()["FDP"] > 5.0
+    bench.rig.line.advance(500_000_000)
+    assert [servo.pulls_a for servo in bench.rig.line.servos.values()] == [0.0] * 7
+    assert max(bench.rig.tensions().values()) < 2.0
+
+
+def test_one_that_is_put_somewhere_is_just_taut(bench: _Bench) -> None:
+    """A person turns the spools: lengths follow, and no tendon is torn."""
+    bench.world.place(7)
+    assert max(bench.rig.tensions().values()) == 0.0
+    bench.drive(_REST, 2)
+    assert max(bench.rig.tensions().values()) < 5.0
+    angles = np.array([bench.world.truth()[f"{n}/angle"] for n in JOINTS])
+    np.testing.assert_allclose(bench.state("length"), -MOMENT_ARMS @ angles, atol=5e-4)
+
+
+def test_unknown_tendons_and_faults_are_told_what_there_is(bench: _Bench) -> None:
+    """By the names of the profile."""
+    with pytest.raises(UnknownName, match=r"'FDPP'. Did you mean 'FDP'"):
+        bench.rig.break_servo("FDPP", "mute")
+    with pytest.raises(UnknownName, match="fault of a servo"):
+        bench.rig.break_servo("FDP", "hott")  # pyright: ignore[reportArgumentType]
