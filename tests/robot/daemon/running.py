@@ -205,6 +205,7 @@ async def running(
     guard = FakeGuard(clock.now_ns)
     if plan.clock == "real":
         guard.attach()
+    guard.say()
     ready, tell = os.pipe()
     daemon = process.Daemon(plan, clock, guard.daemon_fd, ready_fd=tell)
     task = asyncio.create_task(daemon.run())
@@ -221,7 +222,6 @@ async def running(
     async with aiohttp.ClientSession() as session:
         port = json.loads(line)["port"]
         robot = Running(plan, clock, guard, camera, port, daemon, task, session)
-        guard.say()
         try:
             yield robot
         finally:

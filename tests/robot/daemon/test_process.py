@@ -12,13 +12,15 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
 from shapechanger.robot.daemon.life import LIFE, show_life
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
-from tests.robot.daemon.plans import car_plan
+from shapechanger.robot.guard.wire import encode
+from tests.robot.daemon.plans import car_plan, guard_state
 
 
 @dataclass
@@ -28,8 +30,9 @@ class Started:
     process: subprocess.Popen[bytes]
     guard: socket.socket
     heart: socket.socket
-    port: int
+    ready: BinaryIO
     life: int
+    port: int = 0
 
     def ended(self) -> tuple[int, str]:
         """Its exit status and what it said."""
@@ -39,8 +42,8 @@ class Started:
 
 
 @pytest.fixture
-def started() -> Iterator[Started]:
-    """A daemon that serves."""
+def begun() -> Iterator[Started]:
+    """A daemon that the guard has said nothing to."""
     daemon = car_plan(camera=None, discovery=True).to_dict()
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
     plan = plan_fd(ServePlan(guard_plan, daemon))
@@ -67,12 +70,11 @@ def started() -> Iterator[Started]:
         os.close(fd)
     guard_end.close()
     heart_end.close()
-    with os.fdopen(ready, "rb") as told:
-        port = json.loads(told.readline())["port"]
     heart.settimeout(20.0)
     said, (life,), _, _ = socket.recv_fds(guard, 16, 2)
     assert said == LIFE
-    yield Started(process, guard, heart, port, life)
+    with os.fdopen(ready, "rb") as told:
+        yield Started(process, guard, heart, told, life)
     for end in (guard, heart):
         end.close()
     os.close(life)
@@ -80,6 +82,14 @@ def started() -> Iterator[Started]:
     process.wait()
     if process.stderr is not None:
         process.stderr.close()
+
+
+@pytest.fixture
+def started(begun: Started) -> Started:
+    """A daemon that serves."""
+    begun.guard.send(encode(guard_state()))
+    begun.port = json.loads(begun.ready.readline())["port"]
+    return begun
 
 
 def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> None:
@@ -121,6 +131,16 @@ def test_a_guard_that_is_gone_before_is_no_crash() -> None:
     ours.close()
     with theirs:
         assert show_life(theirs.fileno())
+
+
+def test_nobody_is_let_in_before_the_guard_has_spoken(begun: Started) -> None:
+    """They would see a robot of which nothing is known, not even what its outputs do."""
+    assert begun.heart.recv(16) == b"."  # It runs.
+    begun.guard.close()
+    status, said = begun.ended()
+    assert (status, begun.ready.readline()) == (1, b"")
+    assert "listens" not in said
+    assert "The guard is gone." in said
 
 
 def test_it_ends_with_the_guard(started: Started) -> None:

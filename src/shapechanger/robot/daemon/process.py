@@ -65,6 +65,7 @@ class Daemon:
         self._plan = plan
         self._clock = clock
         self._ended = asyncio.Event()
+        self._heard = asyncio.Event()  # The guard has said something, or never will.
         self._why = ""
         self._port = GuardPort(
             guard_fd,
@@ -99,15 +100,14 @@ class Daemon:
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
-            port = await server.start()
-            self._say_ready(port, fingerprint)
-            if plan.discovery and is_loopback(plan.host):
-                _log.info(
-                    "%s is not announced: only this machine reaches %s.", plan.robot, plan.host
-                )
-            elif plan.discovery:
-                announcement = Announcement(plan, port, fingerprint)
-                await announcement.start()
+            # Who looks at once would see a robot of which nothing is known.
+            await self._heard.wait()
+            if not self._ended.is_set():
+                port = await server.start()
+                self._say_ready(port, fingerprint)
+                announcement = self._announcement(port, fingerprint)
+                if announcement is not None:
+                    await announcement.start()
             await self._ended.wait()
         finally:
             # The guard stops first: it sees the end of this socket.
@@ -129,9 +129,11 @@ class Daemon:
         """Stop serving."""
         self._why = self._why or why
         self._ended.set()
+        self._heard.set()
 
     def _on_state(self, state: GuardState) -> None:
         self._cockpit.on_state(state)
+        self._heard.set()
 
     async def _beat(self) -> None:
         """Show the supervisor that the event loop turns."""
@@ -171,6 +173,16 @@ class Daemon:
         reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)
         reader.start()
         return reader
+
+    def _announcement(self, port: int, fingerprint: bytes) -> Announcement | None:
+        """What lets the network know of the robot; None where nobody else reaches it, or shall."""
+        plan = self._plan
+        if not plan.discovery:
+            return None
+        if is_loopback(plan.host):
+            _log.info("%s is not announced: only this machine reaches %s.", plan.robot, plan.host)
+            return None
+        return Announcement(plan, port, fingerprint)
 
     def _say_ready(self, port: int, fingerprint: bytes) -> None:
         """Tell people, and whoever started this, where the robot is."""
