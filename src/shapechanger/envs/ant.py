@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import MissingExtra
 
 try:
-    import mujoco
     from gymnasium.envs.mujoco.ant_v5 import AntEnv as GymnasiumAntEnv
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
@@ -141,8 +140,8 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             check_action(self, action)
         x_before, y_before = bound.main_xy.tolist()
         bound.ctrl[:] = action
-        mujoco.mj_step(bound.stepping, bound.data, bound.frame_skip)
-        mujoco.mj_rnePostConstraint(bound.stepping, bound.data)
+        with bound.stopwatch:
+            bound.move()
         x_after, y_after = bound.main_xy.tolist()
         x_velocity = np.float64((x_after - x_before) / bound.dt)
         y_velocity = np.float64((y_after - y_before) / bound.dt)

@@ -82,8 +82,8 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         if not math.isfinite(sum(action.tolist())):
             check_action(self, action)
         bound.ctrl[:] = action
-        mujoco.mj_step(bound.stepping, bound.data, bound.frame_skip)
-        mujoco.mj_rnePostConstraint(bound.stepping, bound.data)
+        with bound.stopwatch:
+            bound.move()
         observation = np.concatenate(bound.observed, out=out)
         numbers = observation.tolist()
         # A sum is finite only if every number is; one that is not may have overflowed.

@@ -16,6 +16,11 @@ from shapechanger.envs.stepping.comparison import moves_equally
 
 _ISLAND = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 _CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+_MIDPHASE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+_SPRING = int(mujoco.mjtDisableBit.mjDSBL_SPRING)
+_DAMPER = int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+_FRICTION = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+_SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 _BALL = '<geom name="{0}" size="0.1" {1}/>'
 _SCENE = """
@@ -51,6 +56,12 @@ def _scene(**parts: str) -> mujoco.MjSpec:
     given = dict.fromkeys(("floor", "fixed", "trunk", "more", "legs", "other", "rest"), "")
     given |= {"trunk": _SILENT, "legs": _SILENT} | parts
     return mujoco.MjSpec.from_string(_SCENE.format(**given))
+
+
+def _searches(fast: mujoco.MjModel) -> bool:
+    """Whether it looks for contacts as the original does, and not for islands."""
+    flags = fast.opt.disableflags
+    return bool(flags & _ISLAND) and not flags & (_MIDPHASE | _CONTACT)
 
 
 def _twin(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
@@ -112,7 +123,7 @@ def test_where_the_order_is_open_the_search_stays(parts: dict[str, str]) -> None
     assert fast is not None
     assert not fast.npair
     np.testing.assert_array_equal(fast.geom_contype, model.geom_contype)
-    assert fast.opt.disableflags == _ISLAND
+    assert _searches(fast)
     _roll(model, fast, 400)
 
 
@@ -141,7 +152,7 @@ def test_pairs_of_the_model_stay_as_they_are() -> None:
     model, fast = _twin(_scene(rest=pair))
     assert fast is not None
     assert fast.npair == 1
-    assert fast.opt.disableflags == _ISLAND
+    assert _searches(fast)
     _roll(model, fast, 400)
 
 
@@ -151,6 +162,47 @@ def test_a_pendulum_touches_nothing() -> None:
     env.reset(seed=0)
     env.step(np.zeros(1))
     assert env._bound.stepping.opt.disableflags & _CONTACT
+
+
+def _stiff(spec: Any) -> None:
+    spec.joint("hip").stiffness = [20.0, 0.0, 0.0]
+
+
+def _rough(spec: Any) -> None:
+    spec.joint("hip").frictionloss = 0.2
+
+
+def _sensing(spec: Any) -> None:
+    spec.add_sensor(
+        type=mujoco.mjtSensor.mjSENS_JOINTPOS, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname="hip"
+    )
+
+
+@pytest.mark.parametrize(
+    ("add", "flag"), [(_stiff, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)]
+)
+def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
+    """A spring, friction and a sensor are felt as before."""
+    _, plain = _twin(_scene())
+    spec = _scene()
+    add(spec)
+    model, fast = _twin(spec)
+    assert plain is not None
+    assert fast is not None
+    assert plain.opt.disableflags & flag
+    assert not fast.opt.disableflags & flag
+    _roll(model, fast, 400)
+
+
+def test_without_dampers_the_springs_stay() -> None:
+    """Where MuJoCo is told to leave out both, it leaves out gravity compensation as well."""
+    spec = _scene()
+    spec.option.disableflags = _DAMPER
+    spec.body("shin").gravcomp = 1.0
+    model, fast = _twin(spec)
+    assert fast is not None
+    assert not fast.opt.disableflags & _SPRING
+    _roll(model, fast, 400)
 
 
 def test_a_filter_of_contacts_is_obeyed() -> None:

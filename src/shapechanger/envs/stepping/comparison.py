@@ -16,6 +16,9 @@ __all__ = ["moves_equally"]
 _FIELDS: Final = (
     *("time", "qpos", "qvel", "act", "qacc", "qacc_warmstart", "qfrc_constraint", "xpos", "xquat"),
     *(
+        "qfrc_passive",
+        "qfrc_spring",
+        "qfrc_damper",
         "geom_xpos",
         "cinert",
         "cvel",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar, Literal, NamedTuple, cast
 from weakref import WeakValueDictionary
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.reshapable import Reshapable
+from shapechanger.envs.stepping.stopwatch import resting_stopwatch
 from shapechanger.envs.stepping.twin import demand_for, find_twin, known_twin
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
@@ -63,6 +65,7 @@ class Binding:
         has_twin: Whether it is the twin; else None while nobody has looked for one.
         demand: How much a twin would be used.
         shape: Shape of an action.
+        stopwatch: A context in which MuJoCo's stopwatch may rest.
         dt: Time of a step as long as the model is unedited, s.
         trouble: Not 0 where MuJoCo found the pose, the velocity or the acceleration bad, (3,).
         before: What `conclude` needs to know of the time before a step, in arrays of float64.
@@ -81,6 +84,7 @@ class Binding:
         self.stepping = model
         self.has_twin: bool | None = None
         self.demand = demand_for(watch)
+        self.stopwatch: AbstractContextManager[None] = nullcontext()
         self.shape = (int(model.nu),)
         self.frame_skip = frame_skip
         self.dt = model.opt.timestep * frame_skip
@@ -94,7 +98,7 @@ class Binding:
         self.kind_known = False
 
     def move(self) -> None:
-        """Step the physics alone."""
+        """Step the physics alone; to be called with the stopwatch."""
         mujoco.mj_step(self.stepping, self.data, self.frame_skip)
         mujoco.mj_rnePostConstraint(self.stepping, self.data)
 
@@ -129,7 +133,8 @@ class TunedStep(Reshapable):
     Attributes:
         replaced: Methods and properties that `_advance` does the work of.
         tuned: The class that `_advance` was written for.
-        fast_model: Whether a twin of the model, which moves to the last bit like it, may step.
+        fast_model: Whether a twin of the model, which moves to the last bit like it, may step, and
+            MuJoCo's stopwatch may rest.
         patience: Steps with a body, of all envs that have it, before a twin is looked for. To find
             an ant's takes 20 ms, and it saves 0.05 ms in each step: a body that is changed sooner
             would not pay for it. The step at which the twin takes over cannot be seen.
@@ -291,7 +296,10 @@ class TunedStep(Reshapable):
         if watch is None or watch.model is not self.model or not self._is_as_written():
             return None
         bound = self._bound = self._bind(watch)
-        if self.fast_model and (twin := known_twin(watch)) is not None:
+        if not self.fast_model:
+            return bound
+        bound.stopwatch = resting_stopwatch()
+        if (twin := known_twin(watch)) is not None:
             self._take_twin(bound, twin)
             if not bound.unedited():
                 return None

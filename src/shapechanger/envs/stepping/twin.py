@@ -1,6 +1,6 @@
 """A model that moves like another to the last bit, and costs less.
 
-Three things of MuJoCo cost time and change no number of an ant or a pendulum:
+Four things of MuJoCo cost time and change no number of an ant or a pendulum:
 
 - **Islands.** The solver splits the constraints into islands that do not touch. One tree of bodies
   has at most one island, which holds all constraints; not looking for it gives the same sums in the
@@ -9,6 +9,7 @@ Three things of MuJoCo cost time and change no number of an ant or a pendulum:
   Given as explicit pairs, in the order in which the search would find them and with the numbers
   that it would mix, they make the same contacts. Margins are *summed*.
 - **Collisions where there can be none**, as on a pendulum.
+- **Springs, friction of joints, sensors and equalities** of a model that has none.
 
 Which of these hold is decided twice: by rules on the model, which keep every pair that the original
 could ever generate, and then by a test that runs both models side by side. A model for which either
@@ -141,8 +142,23 @@ def _is_one_tree(model: mujoco.MjModel) -> bool:
 def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
     """The model without the search for islands."""
     result = copy.copy(model)
-    result.opt.disableflags |= _NO_ISLANDS
+    result.opt.disableflags |= _NO_ISLANDS | _idle(model)
     return result
+
+
+def _idle(model: mujoco.MjModel) -> int:
+    """The flags of what the model has none of; it has nothing unknown, such as tendons."""
+    # Without springs and dampers MuJoCo leaves out all other passive forces too.
+    has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
+    has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
+    idle = int(_BIT.mjDSBL_EQUALITY)
+    if has_dampers and not has_springs:
+        idle |= int(_BIT.mjDSBL_SPRING)
+    if not model.dof_frictionloss.any():
+        idle |= int(_BIT.mjDSBL_FRICTIONLOSS)
+    if not model.nsensor:
+        idle |= int(_BIT.mjDSBL_SENSOR)
+    return idle
 
 
 def _without_search(
@@ -154,7 +170,7 @@ def _without_search(
     _, pairs = colliding_pairs(model)
     if not pairs.size:
         result = copy.copy(model)
-        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS
+        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS | _idle(model)
         return result
     names = [model.geom(geom).name for geom in range(model.ngeom)]
     if not _on_one_floor(model, pairs) or not all(names):
@@ -174,7 +190,7 @@ def _without_search(
         result.body_conaffinity,
     ):
         bits[:] = 0
-    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH
+    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _idle(model)
     return result
 
 

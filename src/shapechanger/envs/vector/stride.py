@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -111,11 +112,12 @@ class Stride:
         for kind, (own, bindings) in kinds.items():
             self._parts[thread][kind] = self._prepare(thread, kind, own, bindings)
             tasks.extend(zip(own, bindings, strict=True))
-        moved = _move(self._shares.own(thread, tasks), failures)
-        if moved == len(tasks):  # Nobody else is still at it, and the others are not held up.
-            for part in self._parts[thread].values():
-                part.read_after()
-        _move(self._shares.others(thread), failures)
+        with _stopwatch(tasks):
+            moved = _move(self._shares.own(thread, tasks), failures)
+            if moved == len(tasks):  # Nobody else is still at it, and the others are not held up.
+                for part in self._parts[thread].values():
+                    part.read_after()
+            _move(self._shares.others(thread), failures)
 
     def _alone(self, number: int) -> None:
         step = self._members[number].step(self._actions[number])
@@ -160,6 +162,12 @@ class Stride:
 
     def _where(self, numbers: list[int]) -> slice | NDArray[np.intp]:
         return slice(None) if len(numbers) == len(self._members) else np.array(numbers)
+
+
+def _stopwatch(tasks: Iterable[_Task]) -> AbstractContextManager[None]:
+    """The stopwatch of envs that have the same; the usual one goes on where they have not."""
+    found = {bound.stopwatch for _, bound in tasks}
+    return found.pop() if len(found) == 1 else nullcontext()
 
 
 def _move(tasks: Iterable[_Task], failures: Failures) -> int:
