@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, ClassVar, Literal, NamedTuple, cast
+from typing import Any, ClassVar, Final, Literal, NamedTuple, cast
 from weakref import WeakValueDictionary
 
 import gymnasium as gym
@@ -40,6 +40,10 @@ class Outcomes(NamedTuple):
     terminated: NDArray[np.bool_]
     infos: dict[str, NDArray[Any] | list[Any]]
     diverged: Sequence[int]
+
+
+# What a step among others relies on.
+_COUNTS: Final = frozenset({"model", "data", "frame_skip"})
 
 
 class Kind:
@@ -138,6 +142,8 @@ class TunedStep(Reshapable):
         patience: Steps with a body, of all envs that have it, before a twin is looked for. To find
             an ant's takes 20 ms, and it saves 0.05 ms in each step: a body that is changed sooner
             would not pay for it. The step at which the twin takes over cannot be seen.
+        distrusted: Called whenever a step among others must compare the model again, as after a
+            reset.
     """
 
     replaced: ClassVar[tuple[str, ...]] = ()
@@ -145,6 +151,7 @@ class TunedStep(Reshapable):
     patience: ClassVar[int] = 400
 
     fast_model: bool = True
+    distrusted: tuple[Callable[[], None], ...] = ()
     _bound: Any = None
     _watch: ModelWatch | None = None
     _rules: StartRules | None = None
@@ -156,7 +163,7 @@ class TunedStep(Reshapable):
         self._watch = ModelWatch(self.model)
         self._rules = None
         self._bound = None
-        self._trusted = False
+        self._distrust()
 
     def _start_rules(self) -> StartRules:
         watch = self._watch
@@ -170,10 +177,21 @@ class TunedStep(Reshapable):
         """Put the body at a pose (nq,) with velocities (nv,)."""
         super().set_state(qpos, qvel)
         self._started = True
-        # A step among others compares the model again.
-        self._trusted = False
+        self._distrust()
         if self._bound is not None:
             self._bound.kind_known = False
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Another model, other data or a longer step in the place of the old one is noticed."""
+        super().__setattr__(name, value)
+        if name in _COUNTS:
+            self._distrust()
+
+    def _distrust(self) -> None:
+        """Have a step among others compare the model again."""
+        self._trusted = False
+        for tell in self.distrusted:
+            tell()
 
     def render(self) -> Any:
         """A frame, or None where a window shows it.
@@ -216,14 +234,7 @@ class TunedStep(Reshapable):
             ResetNeeded: If the env has not been reset.
         """
         if self._trusted:
-            bound = self._bound
-            if (
-                bound.data is self.data
-                and bound.model is self.model
-                and bound.frame_skip == self.frame_skip
-            ):
-                return bound
-            self._trusted = False
+            return self._bound
         if not self._steps_as_written():
             return None
         bound = self._ready()

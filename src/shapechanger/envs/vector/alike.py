@@ -39,11 +39,21 @@ class Group(NamedTuple):
 
 
 class Alike:
-    """Finds the groups of envs, and remembers them as long as they hold."""
+    """Finds the groups of envs, and remembers them as long as they hold.
+
+    Attributes:
+        ready: By number the bindings of envs that step their physics apart, until they are
+            distrusted.
+    """
 
     def __init__(self) -> None:
+        self.ready: dict[int, Binding] = {}
         self._bindings: dict[int, Binding] = {}
         self._groups: dict[Kind, Group] = {}
+
+    def forget(self, number: int) -> None:
+        """An env has been reset or changed: it must be asked again whether it is ready."""
+        self.ready.pop(number, None)
 
     def group(self, kind: Kind, numbers: list[int], bindings: list[Binding]) -> Group:
         """The group that the envs `numbers` of one kind are in."""

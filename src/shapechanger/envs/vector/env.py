@@ -100,6 +100,9 @@ class ThreadVectorEnv(Access):
         threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
         self._crew = Crew(threads, self.num_envs)
         self._alike = [Alike() for _ in range(threads)]
+        for alike, part in zip(self._alike, self._crew.parts, strict=True):
+            for number in part:
+                self._members[number].when_distrusted(partial(alike.forget, number))
         # Ends the threads of a vector env that nobody closes, and at the end of the program.
         weakref.finalize(self, self._crew.stop)
 
@@ -223,8 +226,16 @@ class ThreadVectorEnv(Access):
 
         def work(thread: int, failures: Failures) -> None:
             own = self._crew.parts[thread]
-            work_through(start, [i for i in own if waiting[i]], failures)
-            stride.advance(thread, [i for i in own if not waiting[i]], failures)
+            begin = [i for i in own if waiting[i]]
+            # What draws may not change threads.
+            work_through(start, [i for i in begin if self._members[i].tuned is None], failures)
+            anywhere = [i for i in begin if self._members[i].tuned is not None]
+            stride.advance(
+                thread,
+                [i for i in own if not waiting[i]],
+                [(i, partial(start, i)) for i in anywhere],
+                failures,
+            )
 
         self._crew.share([partial(work, thread) for thread in range(self.threads)])
         stride.conclude()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
@@ -90,6 +91,11 @@ class Member:
         if "diverged" in info or (self._warnings is not None and self._warned()):
             return self.diverged(truncated, info)
         return reward, terminated, truncated, info
+
+    def when_distrusted(self, tell: Callable[[], None]) -> None:
+        """Have somebody told when `ready` must be asked again."""
+        if self.tuned is not None:
+            self.tuned.distrusted = (*self.tuned.distrusted, tell)
 
     def ready(self) -> Binding | None:
         """The binding of the env, if its physics may step apart; else `step` must do it all."""

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Stride"]
 
-# An env's number and the views of its data.
-_Task = tuple[int, "Binding"]
+# An env's number, and what is to be done for it.
+_Task = tuple[int, Callable[[], object]]
 
 
 @dataclass(slots=True)
@@ -87,37 +87,53 @@ class Stride:
         self._shares: Shares[_Task] = Shares(len(alike))
         self._parts: list[dict[Kind, _Part]] = [{} for _ in alike]
 
-    def advance(self, thread: int, numbers: Sequence[int], failures: Failures) -> None:
+    def advance(
+        self, thread: int, numbers: Sequence[int], begin: Sequence[_Task], failures: Failures
+    ) -> None:
         """Step the physics of envs, and all of those that do not step it apart.
 
         Args:
             thread: The number of the thread; when it is done with its own envs it helps others.
             numbers: Numbers of its envs, from the lowest up.
+            begin: What begins the episodes of others of its envs; any thread may do that.
             failures: Takes what an env raises; the others go on.
         """
         kinds: dict[Kind, tuple[list[int], list[Binding]]] = {}
+        # An env that is not asked again is not brought back into the caches of a core.
+        ready = self._alike[thread].ready
         for number in numbers:
-            try:
-                bound = self._members[number].ready()
-                if bound is None:
-                    self._alone(number)
+            bound = ready.get(number)
+            if bound is None:
+                try:
+                    bound = self._members[number].ready()
+                    if bound is None:
+                        self._alone(number)
+                        continue
+                except Exception as error:  # It crosses to the caller, who raises it.
+                    failures.append((number, error))
                     continue
-            except Exception as error:  # It crosses to the caller, who raises it.
-                failures.append((number, error))
-                continue
+                if bound.has_twin:
+                    ready[number] = bound
             own, bindings = kinds.setdefault(cast("Kind", bound.kind), ([], []))
             own.append(number)
             bindings.append(bound)
         tasks: list[_Task] = []
+        stopwatches: set[AbstractContextManager[None]] = set()
         for kind, (own, bindings) in kinds.items():
             self._parts[thread][kind] = self._prepare(thread, kind, own, bindings)
-            tasks.extend(zip(own, bindings, strict=True))
-        with _stopwatch(tasks):
-            moved = _move(self._shares.own(thread, tasks), failures)
-            if moved == len(tasks):  # Nobody else is still at it, and the others are not held up.
+            tasks.extend((number, bound.move) for number, bound in zip(own, bindings, strict=True))
+            stopwatches.update(bound.stopwatch for bound in bindings)
+        # Python's part of a reset is long. Threads that reset at the same time would wait for one
+        # another; while the others step physics nobody waits.
+        place = len(tasks) * (2 * thread + 1) // (2 * len(self._alike))
+        tasks[place:place] = begin
+        # Where envs do not agree on the stopwatch it goes on.
+        with stopwatches.pop() if len(stopwatches) == 1 else nullcontext():
+            done = _do(self._shares.own(thread, tasks), failures)
+            if done == len(tasks):  # Nobody else is still at it, and the others are not held up.
                 for part in self._parts[thread].values():
                     part.read_after()
-            _move(self._shares.others(thread), failures)
+            _do(self._shares.others(thread), failures)
 
     def _alone(self, number: int) -> None:
         step = self._members[number].step(self._actions[number])
@@ -164,22 +180,16 @@ class Stride:
         return slice(None) if len(numbers) == len(self._members) else np.array(numbers)
 
 
-def _stopwatch(tasks: Iterable[_Task]) -> AbstractContextManager[None]:
-    """The stopwatch of envs that have the same; the usual one goes on where they have not."""
-    found = {bound.stopwatch for _, bound in tasks}
-    return found.pop() if len(found) == 1 else nullcontext()
-
-
-def _move(tasks: Iterable[_Task], failures: Failures) -> int:
-    """Step the physics of envs; how many did."""
-    moved = 0
-    for number, bound in tasks:
+def _do(tasks: Iterable[_Task], failures: Failures) -> int:
+    """Do what is to be done; how much of it could be."""
+    done = 0
+    for number, work in tasks:
         try:
-            bound.move()
-            moved += 1
+            work()
+            done += 1
         except Exception as error:  # It crosses to the caller, who raises it.
             failures.append((number, error))
-    return moved
+    return done
 
 
 def _stacked(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
