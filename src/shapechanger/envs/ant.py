@@ -86,7 +86,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         healthy_z_range: Heights of the torso between which the ant is healthy, m; None derives the
             upper one from the body and sets no lower one.
         fast_model: Whether a model that moves to the last bit like the body's, and costs less, may
-            step it.
+            step it, and MuJoCo measures no times (`data.timer`) meanwhile.
         **arguments: All arguments of `Ant-v5`.
     """
 

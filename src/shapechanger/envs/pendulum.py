@@ -55,7 +55,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
         fast_model: Whether a model that moves to the last bit like the body's, and costs less, may
-            step it.
+            step it, and MuJoCo measures no times (`data.timer`) meanwhile.
         **arguments: All arguments of `InvertedPendulum-v5`.
     """
 
