@@ -24,6 +24,23 @@ settings.register_profile("shapechanger", deadline=None, derandomize=True)
 settings.load_profile("shapechanger")
 
 
+# Robots are processes that keep time with one another. Where the machine stands still for half a
+# second, what is right fails too; the summary names what had to be tried again.
+_IN_REAL_TIME = ("robot", "remote", "twin", "cli/robot", "cli/demos/test_on_robot.py")
+_REAL_TIME_CLAIMS = "claims/test_robot_"
+_AGAIN = 2
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Try the tests of running robots again when they fail."""
+    for item in items:
+        path = item.path.relative_to(config.rootpath / "tests")
+        if path.as_posix().startswith(_REAL_TIME_CLAIMS) or any(
+            path.is_relative_to(folder) for folder in _IN_REAL_TIME
+        ):
+            item.add_marker(pytest.mark.flaky(reruns=_AGAIN))
+
+
 @pytest.fixture(scope="session")
 def gl() -> None:
     """Something to draw with."""
