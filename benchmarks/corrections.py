@@ -32,6 +32,8 @@ __all__ = ["corrections"]
 
 LAYOUTS: Final = 100
 MINUTES: Final = 10
+# A clone of ten minutes collides so rarely that it takes a long way to tell two of them apart.
+LONG_LAYOUTS: Final = 300
 FEW_MINUTES: Final = 2
 FEW_SEEDS: Final = 3
 # Seeds of courses that nobody was recorded on before; each seed of the study has its own.
@@ -45,12 +47,14 @@ class _Round:
     Args:
         vehicle: Which.
         minutes: How many.
+        courses: How many are driven to judge it.
         seed: Of the courses that are recorded, and of the training.
     """
 
-    def __init__(self, vehicle: str, minutes: int, seed: int = 0) -> None:
+    def __init__(self, vehicle: str, minutes: int, courses: int, seed: int = 0) -> None:
         self._vehicle = vehicle
         self._minutes = minutes
+        self._courses = layouts(courses)
         self._seed = seed
         self._folder = Path("results", "corrections", f"{vehicle}-{minutes}-{seed}")
         self._shown = self._folder / "shown"
@@ -94,12 +98,11 @@ class _Round:
 
     def _driven(self, policy: Path) -> list[Drive]:
         """Drives on courses that nobody was recorded on, kept in a file beside the policy."""
-        courses = layouts(LAYOUTS)
-        kept = policy.with_suffix(f".{len(courses)}.drives")
+        kept = policy.with_suffix(f".{len(self._courses)}.drives")
         if not kept.exists():
             act = sighted(CameraPolicy.load(policy))
             with closing(VehicleEnv(self._vehicle, courses="held-out", put_back=True)) as env:
-                drives = [drive(env, act, course=course) for course in courses]
+                drives = [drive(env, act, course=course) for course in self._courses]
             kept.write_text(json.dumps([asdict(each) for each in drives]))
         return [Drive(**each) for each in json.loads(kept.read_text())]
 
@@ -108,14 +111,14 @@ def corrections() -> list[Row]:
     """Ten minutes of the expert and of corrections once; two of each with several seeds."""
     vehicle = os.environ.get("VEHICLE", "car")
     knows = _expert(vehicle)
-    long = _Round(vehicle, MINUTES)
+    long = _Round(vehicle, MINUTES, LONG_LAYOUTS)
     before, after = DriveScore.of(long.first()), DriveScore.of(long.corrected())
     rows = [
         _row(f"{vehicle}, cloned from {MINUTES} minutes of the expert", before, knows),
         _row(f"{vehicle}, after a round of {MINUTES} minutes of corrections", after, knows),
         _ratio_row(f"{vehicle}: collisions left after that round", before, after),
     ]
-    short = [_Round(vehicle, FEW_MINUTES, seed) for seed in range(FEW_SEEDS)]
+    short = [_Round(vehicle, FEW_MINUTES, LAYOUTS, seed) for seed in range(FEW_SEEDS)]
     begun = [each.first() for each in short]
     mended = [each.corrected() for each in short]
     longer = [each.continued() for each in short]
