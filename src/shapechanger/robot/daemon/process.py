@@ -100,8 +100,8 @@ class Daemon:
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
-            # Who looks at once would see a robot of which nothing is known; but where time waits for
-            # somebody who looks, the guard has said nothing before.
+            # Who looks at once would see a robot of which nothing is known. Where time waits for
+            # somebody who looks, the guard says nothing before.
             if not time.in_steps:
                 await self._heard.wait()
             if not self._ended.is_set():
