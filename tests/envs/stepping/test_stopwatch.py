@@ -6,7 +6,8 @@ import contextlib
 import ctypes
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
 import gymnasium as gym
 import mujoco
@@ -15,6 +16,7 @@ import pytest
 
 import shapechanger
 from shapechanger.envs.stepping.stopwatch import Resting, resting_stopwatch
+from shapechanger.envs.vector.env import ThreadVectorEnv
 
 _STEP = int(mujoco.mjtTimer.mjTIMER_STEP)
 
@@ -73,6 +75,16 @@ def test_it_rests_in_a_vector_env_too(threads: int, fast: bool) -> None:
         assert all((_measured(data) == 0.0) is fast for data in datas)
         mujoco.mj_step(envs.envs[0].unwrapped.model, datas[0])
         assert _measured(datas[0]) > 0.0
+
+
+def test_it_goes_on_where_one_env_wants_it() -> None:
+    """The others are measured too then: there is one for all."""
+    makers = [partial(gym.make, "shapechanger/Ant-v1", fast_model=fast) for fast in (True, False)]
+    with contextlib.closing(ThreadVectorEnv(makers)) as envs:
+        datas: list[mujoco.MjData] = [env.unwrapped.data for env in cast("Any", envs.envs)]
+        envs.reset(seed=0)
+        envs.step(np.zeros((2, 8), np.float32))
+        assert all(_measured(data) > 0.0 for data in datas)
 
 
 def test_a_users_own_clock_goes_on(clocked: Callable[[], int]) -> None:

@@ -168,6 +168,11 @@ def _stiff(spec: Any) -> None:
     spec.joint("hip").stiffness = [20.0, 0.0, 0.0]
 
 
+def _stiffening(spec: Any) -> None:
+    """Only where it is bent."""
+    spec.joint("hip").stiffness = [0.0, 20.0, 0.0]
+
+
 def _rough(spec: Any) -> None:
     spec.joint("hip").frictionloss = 0.2
 
@@ -179,7 +184,8 @@ def _sensing(spec: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("add", "flag"), [(_stiff, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)]
+    ("add", "flag"),
+    [(_stiff, _SPRING), (_stiffening, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)],
 )
 def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
     """A spring, friction and a sensor are felt as before."""
