@@ -43,6 +43,7 @@ from benchmarks import (
 )
 from benchmarks.row import Row
 from shapechanger.embodiments.ant import ANT
+from shapechanger.errors import UnknownName
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.effective import fingerprint
 
@@ -179,6 +180,9 @@ def _processor() -> str:
 def main() -> None:
     """Run the suites named on the command line, or all."""
     names = sys.argv[1:] or list(SUITES)
+    for name in names:
+        if name not in SUITES:
+            sys.exit(str(UnknownName("suite", name, SUITES)))
     table = Table("measured", "value", "spread", "target", "met", box=None)
     for name in names:
         rows = SUITES[name]()

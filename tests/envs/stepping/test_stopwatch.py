@@ -42,7 +42,7 @@ def clocked() -> Iterator[Callable[[], int]]:
 
 @pytest.mark.parametrize("name", ["Ant", "InvertedPendulum"])
 def test_nothing_is_measured_in_a_step_but_everything_after_it(name: str) -> None:
-    """A tenth of an ant's step is saved, and whoever steps the data by hand may measure it."""
+    """What that would cost is saved, and whoever steps the data by hand may measure it."""
     with contextlib.closing(gym.make(f"shapechanger/{name}-v1")) as env:
         inner: Any = env.unwrapped
         env.reset(seed=0)

@@ -1,8 +1,8 @@
 """MuJoCo's stopwatch, which rests while an env steps.
 
-In C nothing is measured unless somebody installs a clock. Python's MuJoCo installs one, and each
-step then reads it some fifty times for every stage of the integrator, to fill `data.timer`: a tenth
-of an ant's step (`python -m benchmarks.run speed`). No other number depends on it.
+In C nothing is measured unless somebody installs a clock. Python's MuJoCo installs one, and an
+ant's step reads it hundreds of times to fill `data.timer`; how often, and what that costs, is a row
+of `python -m benchmarks.run speed`. No other number depends on it.
 """
 
 from __future__ import annotations
