@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+import numpy as np
 import pytest
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from gymnasium.wrappers import TransformObservation
 
+import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.layout import Feature, Layout
+from shapechanger.morphology import Edit, Friction, Mass
 from shapechanger.morphology.certificate.certify import Certificate, certify
 from tests.morphology.scenes import ASSETS
 from tests.morphology.swing import Noisy, Swing, Wrapper
@@ -135,3 +138,31 @@ def test_registered_ids_are_the_labels() -> None:
         certificate = certify(env, env, allow_empty=True, steps=20)
     assert certificate.source == certificate.target == "InvertedPendulum-v5"
     assert certificate.is_empty
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [Mass("torso", scale=1.0), Friction("ffoot", to=0.2)],
+    ids=["mass-x1", "masked-friction"],
+)
+def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
+    """Writing out HalfCheetah's total mass moves its masses by 4e-16 kg, which is no shift.
+
+    The friction of a foot at 0.2 is masked by that of the floor, 0.4.
+    """
+    source = gymnasium.make("shapechanger/HalfCheetah-v1")
+    target = gymnasium.make("shapechanger/HalfCheetah-v1", body=edit)
+    assert not np.array_equal(source.unwrapped.model.body_mass, target.unwrapped.model.body_mass)
+    for seed in range(3):  # Seed 1 amplifies the rounding to 0.2 within 100 steps.
+        with pytest.raises(EmptyShift, match="differ by rounding only"):
+            certify(source, target, seed=seed)
+    certificate = certify(source, target, allow_empty=True)
+    assert certificate.same_model
+    assert certificate.changes == ()
+
+
+def test_a_small_real_change_is_no_rounding() -> None:
+    """A mass that differs by a millionth is a shift, although a small one."""
+    target = gymnasium.make("shapechanger/HalfCheetah-v1", body=Mass("torso", scale=1.000001))
+    certificate = certify(gymnasium.make("shapechanger/HalfCheetah-v1"), target)
+    assert "mass" in {change.quantity for change in certificate.changes}

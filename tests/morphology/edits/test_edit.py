@@ -5,10 +5,19 @@ from __future__ import annotations
 import math
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import EDITS, Edit, Gravity, Mass, Stretch
+from shapechanger.morphology import (
+    EDITS,
+    Edit,
+    Gravity,
+    Mass,
+    Stretch,
+    compile_body,
+    to_json,
+)
 from shapechanger.morphology.edits.edit import part_of_the_way, require_factor, require_vector
 from tests.morphology.models import leg
 
@@ -89,3 +98,15 @@ def test_tags_are_the_names_of_the_kinds() -> None:
         *("mass", "density", "gear", "damping", "stiffness", "friction"),
         *("joint_range", "lock", "gravity", "start_height"),
     ]
+
+
+def test_numpy_numbers_are_values() -> None:
+    """Scalars and arrays of NumPy become plain numbers and tuples, which JSON can hold."""
+    stretch = Stretch("thigh", np.linspace(0.5, 2.0, 2)[0])
+    assert stretch == Stretch("thigh", 0.5)
+    assert to_json([stretch]) == to_json([Stretch("thigh", 0.5)])
+    fall = Gravity(np.array([0.0, 0.0, -3.7]))  # type: ignore[arg-type]
+    assert fall == Gravity((0.0, 0.0, -3.7))
+    assert type(Mass("*", scale=np.float32(2.0)).scale) is float
+    assert Stretch("thigh", np.int64(2)) == Stretch("thigh", 2.0)
+    assert compile_body(leg(), [Stretch("thigh", np.float64(2.0))]).nbody == leg().compile().nbody

@@ -48,17 +48,27 @@ class Certificate(msgspec.Struct, frozen=True):
 
     @property
     def same_model(self) -> bool:
-        """Whether the two models do the same."""
-        return self.source_fingerprint == self.target_fingerprint
+        """Return whether the two models move equally, up to rounding."""
+        return self.source_fingerprint == self.target_fingerprint or not self.changes
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing differs: neither what the models do nor what the rollout showed."""
-        return self.same_model and self.rollout.identical
+        """Return whether nothing differs, neither the models nor the rollouts.
+
+        Rollouts of models that differ by rounding need to agree in their first steps only.
+        """
+        if self.source_fingerprint == self.target_fingerprint:
+            return self.rollout.identical
+        return self.same_model and self.rollout.differs_by_rounding
 
     @property
     def verdict(self) -> str:
         """The certificate in one sentence."""
+        if self.is_empty and self.source_fingerprint != self.target_fingerprint:
+            return (
+                f"{self.source} and {self.target} do the same: their models and their first steps "
+                "differ by rounding only."
+            )
         if self.is_empty:
             return (
                 f"{self.source} and {self.target} do the same: both models have the fingerprint "

@@ -73,6 +73,11 @@ _JOINT_UNITS: Final = {
 }
 _ROUND: Final = ("capsule", "cylinder")
 
+# Numbers that agree to this part of the largest of their field are equal: writing out a total mass,
+# or summing in another order, changes the last bits. Constants that MuJoCo derives lose more.
+_ROUNDING: Final = 1e-12
+_DERIVED_ROUNDING: Final = 1e-9
+
 
 def compare(
     source: mujoco.MjModel,
@@ -94,7 +99,7 @@ def compare(
     one, two = effective_model(source), effective_model(target)
     changes: list[Change] = []
     before, after = standing_height
-    if before is not None and after is not None and before != after:
+    if before is not None and after is not None and not _equal((before,), (after,)):
         changes.append(change("standing height", "robot", (before,), (after,), "m"))
     if one == two:
         return tuple(changes)
@@ -109,9 +114,28 @@ def compare(
         changes = [
             change("derived constant", name, old[name]["values"], new[name]["values"])
             for name in old
-            if old[name] != new[name]
+            if not _equal(old[name]["values"], new[name]["values"], _DERIVED_ROUNDING)
         ]
     return tuple(changes)
+
+
+def _equal(
+    before: tuple[Value, ...] | None, after: tuple[Value, ...] | None, tolerance: float = _ROUNDING
+) -> bool:
+    """Return whether the values of a field agree up to rounding."""
+    if before is None or after is None or len(before) != len(after):
+        return before == after
+    numbers = [abs(v) for v in (*before, *after) if not isinstance(v, str) and math.isfinite(v)]
+    margin = tolerance * max(numbers, default=0.0)
+    return all(
+        old == new
+        or (
+            not isinstance(old, str)
+            and not isinstance(new, str)
+            and (abs(old - new) <= margin or (math.isnan(old) and math.isnan(new)))
+        )
+        for old, new in zip(before, after, strict=True)
+    )
 
 
 def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
@@ -138,7 +162,9 @@ def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
             found.append(_one_sided(section, element, old, new))
             continue
         for field in [*old, *(name for name in new if name not in old)]:
-            if old.get(field) != new.get(field) and not _is_segment(section, field, old, new):
+            if not _equal(old.get(field), new.get(field)) and not _is_segment(
+                section, field, old, new
+            ):
                 found.append(_difference(section, element, field, old, new))
     shared_before = [name for name in before if name in after]
     shared_after = [name for name in after if name in before]

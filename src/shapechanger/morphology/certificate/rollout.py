@@ -26,6 +26,12 @@ _Floats = NDArray[np.float64]
 
 _LARGEST: Final = float(np.finfo(np.float64).max)
 
+# Two models that differ by rounding part slowly: HalfCheetah-v1 with its masses written out differs
+# from the original by 4e-16 kg, its observations by at most 1e-11 after 10 steps and by 0.2 after
+# 94 (30 and 3 seeds). So rounding is judged by the first steps only.
+_EARLY_STEPS: Final = 10
+_EARLY_TOLERANCE: Final = 1e-8
+
 
 class Rollout(msgspec.Struct, frozen=True):
     """How two environments answered the same commands.
@@ -45,6 +51,8 @@ class Rollout(msgspec.Struct, frozen=True):
         largest_feature: What differed by that much; empty if nothing did.
         largest_step: Step at which it did.
         reward_difference: Largest difference between the rewards of a step.
+        early_difference: Largest difference of an observation or a reward within the first 10
+            steps.
     """
 
     steps: int
@@ -59,6 +67,7 @@ class Rollout(msgspec.Struct, frozen=True):
     largest_feature: str
     largest_step: int | None
     reward_difference: float
+    early_difference: float = 0.0
 
     @property
     def identical(self) -> bool:
@@ -69,6 +78,15 @@ class Rollout(msgspec.Struct, frozen=True):
             and not self.only_in_target
             and self.reward_difference == 0.0
             and self.source_ended == self.target_ended
+        )
+
+    @property
+    def differs_by_rounding(self) -> bool:
+        """Return whether the first steps differ by no more than rounding explains."""
+        return (
+            self.early_difference <= _EARLY_TOLERANCE
+            and not self.only_in_source
+            and not self.only_in_target
         )
 
     def __str__(self) -> str:
@@ -134,6 +152,7 @@ def compare_rollouts(
         largest_feature=tally.largest_feature,
         largest_step=tally.largest_step,
         reward_difference=float(_gap(*rewards).max(initial=0.0)),
+        early_difference=max(tally.early, float(_gap(*rewards)[:_EARLY_STEPS].max(initial=0.0))),
     )
 
 
@@ -171,6 +190,7 @@ class _Tally:
     largest: float = 0.0
     largest_feature: str = ""
     largest_step: int | None = None
+    early: float = 0.0
 
     def __post_init__(self) -> None:
         self.shared = dict.fromkeys(name for name in self.old if name in self.new)
@@ -186,6 +206,8 @@ class _Tally:
         worst = int(np.argmax(gaps))
         if gaps[worst] > 0.0 and self.first_step is None:
             self.first_step, self.first_feature = step, names[worst]
+        if step <= _EARLY_STEPS:
+            self.early = max(self.early, float(gaps[worst]))
         if gaps[worst] > self.largest:
             self.largest, self.largest_feature = float(gaps[worst]), names[worst]
             self.largest_step = step

@@ -11,6 +11,8 @@ import re
 from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
+import numpy as np
+from msgspec.structs import force_setattr
 
 from shapechanger.errors import MorphologyError
 
@@ -54,6 +56,10 @@ class Edit(
     amount: float = 1.0
 
     def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value: Any = getattr(self, name)
+            if isinstance(value, np.generic | np.ndarray):
+                force_setattr(self, name, _as_python(value))
         if not 0.0 <= self.amount <= 1.0:  # Also refuses NaN.
             raise MorphologyError(f"amount must be between 0 and 1, got {self.amount}.")
         self.check()
@@ -73,6 +79,12 @@ class Edit(
     def partly(self, alpha: float) -> Edit:
         """The same change, made to the part `alpha` in [0, 1] of what it was."""
         return msgspec.structs.replace(self, amount=self.amount * alpha)
+
+
+def _as_python(value: Any) -> Any:
+    """Return a NumPy scalar as a Python number, and an array as a tuple of them."""
+    plain = value.tolist()
+    return tuple(plain) if isinstance(plain, list) else plain
 
 
 def part_of_the_way(old: float, new: float, amount: float) -> float:
