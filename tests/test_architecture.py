@@ -131,19 +131,95 @@ def _imported(module: str, path: Path) -> Iterator[str]:
                 yield whole if whole in _MODULES else source
 
 
-@pytest.mark.parametrize("module", _MODULES)
-def test_imports_obey_the_rule_of_the_package(module: str) -> None:
-    """Who knows too much cannot be reused, tested or run on a Pi."""
+def _violations(module: str) -> Iterator[str]:
+    """Yield the imports of a module that the rule of its package forbids."""
     package = _package(module)
     rule = _RULES[package]  # A new package needs a rule first.
     for name in _imported(module, _MODULES[module]):
         top = name.split(".")[0]
         if top == "shapechanger":
-            assert _package(name) in rule.ours | {package}, f"{module} imports {name}"
-            continue
-        assert top not in rule.never, f"{module} imports {name}"
-        if rule.theirs is not None and top not in sys.stdlib_module_names:
-            assert top in rule.theirs, f"{module} imports {name}"
+            if _package(name) not in rule.ours | {package}:
+                yield f"{module} imports {name}"
+        elif top in rule.never or (
+            rule.theirs is not None
+            and top not in sys.stdlib_module_names
+            and top not in rule.theirs
+        ):
+            yield f"{module} imports {name}"
+
+
+def test_imports_obey_the_rules_of_the_packages() -> None:
+    """Each package imports only what its rule allows."""
+    assert [line for module in _MODULES for line in _violations(module)] == []
+
+
+def _top_level_imports(module: str, path: Path) -> Iterator[str]:
+    """Yield the modules that importing `module` loads, by its top-level statements."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                yield whole if whole in _MODULES else node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def _cycles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Return the strongly connected components of more than one node."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for other in graph[node]:
+            if other not in index:
+                visit(other)
+                low[node] = min(low[node], low[other])
+            elif other in stack:
+                low[node] = min(low[node], index[other])
+        if low[node] == index[node]:
+            part = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(part) > 1:
+                found.append(sorted(part))
+
+    for node in graph:
+        if node not in index:
+            visit(node)
+    return found
+
+
+def test_no_import_cycles() -> None:
+    """Neither modules nor top-level packages import each other in a circle."""
+    modules = {
+        module: {name for name in _top_level_imports(module, path) if name in _MODULES} - {module}
+        for module, path in _MODULES.items()
+    }
+    assert _cycles(modules) == []
+    packages: dict[str, set[str]] = {}
+    for module, names in modules.items():
+        known = packages.setdefault(_package(module), set())
+        known |= {_package(name) for name in names} - {_package(module)}
+    assert _cycles(packages) == []
+
+
+def test_public_classes_have_distinct_names() -> None:
+    """No two public classes share a name."""
+    places: dict[str, list[str]] = {}
+    for module, path in _MODULES.items():
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(module)
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
+def test_no_file_is_longer_than_600_lines() -> None:
+    """A file holds one topic."""
+    lengths = {module: path.read_text().count("\n") for module, path in _MODULES.items()}
+    assert {module: count for module, count in lengths.items() if count > 600} == {}
 
 
 @pytest.mark.parametrize(
@@ -166,20 +242,20 @@ def test_import_stays_light(package: str, forbidden: frozenset[str]) -> None:
     assert not forbidden & set(run.stdout.split())
 
 
-@pytest.mark.parametrize(
-    "module", [m for m in _MODULES if not any(part.startswith("_") for part in m.split("."))]
-)
-def test_modules_export_what_they_say(
-    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """`__all__` is there, names what exists, and names nothing twice."""
-    if module in _NEED_LGPIO and importlib.util.find_spec("lgpio") is None:
-        pytest.skip("lgpio is not installed: it has no wheel for this Python or system.")
+def test_modules_export_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every public module has an `__all__` whose names exist and are distinct."""
     monkeypatch.chdir(tmp_path)  # lgpio makes a named pipe in the working directory.
-    imported = importlib.import_module(module)
-    exported: list[str] = imported.__all__
-    assert [name for name in exported if not hasattr(imported, name)] == []
-    assert len(set(exported)) == len(exported)
+    wrong: list[str] = []
+    for module in _MODULES:
+        if any(part.startswith("_") for part in module.split(".")):
+            continue
+        if module in _NEED_LGPIO and importlib.util.find_spec("lgpio") is None:
+            continue  # It has no wheel for this Python or system.
+        imported = importlib.import_module(module)
+        exported: list[str] = imported.__all__
+        wrong += [f"{module}.{name}" for name in exported if not hasattr(imported, name)]
+        wrong += [f"{module}: {name} twice" for name in set(exported) if exported.count(name) > 1]
+    assert wrong == []
 
 
 def test_every_folder_is_a_package() -> None:
