@@ -1,5 +1,5 @@
-# One command each; every target first installs what it needs, and does that only when something
-# changed. `make help` lists them.
+# Every target installs what it needs first, and only when something changed. `make help` lists the
+# targets.
 
 PYTHON ?= python3
 JOBS ?= 2
@@ -7,44 +7,50 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(BIN)/python
-# Written after an installation that succeeded: what the demo needs, and what everything needs.
+# Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
-TEST := $(RUN) -m pytest -n $(JOBS) --cov
+PYTEST := $(RUN) -m pytest -n $(JOBS)
 
 VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	"Shapechanger needs Python 3.11 or newer, and %s is %d.%d: " % (sys.executable, v[0], v[1]) \
 	+ "name a newer one, as in `make PYTHON=python3.12 test`.")
 
 .DEFAULT_GOAL := help
-.NOTPARALLEL:  # Two installations at once would spoil each other.
-.PHONY: help setup demo test test-all check bench clean
+.NOTPARALLEL:  # Two installations at once would interfere.
+.PHONY: help setup demo test test-system test-all test-matrix check bench clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s%s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
 
-setup: $(INSTALLED_DEV)  ## create .venv with everything that the other targets need
+setup: $(INSTALLED_DEV)  ## create .venv with all dependencies
 	@echo "Ready: source $(BIN)/activate"
 
-demo: $(INSTALLED_ALL)  ## move a skill from a pole to one twice as long; see results/demo
+demo: $(INSTALLED_ALL)  ## transfer a policy to a pole twice as long; see results/demo
 	$(BIN)/shapechanger transfer shapechanger/InvertedPendulum-v1 \
 		shapechanger/BigInvertedPendulum-v1 --seeds 5 --source-steps 16384 --out results/demo
 
-test: $(INSTALLED_DEV)  ## run the quick tests; the pure parts must be covered to the last line
-	$(TEST) -m "not slow"
+test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
+	$(PYTEST) --cov -m "not slow and not system"
 
-test-all: $(INSTALLED_DEV)  ## run all tests, the slow ones too
-	$(TEST)
+test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, browsers, terminals
+	$(PYTEST) -m "system and not slow"
+
+test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
+	$(PYTEST) --cov
+
+test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and installations
+	$(RUN) scripts/test_matrix.py
 
 check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(RUN) -m pyright
 
-bench: $(INSTALLED_DEV)  ## measure every number that the project promises
+bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 	$(RUN) -m benchmarks.run
 
-clean:  ## remove what the other targets made, but keep results/
+clean:  ## remove build products and environments; keep results/
 	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
 		MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
