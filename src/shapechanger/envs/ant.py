@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+import sys
+from collections.abc import Sequence
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -21,7 +22,13 @@ from shapechanger.embodiments.ant import ANT
 from shapechanger.embodiments.family import BodyLike
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.stepping.actions import check_action
-from shapechanger.envs.stepping.tuned import Binding, Outcomes, StepResult, TunedStep
+from shapechanger.envs.stepping.tuned import (
+    NO_WARNINGS,
+    Binding,
+    Outcomes,
+    StepResult,
+    TunedStep,
+)
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
 
@@ -31,27 +38,17 @@ __all__ = ["AntEnv", "ExtendedAntEnv"]
 # m, where Gymnasium has 1.0, and that of BigAnt 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9
 
-_NO_TROUBLE: Final = [0, 0, 0]
-# What an ant's infos hold, in their order.
-_INFO: Final = (
-    *("x_position", "y_position", "distance_from_origin", "x_velocity", "y_velocity"),
-    *("reward_forward", "reward_ctrl", "reward_contact", "reward_survive"),
-)
 _sum: Final = np.add.reduce
-_all: Final = np.logical_and.reduce
-_any: Final = np.logical_or.reduce
 
 
 class _Ant(Binding):
-    """Views of an ant's data, and room for what is computed from them."""
+    """Views of an ant's data, and buffers for what is computed from them."""
 
     def __init__(self, watch: ModelWatch, env: AntEnv) -> None:
         super().__init__(watch, env.data, env.frame_skip)
         data = env.data
-        self.main_body = env.main_body
-        self.main_xy = data.body(self.main_body).xpos[:2]
+        self.main_xy = data.body(env.main_body).xpos[:2]
         self.qpos_xy = data.qpos[:2]
-        self.healthy = np.empty(2)
         self.forces = data.cfrc_ext
         self.clipped = np.empty_like(self.forces)
         self.squared = np.empty_like(self.forces)
@@ -62,9 +59,12 @@ class _Ant(Binding):
         self.state_size = sum(view.size for view in self.observed)
         if env.contacts_observed:
             self.observed.append(self.clipped[1:].ravel())
-        self.before = [self.main_xy]
-        self.after = [data.qpos, data.qvel, self.main_xy, self.healthy]
-        self.after += [self.trouble, data.cfrc_ext.ravel()]
+        self.healthy_z_range = env.healthy_z_range
+        self.after = [data.qpos, data.qvel, self.main_xy, data.cfrc_ext.ravel()]
+
+    def remember(self) -> list[float]:
+        """Return the place of the main body, which a step needs from before the physics, m."""
+        return self.main_xy.tolist()
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -131,22 +131,25 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         return _Ant(watch, self)
 
     def _advance(self, bound: _Ant, action: Any, out: NDArray[np.float64] | None) -> StepResult:
-        # Gymnasium's `step`, `_get_obs`, `_get_rew` and `is_healthy`, each number computed once, in
-        # their order and precision: the cost of an action is summed in the action's own.
+        # Gymnasium's `step`, `_get_obs` and `is_healthy`, each number computed once, in their order
+        # and precision: the cost of an action is summed in the action's own.
         if type(action) is not np.ndarray or action.shape != bound.shape:
             action = check_action(self, action)
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(action), axis=None)
         if not math.isfinite(ctrl_cost):
             check_action(self, action)
-        x_before, y_before = bound.main_xy.tolist()
+        x_before, y_before = bound.remember()
         bound.ctrl[:] = action
-        with bound.stopwatch:
+        with bound.timer:
             bound.move()
         x_after, y_after = bound.main_xy.tolist()
         x_velocity = np.float64((x_after - x_before) / bound.dt)
         y_velocity = np.float64((y_after - y_before) / bound.dt)
 
         bound.forces.clip(*self._contact_force_range, out=bound.clipped)
+        contact_cost = self._contact_cost_weight * _sum(
+            np.square(bound.clipped, out=bound.squared), axis=None
+        )
         observation = np.concatenate(bound.observed, out=out)
 
         qpos = bound.qpos
@@ -155,21 +158,53 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         finite = math.isfinite(sum(observation[: bound.state_size].tolist()) + x + y) or bool(
             np.isfinite(qpos).all() and np.isfinite(bound.qvel).all()
         )
-        lowest, highest = self._healthy_z_range
-        healthy = (
-            finite and lowest <= z <= highest and 1.0 - 2.0 * (up_x * up_x + up_y * up_y) > 0.0
+        healthy = finite and _is_upright(z, up_x, up_y, *self._healthy_z_range)
+        reward, info = self._reward(
+            qpos[0],
+            qpos[1],
+            np.float64(math.sqrt(bound.qpos_xy.dot(bound.qpos_xy))),
+            x_velocity,
+            y_velocity,
+            ctrl_cost,
+            contact_cost,
+            healthy,
         )
+        if bound.warnings.tolist() != NO_WARNINGS:
+            info["diverged"] = True
+        if self.render_mode == "human":
+            self.render()
+        return observation, reward, not healthy and self._terminate_when_unhealthy, False, info
 
+    def _reward(
+        self,
+        x: Any,
+        y: Any,
+        distance: Any,
+        x_velocity: Any,
+        y_velocity: Any,
+        ctrl_cost: Any,
+        contact_cost: Any,
+        healthy: Any,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Return reward and info as Gymnasium's `_get_rew`, of one ant or of a row of ants.
+
+        Args:
+            x: Place of the torso, m.
+            y: Place of the torso, m.
+            distance: Distance of the torso from the origin, m.
+            x_velocity: Velocity of the main body, m/s.
+            y_velocity: Velocity of the main body, m/s.
+            ctrl_cost: Cost of the action.
+            contact_cost: Cost of the contact forces.
+            healthy: Whether the ant is healthy.
+        """
         forward_reward = x_velocity * self._forward_reward_weight
         healthy_reward = healthy * self._healthy_reward
-        contact_cost = self._contact_cost_weight * _sum(
-            np.square(bound.clipped, out=bound.squared), axis=None
-        )
         reward = (forward_reward + healthy_reward) - (ctrl_cost + contact_cost)
-        info: dict[str, Any] = {
-            "x_position": qpos[0],
-            "y_position": qpos[1],
-            "distance_from_origin": np.float64(math.sqrt(bound.qpos_xy.dot(bound.qpos_xy))),
+        info = {
+            "x_position": x,
+            "y_position": y,
+            "distance_from_origin": distance,
             "x_velocity": x_velocity,
             "y_velocity": y_velocity,
             "reward_forward": forward_reward,
@@ -177,63 +212,62 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             "reward_contact": -contact_cost,
             "reward_survive": healthy_reward,
         }
-        if bound.trouble.tolist() != _NO_TROUBLE:
-            info["diverged"] = True
-        if self.render_mode == "human":
-            self.render()
-        return observation, reward, not healthy and self._terminate_when_unhealthy, False, info
+        return reward, info
 
-    def _kind_of(self, bound: _Ant) -> Hashable:
+    def _kind_of(self, bound: _Ant) -> str:
         if self.render_mode == "human":
-            return None
-        bound.healthy[:] = self._healthy_z_range
-        kind: tuple[Any, ...] = (
-            *(self.tuned, bound.qpos.size, bound.qvel.size, bound.forces.size, bound.dt),
-            *(self.place_hidden, self.contacts_observed, tuple(self._contact_force_range)),
-            *(self._forward_reward_weight, self._healthy_reward, self._terminate_when_unhealthy),
-            *(self._ctrl_cost_weight, self._contact_cost_weight),
+            return ""
+        bound.healthy_z_range = self._healthy_z_range
+        # Numbers of other types give results of other types; their representations differ too.
+        return sys.intern(
+            repr(
+                (
+                    *(id(self.tuned), bound.qpos.size, bound.qvel.size, bound.forces.size),
+                    *(bound.dt, self.place_hidden, self.contacts_observed),
+                    *(tuple(self._contact_force_range), self._terminate_when_unhealthy),
+                    *(self._forward_reward_weight, self._healthy_reward),
+                    *(self._ctrl_cost_weight, self._contact_cost_weight),
+                )
+            )
         )
-        return kind, tuple(cast("type[Any]", type(part)) for part in kind)
 
     def conclude(
-        self, before: NDArray[np.float64], after: NDArray[np.float64], actions: NDArray[Any]
+        self, bounds: Sequence[_Ant], before: Sequence[Any], actions: NDArray[Any]
     ) -> Outcomes:
-        """What ants of this kind see and are given; `_advance` for all of them at once."""
-        bound: _Ant = self._bound
-        size = bound.qpos.size + bound.qvel.size
+        """Compute observations, rewards, ends and infos of ants of this kind, all at once."""
+        n, nq = len(bounds), self._bound.qpos.size
+        size = nq + self._bound.qvel.size
+        after = np.concatenate([view for bound in bounds for view in bound.after]).reshape(n, -1)
         place, state = after[:, :2], after[:, :size]
-        main_xy, limits = after[:, size : size + 2], after[:, size + 2 : size + 4]
-        trouble, forces = after[:, size + 4 : size + 7].view(np.int64), after[:, size + 7 :]
+        main_xy, forces = after[:, size : size + 2], after[:, size + 2 :]
+        low, high = np.array([bound.healthy_z_range for bound in bounds]).T
+        warnings = np.concatenate([bound.warnings for bound in bounds]).reshape(n, -1)
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(actions, order="C"), axis=1)
-        with np.errstate(over="ignore", invalid="ignore"):  # As of Python's own numbers.
-            velocity = (main_xy - before) / bound.dt
-            tilt = np.square(after[:, 4:6])
-            z, lean = after[:, 2], tilt[:, 0] + tilt[:, 1]
-            # `1 - 2 * lean > 0` of `_advance` is this to the last bit: near 0.5 it is exact.
-            stands = (limits[:, 0] <= z) & (z <= limits[:, 1]) & (lean < 0.5)
-            # The same function as that of `dot`, which need not round a sum of products as NumPy.
-            distance = np.sqrt(np.vecdot(place, place))
-        healthy = stands & _all(np.isfinite(state), axis=1)
         clipped = forces.clip(*self._contact_force_range)
         observed = [state[:, 2:] if self.place_hidden else state]
         if self.contacts_observed:
-            observed.append(clipped[:, bound.forces.shape[1] :])
+            observed.append(clipped[:, self._bound.forces.shape[1] :])
         observations = np.concatenate(observed, axis=1)
-        forward_reward = velocity[:, 0] * self._forward_reward_weight
-        healthy_reward = [well * self._healthy_reward for well in healthy.tolist()]
         contact_cost = self._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
-        reward = (forward_reward + healthy_reward) - (ctrl_cost + contact_cost)
-        columns = (
-            *(place[:, 0], place[:, 1], distance, velocity[:, 0], velocity[:, 1]),
-            *(forward_reward, -ctrl_cost, -contact_cost, healthy_reward),
+        with np.errstate(over="ignore", invalid="ignore"):  # As with Python's own numbers.
+            velocity = (main_xy - np.array(before)) / self._bound.dt
+            upright = _is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
+            # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.
+            distance = np.sqrt(np.vecdot(place, place))
+        healthy = upright & np.isfinite(state).all(axis=1)
+        rewards, infos = self._reward(
+            place[:, 0],
+            place[:, 1],
+            distance,
+            velocity[:, 0],
+            velocity[:, 1],
+            ctrl_cost,
+            contact_cost,
+            healthy,
         )
-        return Outcomes(
-            observations,
-            reward,
-            ~healthy & bool(self._terminate_when_unhealthy),
-            dict(zip(_INFO, columns, strict=True)),
-            np.flatnonzero(_any(trouble, axis=1)).tolist() if _any(trouble, axis=None) else (),
-        )
+        terminated = ~healthy & bool(self._terminate_when_unhealthy)
+        diverged = np.flatnonzero(warnings.any(axis=1)).tolist() if warnings.any() else ()
+        return Outcomes(observations, rewards, terminated, infos, diverged)
 
     def _observation_features(self, model: Any) -> list[Feature]:
         features = position_features(model)[2 if self.place_hidden else 0 :]
@@ -260,6 +294,19 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
 
 AntEnv.tuned = AntEnv
+
+
+def _is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
+    """Return whether a torso is within its heights with its up axis above the horizon.
+
+    Args:
+        z: Height of the torso, m.
+        x: Its quaternion's x.
+        y: Its quaternion's y.
+        low: Lowest healthy height, m.
+        high: Highest healthy height, m.
+    """
+    return (low <= z) & (z <= high) & (1.0 - 2.0 * (x * x + y * y) > 0.0)
 
 
 class ExtendedAntEnv(AntEnv):

@@ -114,14 +114,18 @@ _EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
 _UP: Final = 950.0
 _RUNS: Final = 6000.0
 
-# Gymnasium's other bodies, as they are: name, summary, where the class is, threshold of its v5.
+_PLANAR: Final = "shapechanger.envs.planar"
+_HUMANOID: Final = "shapechanger.envs.humanoid"
+_DOUBLE_PENDULUM: Final = "shapechanger.envs.double_pendulum"
+
+# Gymnasium's other bodies, unedited: name, summary, module, and the reward threshold of its v5 id.
 _OTHERS: Final = (
-    ("HalfCheetah", "half a cheetah that runs in a plane", "planar", 4800.0),
-    ("Hopper", "one leg that hops in a plane", "planar", 3800.0),
-    ("Walker2d", "two legs that walk in a plane", "planar", None),
-    ("Swimmer", "three links that swim", "planar", 360.0),
-    ("Humanoid", "two legs, two arms and a waist", "humanoid", None),
-    ("InvertedDoublePendulum", "two poles on a cart", "double_pendulum", 9100.0),
+    ("HalfCheetah", "half a cheetah that runs in a plane", _PLANAR, 4800.0),
+    ("Hopper", "one leg that hops in a plane", _PLANAR, 3800.0),
+    ("Walker2d", "two legs that walk in a plane", _PLANAR, None),
+    ("Swimmer", "three links that swim", _PLANAR, 360.0),
+    ("Humanoid", "two legs, two arms and a waist", _HUMANOID, None),
+    ("InvertedDoublePendulum", "two poles on a cart", _DOUBLE_PENDULUM, 9100.0),
 )
 
 CATALOGUE: Final[dict[str, Entry]] = {
@@ -179,8 +183,8 @@ CATALOGUE: Final[dict[str, Entry]] = {
                 name,
                 name,
                 summary,
-                f"shapechanger.envs.{module}:{name}Env",
-                "ppo-balance" if module == "double_pendulum" else "ppo-run",
+                f"{module}:{name}Env",
+                "ppo-balance" if module == _DOUBLE_PENDULUM else "ppo-run",
                 name,
                 threshold,
             )

@@ -22,7 +22,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.embodiments.family import BodyLike
 from shapechanger.embodiments.pendulum import PENDULUM
 from shapechanger.envs.stepping.actions import check_action
-from shapechanger.envs.stepping.tuned import Binding, StepResult, TunedStep
+from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
 
@@ -32,7 +32,6 @@ _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.m
 
 # The lean at which Gymnasium ends an episode.
 _FALLEN_RAD: Final = 0.2
-_NO_TROUBLE: Final = [0, 0, 0]
 
 
 class _Pendulum(Binding):
@@ -82,7 +81,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         if not math.isfinite(sum(action.tolist())):
             check_action(self, action)
         bound.ctrl[:] = action
-        with bound.stopwatch:
+        with bound.timer:
             bound.move()
         observation = np.concatenate(bound.observed, out=out)
         numbers = observation.tolist()
@@ -91,7 +90,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         terminated = not finite or abs(numbers[1]) > _FALLEN_RAD
         reward = int(not terminated)
         info: dict[str, Any] = {"reward_survive": reward}
-        if bound.trouble.tolist() != _NO_TROUBLE:
+        if bound.warnings.tolist() != NO_WARNINGS:
             info["diverged"] = True
         if self.render_mode == "human":
             self.render()

@@ -7,8 +7,7 @@ import pytest
 
 from shapechanger.embodiments.finger import NOMINAL, drive_of
 from shapechanger.embodiments.finger.anatomy import JOINT_REST
-from shapechanger.envs.finger.env import CONTROL_DT
-from shapechanger.envs.finger.plant import FingerPlant
+from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 
 
 def test_no_tendon_pulls_less_than_its_least() -> None:

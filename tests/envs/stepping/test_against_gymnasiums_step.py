@@ -36,7 +36,7 @@ def _ants(body: Body | str, **arguments: Any) -> tuple[AntEnv, _GymnasiumsAnt]:
 
 
 def _has_twin(env: Any) -> bool:
-    return env._bound.has_twin is True and env._bound.stepping is not env.model
+    return env._bound.has_fast_model is True and env._bound.stepping is not env.model
 
 
 @pytest.mark.parametrize("name", _ANTS)

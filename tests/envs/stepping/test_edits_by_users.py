@@ -127,7 +127,7 @@ def test_an_edit_is_stepped_with(edit: Edit) -> None:
     for env in envs:
         env.reset(seed=0)
     _play(envs, 10, seed=0)
-    assert ours._bound.has_twin
+    assert ours._bound.has_fast_model
     before = ours.data.qpos.copy()
     for env in envs:
         edit(env.model)
@@ -151,12 +151,12 @@ def test_an_edit_before_the_first_step_is_stepped_with() -> None:
         env.model.body_mass[1] *= 1.75
         env.reset(seed=0)
     _play(envs, 20, seed=0)
-    assert ours._bound.has_twin is None
+    assert ours._bound.has_fast_model is None
     for env in envs:
         env.model.body_mass[1] /= 1.75
     _play(envs, 20, seed=1)
-    assert ours._bound.has_twin is True
-    assert theirs._bound.has_twin is None
+    assert ours._bound.has_fast_model is True
+    assert theirs._bound.has_fast_model is None
 
 
 def test_edits_of_a_pendulum_are_stepped_with() -> None:

@@ -258,7 +258,7 @@ def test_a_twin_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
         env.reset(seed=0)
         for step in range(5):
             env.step(np.zeros(8))
-            assert env._bound.has_twin is (True if step >= 3 or env is second else None)
+            assert env._bound.has_fast_model is (True if step >= 3 or env is second else None)
 
 
 def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,7 +271,7 @@ def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
     for step in range(4):
         for env in envs:
             env.step(np.zeros(8))
-            assert env._bound.has_twin is (True if step >= 2 else None)
+            assert env._bound.has_fast_model is (True if step >= 2 else None)
 
 
 def test_twins_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from shapechanger.embodiments.finger import JOINTS, NOMINAL, TENDONS, build_finger, drive_of
 from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, MOMENT_ARMS, MOST_TENSION_N
 from shapechanger.embodiments.finger.balance import hold
-from shapechanger.envs.finger.env import CONTROL_DT
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import joint_torque
 from shapechanger.layout import Layout
 

@@ -23,7 +23,7 @@ from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINT_REST, MOS
 from shapechanger.embodiments.finger.figure import FingerFigure
 from shapechanger.envs.finger.gap import Gap, gap_as_asked
 from shapechanger.envs.finger.likeness import identified
-from shapechanger.envs.finger.plant import FingerPlant
+from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.picture import body_reach, draw
 from shapechanger.envs.renderer import Renderer
@@ -36,10 +36,7 @@ from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
-__all__ = ["CONTROL_DT", "FingerEnv", "numbers", "posture_of"]
-
-CONTROL_DT: Final = 0.020
-"""How long an action acts, s."""
+__all__ = ["FingerEnv", "numbers", "posture_of"]
 
 _MODES: Final = ("human", "rgb_array", "depth_array")
 # From the thumb's side, with the workspace and the end of the hand in view.

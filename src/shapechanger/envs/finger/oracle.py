@@ -20,8 +20,8 @@ from shapechanger.embodiments.finger import (
 )
 from shapechanger.embodiments.finger.anatomy import LEAST_TENSION_N
 from shapechanger.embodiments.finger.balance import hold
-from shapechanger.envs.finger.env import CONTROL_DT
 from shapechanger.envs.finger.inverse import angles_for
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import joint_torque
 from shapechanger.layout import Layout
 

@@ -14,7 +14,10 @@ from shapechanger.embodiments.finger.model import FINGERTIP, TARGET
 from shapechanger.envs.finger.velocities import JointVelocities
 from shapechanger.tasks.finger import FingerSenses, fingertip
 
-__all__ = ["FingerPlant"]
+__all__ = ["CONTROL_DT", "FingerPlant"]
+
+CONTROL_DT: Final = 0.020
+"""Duration of one action, s."""
 
 _N_JOINTS: Final = len(JOINTS)
 _N_TENDONS: Final = len(TENDONS)

@@ -10,7 +10,8 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.embodiments.finger.anatomy import PHALANX_LENGTH_M
-from shapechanger.envs.finger.env import CONTROL_DT, FingerEnv, numbers
+from shapechanger.envs.finger.env import FingerEnv, numbers
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
 from shapechanger.layout import Element, Feature, Layout

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shapechanger.embodiments.finger import JOINTS, TENDONS
 from shapechanger.envs.finger.babble import FingerBabble
-from shapechanger.envs.finger.env import CONTROL_DT
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.errors import FingerError, LayoutError
 from shapechanger.identify import FingerLog
 from shapechanger.layout import Layout

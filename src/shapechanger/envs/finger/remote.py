@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from shapechanger.embodiments.finger import JOINTS, NOMINAL, TENDONS
 from shapechanger.embodiments.finger.anatomy import MOMENT_ARMS
-from shapechanger.envs.finger.env import CONTROL_DT, posture_of
+from shapechanger.envs.finger.env import posture_of
 from shapechanger.envs.finger.gap import geared_around, with_gears
 from shapechanger.envs.finger.likeness import identified
 from shapechanger.envs.finger.own_twin import NOMINAL_TWIN, serve_twin
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.envs.finger.rig_senses import RigSenses

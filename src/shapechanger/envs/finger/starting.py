@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from shapechanger.embodiments.finger.anatomy import MOMENT_ARMS
 from shapechanger.embodiments.finger.balance import hold
-from shapechanger.envs.finger.env import CONTROL_DT
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import moving_torque
 from shapechanger.tasks.finger import FingerSenses
 

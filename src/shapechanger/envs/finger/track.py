@@ -10,8 +10,9 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.envs.finger.env import CONTROL_DT, FingerEnv
+from shapechanger.envs.finger.env import FingerEnv
 from shapechanger.envs.finger.inverse import angles_for
+from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.random_paths import draw_path
 from shapechanger.envs.finger.reachable import require_reachable
 from shapechanger.layout import Element, Feature, Layout

@@ -1,10 +1,12 @@
-"""Noticing that somebody has edited a compiled model, in a microsecond or two."""
+"""Detect edits to a compiled model in a few microseconds."""
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
+import threading
 from typing import Any, Final, cast
+from weakref import WeakValueDictionary
 
 import mujoco
 
@@ -17,50 +19,60 @@ _LONGEST_HEAD: Final = 8192
 _ALIGNMENT: Final = 64
 
 
-class ModelWatch:
-    """Tells whether a model is as it was when the watch began.
+class _Snapshot(list[bytearray]):
+    """The bytes of a model, shared by all watches of models that were compiled equal.
 
-    It compares memory: all sizes, options and statistics, and every array but the pixels of
-    textures, which move nothing. So no field can be forgotten, and restoring a field is noticed
-    too.
+    Sharing keeps the bytes in a core's caches while many envs compare their models with them.
+    """
+
+
+_snapshots: WeakValueDictionary[bytes, _Snapshot] = WeakValueDictionary()
+_lock = threading.Lock()
+
+
+class ModelWatch:
+    """Detects whether a model has changed since the watch was created.
+
+    It compares memory: all sizes, options and statistics, and every array except the pixels of
+    textures, which do not affect the physics. So no field can be forgotten, and restoring a field
+    is detected too.
 
     Args:
-        model: The model; the watch keeps it alive, because it looks at its memory.
+        model: The model; the watch keeps it alive, because it reads the model's memory.
 
     Attributes:
-        model: The model that is watched.
-        sees: Whether this version of MuJoCo lays models out as known; if not, `unedited` is never
-            true.
+        model: The watched model.
+        sees: Whether this version of MuJoCo lays models out as expected; if not, `unedited` is
+            always false.
+        digest: Hash of the model as it was when the watch was created.
+        timestep: Its timestep then, s.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model = model
-        regions = _regions(model)
-        self.sees = bool(regions)
+        self.timestep = float(model.opt.timestep)
+        views = [(ctypes.c_char * size).from_address(start) for start, size in _regions(model)]
+        self.sees = bool(views)
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
-        self._parts: list[tuple[bytearray, Any]] = []
-        for address, size in regions:
-            view = (ctypes.c_char * size).from_address(address)
-            self._parts.append((bytearray(view), view))
+        parts = _Snapshot(bytearray(view) for view in views)
+        total = hashlib.blake2b(digest_size=16)
+        for part in parts:
+            total.update(part)
+        self.digest = total.digest()
+        with _lock:
+            self._snapshot = _snapshots.setdefault(self.digest, parts)
+        self._parts = list(zip(self._snapshot, views, strict=True))
 
     def unedited(self) -> bool:
-        """Whether every number of the model is as it was, to the last bit."""
+        """Return whether every number of the model is as it was, to the last bit."""
         for before, now in self._parts:
             if before != now:
                 return False
         return self.sees
 
-    @property
-    def digest(self) -> bytes:
-        """A name for the model as it was when the watch began."""
-        total = hashlib.blake2b(digest_size=16)
-        for before, _ in self._parts:
-            total.update(before)
-        return total.digest()
-
 
 def _regions(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """Address and length in bytes of what is watched; empty if the layout is not as known."""
+    """Address and length in bytes of the watched memory; empty if the layout is unknown."""
     head = int(cast("Any", model)._address)
     gravity = _start(model.opt.gravity)
     lamp = _start(model.vis.headlight.ambient)

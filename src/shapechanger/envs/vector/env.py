@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from shapechanger.envs.vector.access import Access
 from shapechanger.envs.vector.actions import checked
-from shapechanger.envs.vector.alike import Alike
 from shapechanger.envs.vector.crew import Crew, Failures, work_through
 from shapechanger.envs.vector.infos import batched, in_columns
 from shapechanger.envs.vector.member import Member
 from shapechanger.envs.vector.resets import masked_options, one_seed_each
 from shapechanger.envs.vector.results import Restart, Results
 from shapechanger.envs.vector.spaces import require_boxes, require_same_spaces
-from shapechanger.envs.vector.stride import Stride
+from shapechanger.envs.vector.stride import BatchStep
 from shapechanger.errors import VectorEnvError
 
 __all__ = ["ThreadVectorEnv"]
@@ -99,10 +98,6 @@ class ThreadVectorEnv(Access):
         self._awaits_reset = True
         threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
         self._crew = Crew(threads, self.num_envs)
-        self._alike = [Alike() for _ in range(threads)]
-        for alike, part in zip(self._alike, self._crew.parts, strict=True):
-            for number in part:
-                self._members[number].when_distrusted(partial(alike.forget, number))
         # Ends the threads of a vector env that nobody closes, and at the end of the program.
         weakref.finalize(self, self._crew.stop)
 
@@ -213,12 +208,14 @@ class ThreadVectorEnv(Access):
         self._require_running()
         results = Results(self.num_envs)
         restart = partial(self._restart, results) if self._starts_at_once else None
-        stride = Stride(self._members, given, self._observations, results, restart, self._alike)
-        self._guarded(lambda: self._advance(waits.tolist(), stride, results))
+        step = BatchStep(
+            self._members, given, self._observations, results, restart, self._crew.threads
+        )
+        self._guarded(lambda: self._advance(waits.tolist(), step, results))
         self._ended = results.terminated | results.truncated
         return self._present_observations(), results
 
-    def _advance(self, waiting: list[bool], stride: Stride, results: Results) -> None:
+    def _advance(self, waiting: list[bool], stride: BatchStep, results: Results) -> None:
         """Start again who waits for it, and step the others."""
 
         def start(i: int) -> None:

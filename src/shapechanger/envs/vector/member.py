@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
@@ -12,7 +11,7 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from shapechanger.envs.stepping.tuned import Binding, TunedStep
+    from shapechanger.envs.stepping.tuned import TunedStep
 
 __all__ = ["Member", "Step"]
 
@@ -92,17 +91,11 @@ class Member:
             return self.diverged(truncated, info)
         return reward, terminated, truncated, info
 
-    def when_distrusted(self, tell: Callable[[], None]) -> None:
-        """Have somebody told when `ready` must be asked again."""
-        if self.tuned is not None:
-            self.tuned.distrusted = (*self.tuned.distrusted, tell)
-
-    def ready(self) -> Binding | None:
+    def ready(self) -> Any:
         """The binding of the env, if its physics may step apart; else `step` must do it all."""
         if self.tuned is None:
             return None
-        bound = self.tuned.ready_together()
-        return None if bound is None or bound.kind is None else bound
+        return self.tuned.ready_together()
 
     def ticked(self) -> bool:
         """Count one more step; whether the time of the episode is over with it."""

@@ -7,7 +7,7 @@ reads, is found out.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import msgspec
@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import EmptyShift, MorphologyError
-
-if TYPE_CHECKING:
-    from shapechanger.envs.vehicle.env import VehicleEnv
+from shapechanger.worlds.simulation import MujocoWorld
 
 __all__ = ["VehicleShift", "certify_vehicles"]
 
@@ -162,8 +160,9 @@ def _answers(one: _Driven, two: _Driven) -> tuple[str, ...]:
 
 def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
     """What there is to say of a vehicle, by its name."""
-    inner: VehicleEnv = env.unwrapped  # pyright: ignore[reportAssignmentType]
-    model, world = inner.world.vehicle, inner.world
+    inner: Any = env.unwrapped
+    world: MujocoWorld = inner.world
+    model = world.vehicle
     turning = model.turning_radius_m
     return {
         "vehicle": model.name,
