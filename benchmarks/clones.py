@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle.clones import CLONES
+from shapechanger.envs.vehicle.drivers import CLONES
 
 __all__ = ["blind", "find_clone", "sighted"]
 

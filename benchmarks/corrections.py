@@ -25,8 +25,8 @@ from benchmarks.vehicles import counted, layouts
 from shapechanger.cli import main
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import Drive, DriveScore, drive
-from shapechanger.envs.vehicle.pilot import Pilot
+from shapechanger.envs.vehicle.drivers import ExpertDriver
+from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 
 __all__ = ["corrections"]
 
@@ -59,17 +59,17 @@ class _Round:
         self._folder = Path("results", "corrections", f"{vehicle}-{minutes}-{seed}")
         self._shown = self._folder / "shown"
 
-    def first(self) -> list[Drive]:
+    def first(self) -> list[DriveResult]:
         """How the clone of the expert drives."""
         return self._driven(self._first())
 
-    def corrected(self) -> list[Drive]:
+    def corrected(self) -> list[DriveResult]:
         """How it drives after the expert has taken over wherever it went wrong."""
         by_expert = ["--driver", str(self._first()), "--corrected-by", "expert"]
         corrected = self._recorded("corrected", LATER, by_expert)
         return self._driven(self._trained("both", self._merged("both", corrected)))
 
-    def continued(self) -> list[Drive]:
+    def continued(self) -> list[DriveResult]:
         """How it drives after as many minutes more of the expert in place of that."""
         more = self._recorded("more", LATER)
         return self._driven(self._trained("longer", self._merged("longer", more)))
@@ -96,7 +96,7 @@ class _Round:
         _once(out, ["train", str(data), "--out", str(out), "--held-out", "0", *seed])
         return out
 
-    def _driven(self, policy: Path) -> list[Drive]:
+    def _driven(self, policy: Path) -> list[DriveResult]:
         """Drives on courses that nobody was recorded on, kept in a file beside the policy."""
         kept = policy.with_suffix(f".{len(self._courses)}.drives")
         if not kept.exists():
@@ -104,7 +104,7 @@ class _Round:
             with closing(VehicleEnv(self._vehicle, courses="held-out", put_back=True)) as env:
                 drives = [drive(env, act, course=course) for course in self._courses]
             kept.write_text(json.dumps([asdict(each) for each in drives]))
-        return [Drive(**each) for each in json.loads(kept.read_text())]
+        return [DriveResult(**each) for each in json.loads(kept.read_text())]
 
 
 def corrections() -> list[Row]:
@@ -146,15 +146,17 @@ def _once(made: Path, command: list[str]) -> None:
 
 def _expert(vehicle: str) -> DriveScore:
     with closing(VehicleEnv(vehicle, courses="held-out", image=False, put_back=True)) as env:
-        act = Pilot(env.world)
+        act = ExpertDriver(env.world)
         return DriveScore.of([drive(env, act, course=course) for course in layouts(LAYOUTS)])
 
 
-def _together(seeds: Sequence[list[Drive]]) -> DriveScore:
+def _together(seeds: Sequence[list[DriveResult]]) -> DriveScore:
     return DriveScore.of([each for drives in seeds for each in drives])
 
 
-def _row(name: str, score: DriveScore, knows: DriveScore, seeds: Sequence[list[Drive]] = ()) -> Row:
+def _row(
+    name: str, score: DriveScore, knows: DriveScore, seeds: Sequence[list[DriveResult]] = ()
+) -> Row:
     """Only ten minutes of the expert have a number to reach."""
     share = score.speed / knows.speed
     each = ", ".join(f"{DriveScore.of(drives).per_100_m:.2f}" for drives in seeds)

@@ -17,12 +17,12 @@ import numpy as np
 from benchmarks.row import Row
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.reports.numbers import share_text
+from shapechanger.reports.verdict import successes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
+from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.plan import EVERY_ARM, Arm, TransferTask
-from shapechanger.transfer.report.arms import successes
-from shapechanger.transfer.report.spread import share_text
-from shapechanger.transfer.settings import learner_settings
 from shapechanger.transfer.study import Study, make_plan, run_study
 
 __all__ = ["gap", "rig"]

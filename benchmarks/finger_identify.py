@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
-from shapechanger.embodiments.finger import JOINTS, FingerParameters
-from shapechanger.envs.finger.recording import record_babble
-from shapechanger.identify import FingerLog, Identified, identify
-from shapechanger.identify.dynamics import fit_dynamics
+from shapechanger.bodies.finger import JOINTS, FingerParameters
+from shapechanger.envs.finger.identification import record_babble
+from shapechanger.identify import FingerLog, IdentifiedFinger, identify
 from shapechanger.identify.kinematics import fit_kinematics
+from shapechanger.identify.motion import fit_dynamics
 from shapechanger.identify.motors import fit_motors
 
 __all__ = ["identified", "with_arms"]
@@ -138,7 +138,7 @@ def _off(found: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.fl
     return np.abs(found - arms)[large] / np.abs(arms[large])
 
 
-def _factors(found: Identified, truth: FingerParameters) -> dict[str, float]:
+def _factors(found: IdentifiedFinger, truth: FingerParameters) -> dict[str, float]:
     """Of other parameters, what was found over what is."""
     mine = found.parameters
     over = {

@@ -21,11 +21,11 @@ import numpy as np
 from benchmarks.finger_oracle import FIRST_SEED, tracked_mm
 from benchmarks.row import Row
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.evaluation import Evaluation
-from shapechanger.transfer.files import write_whole
-from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.settings import LearnerSettings, learner_settings
-from shapechanger.transfer.training import train, use_one_thread
+from shapechanger.transfer.files import write_atomic
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.ppo import train, use_one_thread
+from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
 
 __all__ = ["FOLDER", "TASKS", "learned", "trained"]
 
@@ -67,7 +67,7 @@ def learned() -> list[Row]:
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         list(pool.map(trained, *zip(*wanted, strict=True)))
     curves = {f"{name}-{seed}": json.loads(_curve(name, seed).read_text()) for name, seed in wanted}
-    write_whole(CURVES, (json.dumps(curves, indent=1) + "\n").encode())
+    write_atomic(CURVES, (json.dumps(curves, indent=1) + "\n").encode())
     return [_reach_row(seeds), _track_row(seeds)]
 
 
@@ -82,7 +82,7 @@ def trained(name: str, seed: int) -> Path:
     use_one_thread()
     curve: list[Evaluation] = []
     policy = train(task.env, task.learner, settings, task.steps, seed, on_evaluation=curve.append)
-    write_whole(_curve(name, seed), msgspec.json.encode(curve))
+    write_atomic(_curve(name, seed), msgspec.json.encode(curve))
     save_policy(policy, out)
     return out
 

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 from benchmarks.row import Row
-from shapechanger.embodiments.finger import DRIVES
+from shapechanger.bodies.finger import DRIVES
 from shapechanger.envs.finger.oracle import FingerOracle
 
 __all__ = ["oracle", "reached", "tracked_mm"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shapechanger.envs.vehicle.drive import LIMIT_S, METRES, Act, Drive
+from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.remote.vehicle import RemoteVehicleEnv
 from shapechanger.twin.operator import Operator
 
@@ -20,8 +20,8 @@ def drive_remote(
     start: int | None = None,
     metres: float = METRES,
     limit_s: float = LIMIT_S,
-) -> Drive:
-    """As `shapechanger.envs.vehicle.drive.drive`, on a twin that is served.
+) -> DriveResult:
+    """As `shapechanger.envs.vehicle.evaluation.drive`, on a twin that is served.
 
     Args:
         env: The robot, made with `on_reset=operator.place`; a collision ends no episode.
@@ -49,4 +49,4 @@ def drive_remote(
             operator.put_back()
     came = where.truth["progress_m"]
     seconds = (where.t - began_ns) / 1e9
-    return Drive(course, came, seconds, int(collisions), came >= metres)
+    return DriveResult(course, came, seconds, int(collisions), came >= metres)

@@ -42,7 +42,7 @@ from benchmarks import (
     vehicles_twin,
 )
 from benchmarks.row import Row
-from shapechanger.embodiments.ant import ANT
+from shapechanger.bodies.ant import ANT
 from shapechanger.errors import UnknownName
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.effective import fingerprint

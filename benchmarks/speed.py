@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-import shapechanger.envs.stepping.twin as twins
+import shapechanger.envs.stepping.fast_model as twins
 from benchmarks.row import Row
-from shapechanger.envs.stepping.stopwatch import resting_stopwatch
+from shapechanger.envs.stepping.tuned import paused_timer
 
 __all__ = ["single"]
 
@@ -137,7 +137,7 @@ def _stopwatch_row() -> Row:
             mujoco.mj_step(model, data, _ANT_FRAME_SKIP)
 
     def rested() -> None:
-        with resting_stopwatch():
+        with paused_timer():
             step_all()
 
     ratios: list[float] = []

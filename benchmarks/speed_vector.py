@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 import shapechanger
 from benchmarks.peer import Peer
 from benchmarks.row import Row
-from shapechanger.envs.stepping.stopwatch import resting_stopwatch
-from shapechanger.envs.stepping.twin import find_twin
+from shapechanger.envs.stepping.fast_model import find_fast_model
+from shapechanger.envs.stepping.tuned import paused_timer
 from shapechanger.envs.stepping.watch import ModelWatch
 
 ROUNDS = 31
@@ -108,7 +108,7 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
     model = gym.make("Ant-v5").unwrapped.model
     if fast:
         one: Any = fleet.envs.envs[0].unwrapped
-        model = find_twin(ModelWatch(one.model), one.body_spec)
+        model = find_fast_model(ModelWatch(one.model), one.body_spec)
     bare = [(model, mujoco.MjData(model)) for _ in range(num_envs)]
     controls: list[Any] = [data.ctrl for _, data in bare]
     actions = fleet.actions(STEPS)
@@ -123,7 +123,7 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
                     control[:] = action
                     step(model, data, 5)
 
-        with resting_stopwatch():
+        with paused_timer():
             return _timed(work, time.process_time)
 
     def ours() -> float:

@@ -15,10 +15,10 @@ import gymnasium as gym
 
 from benchmarks.clones import blind, find_clone, sighted
 from benchmarks.row import Row
-from shapechanger.embodiments.vehicles import VEHICLES
+from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import LIMIT_S, METRES, Act, DriveScore, drive
-from shapechanger.envs.vehicle.pilot import Pilot
+from shapechanger.envs.vehicle.drivers import ExpertDriver
+from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
 from shapechanger.worlds.course import HELD_OUT
 
 __all__ = ["clone", "counted", "expert", "frames", "layouts"]
@@ -47,7 +47,7 @@ def _frames_row(vehicle: str) -> Row:
     rates: list[float] = []
     with gym.make(f"shapechanger/{vehicle.capitalize()}-v1", put_back=True) as env:
         inner: Any = env.unwrapped
-        pilot = Pilot(inner.world)
+        pilot = ExpertDriver(inner.world)
         # Long drives on one course: a reset is not what is measured.
         seen, _ = env.reset(seed=0, options={"course": HELD_OUT[0], "start": 0})
         spent = _spent_s(env, pilot, seen)  # The first round warms up.
@@ -141,7 +141,7 @@ def _env(vehicle: str, *, image: bool) -> VehicleEnv:
 
 def _expert_score(vehicle: str, courses: range) -> DriveScore:
     with closing(_env(vehicle, image=False)) as env:
-        return _score(env, Pilot(env.world), courses)
+        return _score(env, ExpertDriver(env.world), courses)
 
 
 def _score(env: VehicleEnv, act: Act, courses: range, limit_s: float = LIMIT_S) -> DriveScore:

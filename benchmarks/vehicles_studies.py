@@ -15,9 +15,9 @@ import msgspec
 from benchmarks.row import Row
 from shapechanger.cli.suite import Suite
 from shapechanger.cli.transfer import Transfer
-from shapechanger.transfer.report.numbers import estimate_text
+from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.study import STUDY_FILE, Study
-from shapechanger.transfer.suite import Crossing, crossings
+from shapechanger.transfer.suite import StudyOutcome, study_outcomes
 
 __all__ = ["lenses", "pairs", "tries"]
 
@@ -53,20 +53,20 @@ def tries() -> list[Row]:
     out = Path("results", "Car-to-Tank-sac")
     Transfer("Car", "Tank", learner="sac", seeds=_seeds(), out=out).run()
     study = msgspec.json.decode((out / STUDY_FILE).read_bytes(), type=Study)
-    return [_row(crossing) for crossing in crossings([study])]
+    return [_row(crossing) for crossing in study_outcomes([study])]
 
 
-def _suite(name: Literal["vehicles", "lenses"]) -> list[Crossing]:
+def _suite(name: Literal["vehicles", "lenses"]) -> list[StudyOutcome]:
     out = Path("results", name)
     Suite(name, seeds=_seeds(), out=out).run()
-    return msgspec.json.decode((out / "suite.json").read_bytes(), type=list[Crossing])
+    return msgspec.json.decode((out / "suite.json").read_bytes(), type=list[StudyOutcome])
 
 
 def _seeds() -> int:
     return int(os.environ.get("SEEDS", SEEDS))
 
 
-def _row(crossing: Crossing) -> Row:
+def _row(crossing: StudyOutcome) -> Row:
     tuned = crossing.fine_tune_steps
     gains = ", ".join(
         f"{name.replace('_', ' ')} {estimate_text(gain, signed=True)}"

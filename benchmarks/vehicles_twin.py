@@ -14,7 +14,7 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import Act, Drive, DriveScore, drive
+from shapechanger.envs.vehicle.evaluation import Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
 from shapechanger.remote.vehicle import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
@@ -111,7 +111,7 @@ def _served(
     course: int,
     image: bool,
     driver: Callable[[Layout], Act],
-) -> Drive:
+) -> DriveResult:
     """A drive of a robot that was started on this course.
 
     To lay another out takes a tenth of a second, for which no guard in real time should wait.

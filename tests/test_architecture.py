@@ -39,56 +39,54 @@ def _names(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-# Packages that do not exist yet are here already, so that they are born under their rule.
 _RULES = {
-    # The words that both sides share, on a workstation and on a Pi.
+    # Shared by the workstation and the robot.
     "errors": _Rule(_names("layout link"), _names("numpy msgspec")),
-    # Pages of reports, whatever they report.
-    "pages": _Rule(_names("errors"), _names("numpy matplotlib")),
-    # Which OpenGL draws here.
-    "headless": _Rule(_names("errors")),
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
-    # Bodies: no environment, no reward, no robot.
+    # The OpenGL library to draw with.
+    "headless": _Rule(_names("errors")),
+    "rendering": _Rule(_names("errors")),
+    # Models and edits: no environment, no reward, no robot.
     "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
-    # Of `worlds` they know how a pose is written down.
-    "embodiments": _Rule(_names("errors layout morphology worlds"), never=_HARDWARE | {"torch"}),
-    # Places to drive in, and a vehicle in one of them.
+    "bodies": _Rule(_names("errors layout morphology"), never=_HARDWARE | {"torch"}),
+    # Courses, their scenes, and the expert that drives them with a vehicle.
     "worlds": _Rule(
-        _names("errors headless embodiments"), never=_HARDWARE | {"torch", "gymnasium"}
+        _names("errors headless rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}
     ),
     # Rewards and endings: no model file.
     "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
-    # Only the envs join bodies and tasks. A vehicle's env is its whole robot in one process, and a
-    # finger's tells what the finger is like.
+    # Envs join bodies and tasks. A vehicle's env runs the whole robot in one process, and the
+    # remote ones reach it over the link.
     "envs": _Rule(
-        _names("errors layout headless morphology embodiments tasks")
+        _names("errors layout headless rendering morphology bodies tasks")
         | _names("link robot remote twin worlds identify"),
         never=_HARDWARE | {"torch"},
     ),
-    # Transfer cannot tell a simulator from a car. It writes our version into what it leaves behind,
-    # and cloning is one of its learners.
+    # Transfer cannot tell a simulator from a robot. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors layout demos pages shapechanger"), never=_HARDWARE | _SIMULATORS
+        _names("errors layout demos reports shapechanger"), never=_HARDWARE | _SIMULATORS
     ),
-    # The exam for anybody's env, simulated or real.
+    "reports": _Rule(
+        _names("errors layout transfer demos identify shapechanger"),
+        never=_HARDWARE | _SIMULATORS,
+    ),
+    # The exam for third-party envs.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
-    # The robot's side: of `demos` it knows the writer of episodes, which needs nothing.
+    # Runs on the robot: of `demos` it uses the writer of episodes, which needs no other package.
     "robot": _Rule(_names("errors layout link demos"), never=_HEAVY | {"gymnasium"}),
     "remote": _Rule(_names("errors layout link tasks"), never=_HEAVY),
-    # One that is served is reached as every robot is.
-    "twin": _Rule(_names("errors layout link robot remote morphology embodiments tasks worlds")),
+    "twin": _Rule(_names("errors layout link robot remote morphology bodies tasks worlds")),
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
     "demos": _Rule(_names("errors layout"), never=_HARDWARE | _SIMULATORS | {"socket"}),
-    # It composes what must not know each other, and nobody imports it.
+    # The command line composes everything, and nothing imports it.
     "cli": _Rule(
-        _names("errors layout link morphology embodiments tasks envs transfer robot remote twin")
-        | _names("teleop demos pages testing shapechanger headless worlds identify")
+        _names("errors layout link morphology bodies tasks envs transfer robot remote twin")
+        | _names("teleop demos reports testing shapechanger headless rendering worlds identify")
     ),
-    # What a finger is like, from a log; whoever has written it.
     "identify": _Rule(
-        _names("errors layout morphology embodiments tasks pages"),
+        _names("errors layout morphology bodies tasks"),
         _names("mujoco scipy numpy msgspec"),
     ),
     # The package itself registers the ids.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.envs.vehicle.clones import CLONES
+from shapechanger.envs.vehicle.drivers import CLONES
 
 _ROOT = Path(__file__).resolve().parents[1]
 _SRC = _ROOT / "src"

@@ -6,10 +6,10 @@ from contextlib import closing
 
 import pytest
 
-from shapechanger.embodiments.vehicles import VEHICLES
+from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import DriveScore, drive
-from shapechanger.envs.vehicle.pilot import Pilot
+from shapechanger.envs.vehicle.drivers import ExpertDriver
+from shapechanger.envs.vehicle.evaluation import DriveScore, drive
 from shapechanger.worlds.course import HELD_OUT
 
 
@@ -17,7 +17,7 @@ from shapechanger.worlds.course import HELD_OUT
 def test_the_expert_is_fast_and_safe(vehicle: str) -> None:
     """At 60 % of the top speed and more, from rest, through the whole robot."""
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:
-        pilot = Pilot(env.world)
+        pilot = ExpertDriver(env.world)
         score = DriveScore.of([drive(env, pilot, course=c, metres=15.0) for c in HELD_OUT[:2]])
     assert score.reached == 1.0
     assert score.collisions == 0

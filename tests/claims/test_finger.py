@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.embodiments.finger import DRIVES
+from shapechanger.bodies.finger import DRIVES
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.policies import POLICIES
-from shapechanger.transfer.policy_file import TrainedPolicy, load_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 
 FINGER = "shapechanger/Finger-v1"
 TRACK = "shapechanger/FingerTrack-v1"

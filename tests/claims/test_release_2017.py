@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.ant import ANT
-from shapechanger.embodiments.pendulum import PENDULUM
+from shapechanger.bodies.ant import ANT
+from shapechanger.bodies.families import PENDULUM
 from shapechanger.morphology import compile_body
 from tests.morphology.models import differing
 from tests.morphology.scenes import ASSETS

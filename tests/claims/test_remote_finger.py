@@ -12,8 +12,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL, FingerParameters
-from shapechanger.envs.finger.gap import gap_as_asked
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.envs.finger.gap import resolve_gap
 from shapechanger.errors import BadAction, UnknownName
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.running import RunningRobot, run_robot
@@ -300,7 +300,7 @@ def test_ten_seconds_tell_what_finger_is_on_a_rig() -> None:
         truth: FingerParameters = simulated.get_wrapper_attr("parameters")
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:
         own: Any = rig.unwrapped
-        found = gap_as_asked(own.identified_source(0)["gap"]).around
+        found = resolve_gap(own.identified_source(0)["gap"]).around
     large = np.abs(truth.arms) > 2e-3
     np.testing.assert_allclose(found.arms[large], truth.arms[large], rtol=0.05)
     assert np.abs(NOMINAL.arms / np.where(large, truth.arms, 1.0) - 1.0)[large].max() > 0.15

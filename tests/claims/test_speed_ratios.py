@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import mujoco
 
-from shapechanger.embodiments.ant import ANT
+from shapechanger.bodies.ant import ANT
 from shapechanger.morphology import compile_body
 from tests.morphology.scenes import ASSETS
 

@@ -19,7 +19,7 @@ from shapechanger.cli.env_arguments import driven, env_ref
 from shapechanger.cli.suite import Suite
 from shapechanger.transfer import executor
 from shapechanger.transfer.executor import Job, OnProgress, Serial
-from shapechanger.transfer.settings import LEARNERS
+from shapechanger.transfer.learners.settings import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
 _SUITE = ["suite", "vehicles", "--seeds", "2"]

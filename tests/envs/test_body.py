@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from shapechanger.embodiments.family import BodyLike
+from shapechanger.bodies.families import BodyLike
 from shapechanger.envs import CATALOGUE
 from shapechanger.errors import BrokenModel, MorphologyError, SpaceMismatch, UnknownName
 from shapechanger.morphology import (

@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.embodiments.finger import FingerParameters
-from shapechanger.envs.finger.recording import record_babble
+from shapechanger.bodies.finger import FingerParameters
+from shapechanger.envs.finger.identification import record_babble
 from shapechanger.identify import FingerLog
 
 __all__ = ["changed", "made_up", "recorded"]

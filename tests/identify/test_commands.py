@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL
-from shapechanger.identify.commands import Commands
-from shapechanger.identify.motors import fit_motors
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.identify.motors import CommandSignal, fit_motors
 from tests.identify.logs import changed, made_up, recorded
 
 
-def stepped() -> Commands:
+def stepped() -> CommandSignal:
     """All commands are 0, and 1 from the period that ends at 1 s."""
     log = made_up()
-    return Commands(changed(log, commands=np.repeat((log.t > 0.99)[:, None], 7, axis=1) * 1.0))
+    return CommandSignal(changed(log, commands=np.repeat((log.t > 0.99)[:, None], 7, axis=1) * 1.0))
 
 
 def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
@@ -30,7 +29,7 @@ def test_motors_follow_with_their_lag() -> None:
     made = stepped().followed(0.0, 0.001, 1100, 0.0, 0.030)
     assert made[979, 3] == pytest.approx(0.0, abs=1e-9)
     assert made[1009, 3] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-9)
-    held = Commands(changed(made_up(), commands=np.full((300, 7), 0.4)))
+    held = CommandSignal(changed(made_up(), commands=np.full((300, 7), 0.4)))
     np.testing.assert_allclose(held.followed(0.0, 0.001, 50, 0.02, 0.03), 0.4)
 
 

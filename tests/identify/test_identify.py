@@ -6,12 +6,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import JOINTS, NOMINAL
+from shapechanger.bodies.finger import JOINTS, NOMINAL
 from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.errors import MissingExtra
-from shapechanger.identify import identify, toolbox
-from shapechanger.identify.page import identified_html
-from shapechanger.identify.words import interval, label, number, told
+from shapechanger.identify import identify
+from shapechanger.identify import motion as toolbox
+from shapechanger.reports.finger import finger_html, interval, label, number, summary_line
 from tests.identify.logs import recorded
 
 
@@ -59,7 +59,7 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
     for j, joint in enumerate(JOINTS):
         low, high = intervals[f"joint_stiffness/{joint}"]
         assert low < truth.joint_stiffness[j] < high
-    page = identified_html(found, "finger.npz")
+    page = finger_html(found, "finger.npz")
     for e in found.estimates:
         assert label(e) in page
         assert interval(e) in page
@@ -68,7 +68,7 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
         assert name in page
         assert why in page
     assert page.count("<img") == 4
-    assert told(found).startswith("arms: 25 intervals, the widest of those above 2 mm ±")
+    assert summary_line(found).startswith("arms: 25 intervals, the widest of those above 2 mm ±")
     with gym.make("shapechanger/Finger-v1", parameters=found.parameters.to_json()) as env:
         env.reset(seed=0)
         observation, *_ = env.step(np.zeros(7, np.float32))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL
-from shapechanger.identify.kinematics import ARMS, fit_kinematics
-from shapechanger.identify.standard_errors import covariance, quantile
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.identify.kinematics import ARMS, covariance, fit_kinematics, quantile
 from tests.identify.logs import recorded
 
 LARGE_M = 2e-3

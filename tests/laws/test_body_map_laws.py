@@ -13,12 +13,12 @@ from shapechanger.errors import MapError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import (
     BodyMap,
-    Entry,
+    Copy,
     Hold,
     Learn,
+    MapEntry,
     Rule,
     Symmetry,
-    Take,
     Zero,
     mirror,
 )
@@ -54,7 +54,7 @@ def rules(
     if not fitting:
         return constant
     # Twice, so that most rules take something.
-    take = st.builds(Take, st.sampled_from(fitting), scales)
+    take = st.builds(Copy, st.sampled_from(fitting), scales)
     return st.one_of(take, take, constant)
 
 
@@ -68,8 +68,8 @@ def maps(
     source_observation, source_action = source or (draw(layouts()), draw(layouts()))
     target_observation, target_action = draw(layouts()), draw(layouts())
 
-    def entries(into: Layout, over: Layout) -> tuple[Entry, ...]:
-        return tuple(Entry(f.name, draw(rules(over, f.shape, scales))) for f in into)
+    def entries(into: Layout, over: Layout) -> tuple[MapEntry, ...]:
+        return tuple(MapEntry(f.name, draw(rules(over, f.shape, scales))) for f in into)
 
     return BodyMap(
         source_observation,
@@ -96,14 +96,14 @@ def one_to_one(draw: st.DrawFn) -> BodyMap:
     """A map in which nothing is taken twice."""
     built = draw(maps())
 
-    def thinned(entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    def thinned(entries: tuple[MapEntry, ...]) -> tuple[MapEntry, ...]:
         seen: set[str] = set()
-        kept: list[Entry] = []
+        kept: list[MapEntry] = []
         for entry in entries:
-            again = isinstance(entry.rule, Take) and entry.rule.feature in seen
-            if isinstance(entry.rule, Take):
+            again = isinstance(entry.rule, Copy) and entry.rule.feature in seen
+            if isinstance(entry.rule, Copy):
                 seen.add(entry.rule.feature)
-            kept.append(Entry(entry.feature, Zero()) if again else entry)
+            kept.append(MapEntry(entry.feature, Zero()) if again else entry)
         return tuple(kept)
 
     return BodyMap(
@@ -120,11 +120,11 @@ def one_to_one(draw: st.DrawFn) -> BodyMap:
 def symmetries(draw: st.DrawFn) -> Symmetry:
     """Any signed permutation of features that are alike."""
 
-    def turned(layout: Layout) -> tuple[Take, ...]:
+    def turned(layout: Layout) -> tuple[Copy, ...]:
         names = [f.name for f in layout if not f.shape]
         order = dict(zip(names, draw(st.permutations(names)), strict=True))
         return tuple(
-            Take(order.get(f.name, f.name), draw(st.sampled_from([1.0, -1.0]))) for f in layout
+            Copy(order.get(f.name, f.name), draw(st.sampled_from([1.0, -1.0]))) for f in layout
         )
 
     observation, action = draw(layouts()), draw(layouts())
@@ -184,11 +184,11 @@ def test_there_and_back_is_the_identity_where_it_matched(built: BodyMap) -> None
     """What was taken comes back; what was not stays as its rule says."""
     there_and_back = built.then(built.inverse("learn"))
     for before, after in zip(built.observation, there_and_back.observation, strict=True):
-        expected = Take(before.feature) if isinstance(before.rule, Take) else before.rule
+        expected = Copy(before.feature) if isinstance(before.rule, Copy) else before.rule
         assert after.rule == expected
     back_and_there = built.inverse("learn").then(built)
     for before, after in zip(built.action, back_and_there.action, strict=True):
-        expected = Take(before.feature) if isinstance(before.rule, Take) else before.rule
+        expected = Copy(before.feature) if isinstance(before.rule, Copy) else before.rule
         assert after.rule == expected
 
 
@@ -200,7 +200,7 @@ def test_the_inverse_of_the_inverse_takes_the_same(built: BodyMap) -> None:
     for before, after in zip(
         (*built.observation, *built.action), (*again.observation, *again.action), strict=True
     ):
-        if isinstance(before.rule, Take):
+        if isinstance(before.rule, Copy):
             assert after.rule == before.rule
 
 
@@ -215,7 +215,7 @@ def test_an_inverse_takes_each_feature_at_most_once(built: BodyMap) -> None:
         with pytest.raises(MapError, match="is taken by"):
             built.inverse()
         return
-    taken = [e.rule.feature for e in back.action if isinstance(e.rule, Take)]
+    taken = [e.rule.feature for e in back.action if isinstance(e.rule, Copy)]
     assert len(taken) == len(set(taken))
 
 

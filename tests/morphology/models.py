@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.ant import ANT
-from shapechanger.embodiments.pendulum import PENDULUM
+from shapechanger.bodies.ant import ANT
+from shapechanger.bodies.families import PENDULUM
 from shapechanger.morphology import Edit, compile_body
 from tests.morphology.scenes import ASSETS
 

@@ -28,7 +28,7 @@ from shapechanger.morphology import (
     name_elements,
 )
 from shapechanger.morphology.spec.elements import limbs_and_trunks
-from shapechanger.morphology.spec.geoms import volume
+from shapechanger.morphology.spec.geometry import volume
 from tests.morphology.models import Array, built, differing, mass, posed
 from tests.morphology.scenes import ASSETS, asset_spec
 

@@ -8,31 +8,31 @@ import time
 from pathlib import Path
 
 from shapechanger.errors import UnknownName
-from shapechanger.transfer.executor import Job, Processes, Report
+from shapechanger.transfer.executor import Job, Processes, ReportSteps
 
 
-def leave_a_mark(path: str, report: Report) -> None:
+def leave_a_mark(path: str, report: ReportSteps) -> None:
     """Write the time at which the job ended."""
     report(1)
     Path(path).write_text(str(time.monotonic_ns()))
 
 
-def refuse(report: Report) -> None:
+def refuse(report: ReportSteps) -> None:
     """Fail as a user's mistake does."""
     raise UnknownName("thing", "this", ["that"])
 
 
-def crash(report: Report) -> None:
+def crash(report: ReportSteps) -> None:
     """Fail as a bug does."""
     raise ZeroDivisionError("a bug")
 
 
-def vanish(report: Report) -> None:
+def vanish(report: ReportSteps) -> None:
     """End without a word, as under the kernel's axe."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def wait_for_ever(pid_file: str, report: Report) -> None:
+def wait_for_ever(pid_file: str, report: ReportSteps) -> None:
     """Say who runs it, and go on until somebody ends it."""
     Path(pid_file).write_text(str(os.getpid()))
     while True:

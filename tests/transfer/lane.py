@@ -13,7 +13,7 @@ from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.settings import CloningSettings
+from shapechanger.transfer.learners.settings import CloningSettings
 
 __all__ = ["DRY", "ICY", "LANE", "QUICK_CLONING", "SLIPPERY", "TINY_CLONING", "WET", "Lane"]
 

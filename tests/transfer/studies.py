@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.settings import LearnerSettings
 from shapechanger.transfer.plan import Plan, TransferTask
-from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.study import make_plan
 
 SMALL = EnvRef("shapechanger/SmallInvertedPendulum-v1")

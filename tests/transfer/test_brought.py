@@ -14,12 +14,12 @@ from shapechanger.demos.cloning.errors import PolicyError
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
-from shapechanger.transfer.cloning import Recording, clone_along, evaluate_clone
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone, train_clones
+from shapechanger.transfer.learners.policy_file import save_policy
+from shapechanger.transfer.learners.ppo import train
 from shapechanger.transfer.plan import Plan, TransferTask
-from shapechanger.transfer.policy_file import save_policy
 from shapechanger.transfer.study import make_plan, run_study
-from shapechanger.transfer.training import train
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import SMALL, TINY, tiny_plan
 
@@ -37,12 +37,12 @@ def one_thread() -> Iterator[None]:
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A clone of the driver on the dry lane, as `train` writes it."""
     folder = tmp_path_factory.mktemp("clone")
-    policy = clone_along(
+    policy = train_clones(
         DRY,
         QUICK_CLONING,
         40,
         3,
-        demonstrations=Recording(folder / "shown.npz", 3),
+        demonstrations=DemonstrationFile(folder / "shown.npz", 3),
         on_evaluation=lambda evaluation: None,
     )
     policy.save(folder / "dry.zip")

@@ -13,13 +13,18 @@ import torch
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.transfer import cloning
-from shapechanger.transfer.cloning import Recording, clone_along, demonstrate, evaluate_clone
-from shapechanger.transfer.evaluation import Evaluation, evaluation_envs
+from shapechanger.reports.study import write_report
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners import cloning
+from shapechanger.transfer.learners.cloning import (
+    DemonstrationFile,
+    evaluate_clone,
+    record_demonstrations,
+    train_clones,
+)
+from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
+from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings, learner_settings
 from shapechanger.transfer.plan import Plan, TransferTask
-from shapechanger.transfer.report import write_report
-from shapechanger.transfer.settings import LEARNERS, CloningSettings, learner_settings
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG
@@ -55,7 +60,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
     """The picture before the action, and not the mistake that was made."""
-    shown = demonstrate(LANE, 150, 20, 3, _FRAMING)
+    shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)
     bright = shown.pictures[:, 6, :, 0].argmax(axis=1)
@@ -69,31 +74,31 @@ def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
 
 def test_fewer_demonstrations_are_the_first_of_more() -> None:
     """So that a budget is part of the next one."""
-    more, fewer = (demonstrate(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
+    more, fewer = (record_demonstrations(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
     first = more.first(30)
     np.testing.assert_array_equal(first.pictures, fewer.pictures)
     np.testing.assert_array_equal(first.actions, fewer.actions)
     assert first.episodes == fewer.episodes == (20, 10)
-    other = demonstrate(LANE, 30, 20, 4, _FRAMING)
+    other = record_demonstrations(LANE, 30, 20, 4, _FRAMING)
     assert not np.array_equal(other.actions, fewer.actions)
 
 
 def test_an_env_without_a_demonstrator_is_refused() -> None:
     """There is nobody to learn from, and the sentence says where."""
     with pytest.raises(StudyError, match="BigInvertedPendulum-v1 has no demonstrator"):
-        demonstrate(BIG, 10, 20, 3, _FRAMING)
+        record_demonstrations(BIG, 10, 20, 3, _FRAMING)
 
 
 def _cloned(
     folder: Path, steps: int = 120, *, only_last: bool = False, start: CameraPolicy | None = None
 ) -> tuple[CameraPolicy, list[Evaluation]]:
     found: list[Evaluation] = []
-    policy = clone_along(
+    policy = train_clones(
         LANE,
         TINY_CLONING,
         steps,
         5,
-        demonstrations=Recording(folder / "shown.npz", 6),
+        demonstrations=DemonstrationFile(folder / "shown.npz", 6),
         start=start,
         only_last=only_last,
         on_evaluation=found.append,
@@ -132,7 +137,7 @@ def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.Mo
     assert sorted(path.name for path in tmp_path.iterdir()) == ["shown.npz"]
     _, found = _cloned(tmp_path, 120)
     asked: list[int] = []
-    monkeypatch.setattr(cloning, "demonstrate", lambda *_: asked.append(1))
+    monkeypatch.setattr(cloning, "record_demonstrations", lambda *_: asked.append(1))
     assert _cloned(tmp_path, 120)[1] == found
     _cloned(tmp_path, 60)
     assert asked == []

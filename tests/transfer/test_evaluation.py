@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.transfer.evaluation import evaluate, random_actions
+from shapechanger.transfer.learners.evaluation import evaluate, random_actions
 
 
 class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):

@@ -11,8 +11,8 @@ from shapechanger.transfer.files import (
     append_line,
     make_folder,
     read_json,
+    write_atomic,
     write_json,
-    write_whole,
 )
 
 
@@ -27,14 +27,14 @@ def test_a_file_appears_whole_or_keeps_what_was_there(
 ) -> None:
     """A write that fails half-way leaves the old file, and nothing beside it."""
     path = tmp_path / "a.json"
-    write_whole(path, b"old")
+    write_atomic(path, b"old")
 
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OutputError, match=r"Cannot write .*a\.json: No space left on device"):
-        write_whole(path, b"new")
+        write_atomic(path, b"new")
     assert path.read_bytes() == b"old"
     assert [item.name for item in tmp_path.iterdir()] == ["a.json"]
 

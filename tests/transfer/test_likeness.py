@@ -9,16 +9,16 @@ from typing import Any
 import gymnasium as gym
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL, FingerParameters
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger import env as finger_env
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import StudyError
+from shapechanger.reports import verdict
+from shapechanger.reports.study import arm_rows, caveats
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.likeness import arms_for
+from shapechanger.transfer.methods import default_arms, policy_path
 from shapechanger.transfer.plan import ARMS, EVERY_ARM, Run, TransferTask
-from shapechanger.transfer.report import arm_rows, caveats, verdict
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import Study, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
@@ -105,9 +105,9 @@ def test_a_study_that_cannot_go_on_begins_no_run_twice(
 
 def test_arms_that_nobody_asked_for() -> None:
     """The same task in another finger gets all arms, any other pair the three of always."""
-    assert arms_for(TransferTask(FINGER, REAL_LIKE)) == EVERY_ARM
-    assert arms_for(TransferTask(FINGER, FOLLOWS)) == ARMS
-    assert arms_for(TransferTask(SMALL, BIG)) == ARMS
+    assert default_arms(TransferTask(FINGER, REAL_LIKE)) == EVERY_ARM
+    assert default_arms(TransferTask(FINGER, FOLLOWS)) == ARMS
+    assert default_arms(TransferTask(SMALL, BIG)) == ARMS
 
 
 def test_a_target_that_tells_nothing_of_itself_is_refused() -> None:

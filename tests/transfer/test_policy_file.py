@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import CorruptStudy
-from shapechanger.transfer.evaluation import Evaluation
-from shapechanger.transfer.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.settings import LearnerSettings
-from shapechanger.transfer.training import train
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.ppo import train
+from shapechanger.transfer.learners.settings import LearnerSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
 

@@ -13,13 +13,13 @@ from stable_baselines3.common.buffers import ReplayBuffer
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.transfer.cloning import Recording, evaluate_clone
-from shapechanger.transfer.evaluation import Evaluation
+from shapechanger.reports.study import write_report
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.sac import MixedReplay, train_sac
+from shapechanger.transfer.learners.settings import SacSettings, learner_settings
 from shapechanger.transfer.plan import TransferTask
-from shapechanger.transfer.report import write_report
-from shapechanger.transfer.sac import MixedReplay, learn_by_trying
-from shapechanger.transfer.settings import SacSettings, learner_settings
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, LANE, TINY_CLONING
 from tests.transfer.studies import BIG
@@ -54,12 +54,12 @@ def _learned(
     folder: Path, steps: int = 120, seed: int = 5, *, only_last: bool = False
 ) -> tuple[CameraPolicy, list[Evaluation]]:
     found: list[Evaluation] = []
-    policy = learn_by_trying(
+    policy = train_sac(
         LANE,
         TINY_SAC,
         steps,
         seed,
-        demonstrations=Recording(folder / "shown.npz", 6),
+        demonstrations=DemonstrationFile(folder / "shown.npz", 6),
         only_last=only_last,
         on_evaluation=found.append,
     )
@@ -143,12 +143,12 @@ def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
     wild = msgspec.structs.replace(TINY_SAC, learning_rate=3e-2, critic_warm_up=0)
     errors: list[float] = []
     for rate in (0.0, 3e-2):
-        policy = learn_by_trying(
+        policy = train_sac(
             LANE,
             msgspec.structs.replace(wild, anchor_rate=rate),
             120,
             5,
-            demonstrations=Recording(tmp_path / "shown.npz", 6),
+            demonstrations=DemonstrationFile(tmp_path / "shown.npz", 6),
             on_evaluation=lambda evaluation: None,
         )
         with np.load(tmp_path / "shown.npz") as shown:

@@ -25,9 +25,9 @@ from shapechanger.errors import (
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
+from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.methods import policy_path
 from shapechanger.transfer.plan import Run, TransferTask
-from shapechanger.transfer.policy_file import load_policy
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import STUDY_FILE, Study, run_study
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
 

@@ -21,7 +21,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
-from shapechanger.transfer.suite import Crossing, crossings, run_beside, study_folder
+from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_folder, study_outcomes
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.report.studies import make_study
 from tests.transfer.studies import files_of
@@ -81,7 +81,7 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a suite in which Dry-to-Wet is done; tests work on copies."""
     out = tmp_path_factory.mktemp("suite") / "suite"
     told = _Told()
-    run_beside(_plan(DRY, WET), out, executor=told)
+    run_in_suite(_plan(DRY, WET), out, executor=told)
     assert set(told.names) == _names(*_KINDS)
     return out
 
@@ -96,7 +96,7 @@ def _asked_for(plan: Plan, out: Path) -> set[str]:
     """The runs that a study beside the others would do; it does none."""
     told = _Told(refuses=True)
     with pytest.raises(_Stopped):
-        run_beside(plan, out, executor=told)
+        run_in_suite(plan, out, executor=told)
     return set(told.names)
 
 
@@ -119,7 +119,7 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
 def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
     """Another source, the same target; and the study says what it says when it is alone."""
     plan, told = _plan(ICY, WET), _Told()
-    beside = run_beside(plan, out, executor=told)
+    beside = run_in_suite(plan, out, executor=told)
     assert set(told.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
@@ -171,7 +171,7 @@ def test_what_is_there_already_stays(out: Path) -> None:
     _asked_for(plan, out)
     assert taken_over.stat().st_ino == before
     told = _Told()
-    run_beside(_plan(DRY, WET), out, executor=told)
+    run_in_suite(_plan(DRY, WET), out, executor=told)
     assert told.names == []
 
 
@@ -190,7 +190,7 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
     with monkeypatch.context() as patch:
         patch.setattr(suite.shutil, "copytree", full)
         with pytest.raises(OutputError, match="source-0: No space left"):
-            run_beside(plan, out, executor=_Told(refuses=True))
+            run_in_suite(plan, out, executor=_Told(refuses=True))
     assert not (runs / "source-0").exists()
     _asked_for(plan, out)
     assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
@@ -201,14 +201,14 @@ def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
     """It may hold what is wanted here, so somebody should look at it."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
     with pytest.raises(CorruptStudy, match=r"Dry-to-Wet/plan\.json .*delete .*Dry-to-Wet to do"):
-        run_beside(_plan(DRY, ICY), out, executor=_Told(refuses=True))
+        run_in_suite(_plan(DRY, ICY), out, executor=_Told(refuses=True))
 
 
 def test_a_folder_of_another_study_is_left_alone(out: Path) -> None:
     """The same pair with another seed is another study."""
     before = files_of(out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
-        run_beside(_plan(DRY, WET, seed=1), out, executor=Serial())
+        run_in_suite(_plan(DRY, WET, seed=1), out, executor=Serial())
     assert files_of(out) == before
 
 
@@ -230,8 +230,10 @@ def _twice(means: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _crossing(
     fine_tune: NDArray[np.float64], scratch: NDArray[np.float64] = _STEADY, **more: Any
-) -> Crossing:
-    (found,) = crossings([make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)])
+) -> StudyOutcome:
+    (found,) = study_outcomes(
+        [make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)]
+    )
     return found
 
 
@@ -240,7 +242,7 @@ def test_a_crossing_is_found_along_a_line() -> None:
     found = _crossing(np.array([0.0, 500.0, 1500.0, *[900.0] * 8]))
     assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]
     assert found.gains["jumpstart"].value is not None
-    assert msgspec.structs.replace(found, gains={}) == Crossing(
+    assert msgspec.structs.replace(found, gains={}) == StudyOutcome(
         "Ant-to-BigAnt",
         final=pytest.approx(1000.0),
         zero_shot=pytest.approx(400.0),
@@ -278,14 +280,14 @@ def test_half_is_less_than_half() -> None:
     """Exactly half of scratch's steps are not less."""
     at_half = np.array([*[0.0] * 5, *[1000.0] * 6])
     assert _crossing(at_half).fine_tune_steps == pytest.approx(5120.0)
-    assert not Crossing("a", 1.0, None, 1.0, 5120.0, 2560.0).halves
-    assert Crossing("a", 1.0, None, 1.0, 5120.0, 2559.9).halves
+    assert not StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2560.0).halves
+    assert StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2559.9).halves
 
 
 def test_zero_shot_may_be_left_out_and_order_is_kept() -> None:
     """One line for each study, in their order."""
     without = make_study(arms=("scratch", "fine-tune"))
-    found = crossings([without, make_study(target=EnvRef("shapechanger/ExtendedAnt-v1"))])
+    found = study_outcomes([without, make_study(target=EnvRef("shapechanger/ExtendedAnt-v1"))])
     assert [crossing.name for crossing in found] == ["Ant-to-BigAnt", "Ant-to-ExtendedAnt"]
     assert found[0].zero_shot is None
     assert found[1].zero_shot is not None

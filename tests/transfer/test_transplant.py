@@ -21,7 +21,7 @@ from torch import nn
 
 from shapechanger.errors import MissingExtra, SpaceMismatch, TransplantError
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Take, mirror
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, mirror
 from shapechanger.transfer.transplant import transplant, transplant_normalisation
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
@@ -92,7 +92,7 @@ MAPS: dict[str, BodyMap] = {
         False,
         True,
         rules={"foot_*/motor": "copy ankle_*/motor"},
-        observation_rules={"hip_1/angle": "copy hip_2/angle", "torso/vx": Take("torso/vx", -2.0)},
+        observation_rules={"hip_1/angle": "copy hip_2/angle", "torso/vx": Copy("torso/vx", -2.0)},
     ),
 }
 ARCHITECTURES: dict[str, tuple[Any, Any]] = {
@@ -194,7 +194,7 @@ def back_to_source(body_map: BodyMap, u: NDArray[np.float64]) -> NDArray[np.floa
     column = {name: place.start for name, place in body_map.target_action.slices.items()}
     signed: dict[str, NDArray[np.float64]] = {}
     for entry in body_map.action:
-        if isinstance(entry.rule, Take):
+        if isinstance(entry.rule, Copy):
             taken = entry.rule.feature
             if taken not in signed or entry.feature == taken:
                 signed[taken] = u[:, column[entry.feature]] * np.sign(entry.rule.scale)
@@ -290,7 +290,7 @@ def test_each_weight_goes_to_its_name() -> None:
         seen,
         Layout((motor("x"), motor("y"))),
         Layout((motor("y"), motor("z"), motor("x"))),
-        rules={"b": Take("b", -3.0)},
+        rules={"b": Copy("b", -3.0)},
     )
     source = trained(PPO, body_map, ([], []))
     with torch.no_grad():
@@ -430,7 +430,7 @@ def test_critics_judge_copies_by_the_namesake_or_the_mean() -> None:
         copies,
         rules={
             "[cd]/motor": "copy a/motor",
-            "e/motor": Take("b/motor", -1.0),
+            "e/motor": Copy("b/motor", -1.0),
             "new/motor": "learn",
         },
     )
@@ -473,7 +473,7 @@ def test_statistics_go_with_their_names() -> None:
         ),
         pendulum_action(),
         pendulum_action(),
-        rules={"copy": "copy z", "angle": Take("angle", -2.0)},
+        rules={"copy": "copy z", "angle": Copy("angle", -2.0)},
     )
     source = RunningMeanStd(shape=(3,))
     source.mean, source.var = np.array([5.0, 1.0, 8.0]), np.array([9.0, 4.0, 16.0])

@@ -11,7 +11,7 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.vec_env import ThreadVecEnv, learner_envs
+from shapechanger.transfer.learners.ppo import ThreadVecEnv, training_vec_env
 from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 
@@ -92,9 +92,9 @@ def test_pictures_are_tiled() -> None:
 def test_envs_of_strangers_are_stepped_by_sb3() -> None:
     """They may share what they change."""
     for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
-        envs = learner_envs(EnvRef(env_id), 2, 1)
+        envs = training_vec_env(EnvRef(env_id), 2, 1)
         assert isinstance(envs, kind)
         envs.close()
-    envs = learner_envs(EnvRef(f"shapechanger:{_PENDULUM}", {"max_episode_steps": 3}), 2, None)
+    envs = training_vec_env(EnvRef(f"shapechanger:{_PENDULUM}", {"max_episode_steps": 3}), 2, None)
     assert isinstance(envs, ThreadVecEnv)
     envs.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL
+from shapechanger.bodies.finger import NOMINAL
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.outputs import Outputs
 from shapechanger.robot.guard.safe_pins import make_safe

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import JOINTS, NOMINAL
+from shapechanger.bodies.finger import JOINTS, NOMINAL
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import JOINTS, NOMINAL, TENDONS
-from shapechanger.embodiments.finger.anatomy import JOINT_REST, MOMENT_ARMS
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
+from shapechanger.bodies.finger.anatomy import JOINT_REST, MOMENT_ARMS
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from shapechanger.embodiments.vehicles import VEHICLES
-from shapechanger.worlds.home import HOME
+from shapechanger.bodies.vehicles import VEHICLES
+from shapechanger.worlds.course import HOME
 from shapechanger.worlds.layout import WORLDS
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.errors import WorldError
-from shapechanger.worlds.mount import Jitter, move_camera
+from shapechanger.worlds.camera import CameraJitter, move_camera
 
 # It looks along x, with z up, as those on the vehicles do.
 _MODEL = """
@@ -20,7 +20,7 @@ _MODEL = """
 """
 
 
-def _moved(jitter: Jitter) -> mujoco.MjModel:
+def _moved(jitter: CameraJitter) -> mujoco.MjModel:
     model = mujoco.MjModel.from_xml_string(_MODEL)
     move_camera(model, "eye", jitter)
     return model
@@ -35,30 +35,30 @@ def _axes(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 def test_none_is_none() -> None:
     """A camera that is off by nothing stays."""
-    assert _moved(Jitter()).camera("eye").pos == pytest.approx([0.05, 0.0, 0.12])
-    np.testing.assert_allclose(_axes(_moved(Jitter()))[:, 2], [-1, 0, 0], atol=1e-9)
+    assert _moved(CameraJitter()).camera("eye").pos == pytest.approx([0.05, 0.0, 0.12])
+    np.testing.assert_allclose(_axes(_moved(CameraJitter()))[:, 2], [-1, 0, 0], atol=1e-9)
 
 
 def test_places_are_up_and_left() -> None:
     """Seen from above, the left of a vehicle that looks along x is y."""
-    place = _moved(Jitter(up_m=0.01, left_m=0.02)).camera("eye").pos
+    place = _moved(CameraJitter(up_m=0.01, left_m=0.02)).camera("eye").pos
     assert place == pytest.approx([0.05, 0.02, 0.13])
 
 
 def test_each_angle_turns_the_way_it_says() -> None:
     """Down, to the left, and clockwise."""
     few = 0.05
-    ahead_down = -_axes(_moved(Jitter(pitch_rad=few)))[:, 2]
+    ahead_down = -_axes(_moved(CameraJitter(pitch_rad=few)))[:, 2]
     np.testing.assert_allclose(ahead_down, [math.cos(few), 0.0, -math.sin(few)], atol=1e-9)
-    ahead_left = -_axes(_moved(Jitter(yaw_rad=few)))[:, 2]
+    ahead_left = -_axes(_moved(CameraJitter(yaw_rad=few)))[:, 2]
     np.testing.assert_allclose(ahead_left, [math.cos(few), math.sin(few), 0.0], atol=1e-9)
-    up_right = _axes(_moved(Jitter(roll_rad=few)))[:, 1]
+    up_right = _axes(_moved(CameraJitter(roll_rad=few)))[:, 1]
     np.testing.assert_allclose(up_right, [0.0, -math.sin(few), math.cos(few)], atol=1e-9)
 
 
 def test_random_ones_are_small_and_of_both_signs() -> None:
     """A draw is within what it promises, and comes from its generator alone."""
-    drawn = [Jitter.random(np.random.default_rng(seed)) for seed in range(200)]
+    drawn = [CameraJitter.random(np.random.default_rng(seed)) for seed in range(200)]
     for name, most in {
         "up_m": 0.015,
         "left_m": 0.01,
@@ -69,18 +69,20 @@ def test_random_ones_are_small_and_of_both_signs() -> None:
         values = np.array([getattr(jitter, name) for jitter in drawn])
         assert -most <= values.min() < -0.8 * most
         assert 0.8 * most < values.max() <= most
-    assert drawn[7] == Jitter.random(np.random.default_rng(7))
+    assert drawn[7] == CameraJitter.random(np.random.default_rng(7))
 
 
-@pytest.mark.parametrize("jitter", [Jitter(up_m=-0.115), Jitter(up_m=1.0), Jitter(left_m=-1.5)])
-def test_a_camera_stays_on_its_vehicle(jitter: Jitter) -> None:
+@pytest.mark.parametrize(
+    "jitter", [CameraJitter(up_m=-0.115), CameraJitter(up_m=1.0), CameraJitter(left_m=-1.5)]
+)
+def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
     """In the floor, or in the air, it is no camera of this vehicle."""
     with pytest.raises(WorldError, match=r"The camera is outside the world: it would be at \("):
         _moved(jitter)
 
 
-@pytest.mark.parametrize("jitter", [Jitter(left_m=math.nan), Jitter(roll_rad=math.inf)])
-def test_a_camera_is_off_by_numbers(jitter: Jitter) -> None:
+@pytest.mark.parametrize("jitter", [CameraJitter(left_m=math.nan), CameraJitter(roll_rad=math.inf)])
+def test_a_camera_is_off_by_numbers(jitter: CameraJitter) -> None:
     """What is no number would turn the picture black."""
     with pytest.raises(WorldError, match="by finite numbers, got"):
         _moved(jitter)

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.vehicles import SIM_DT, VEHICLES
+from shapechanger.bodies.vehicles import SIM_DT, VEHICLES
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds import simulation
-from shapechanger.worlds.course import Course
-from shapechanger.worlds.home import HOME
+from shapechanger.worlds.camera import CameraJitter
+from shapechanger.worlds.course import HOME, Course
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.mount import Jitter
 from shapechanger.worlds.simulation import MujocoWorld
 from shapechanger.worlds.world import RESTING_V, Pose
 
@@ -233,7 +232,7 @@ def test_what_is_refused_leaves_the_world_as_it_was() -> None:
         world.lay_out(-1)
     dim = replace(look, light=0.3)
     with pytest.raises(WorldError, match="outside the world"):
-        world.lay_out(4, dim, Jitter(up_m=-1.0))
+        world.lay_out(4, dim, CameraJitter(up_m=-1.0))
     assert (world.model, world.course, world.look) == (model, course, look)
     _drive(world, _AHEAD["car"], 0.2)
 
@@ -272,7 +271,7 @@ def test_a_moved_camera_sees_something_else() -> None:
     """And the one after it is at its place again."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     usual = world.picture()
-    world.lay_out(3, camera=Jitter(yaw_rad=0.05))
+    world.lay_out(3, camera=CameraJitter(yaw_rad=0.05))
     assert not np.array_equal(world.picture(), usual)
     world.lay_out(3)
     np.testing.assert_array_equal(world.picture(), usual)

@@ -7,7 +7,7 @@ import math
 import mujoco
 import pytest
 
-from shapechanger.worlds.touch import APART_S, BUMPER_SPREAD, Touch
+from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, Touch
 from shapechanger.worlds.world import Pose
 
 _DT = 0.01

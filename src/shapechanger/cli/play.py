@@ -72,14 +72,14 @@ class Play:
 
     def _policy(self, env: Any) -> tuple[Any, Any]:
         """The env to act in, and what acts."""
-        from shapechanger.transfer.evaluation import random_actions
+        from shapechanger.transfer.learners.evaluation import random_actions
 
         if self.policy is None:
             return env, random_actions(env.action_space, self.seed)
         from shapechanger.transfer.body_map import BodyMap, MappedEnv
-        from shapechanger.transfer.cloning import is_clone, load_clone
         from shapechanger.transfer.env_ref import layouts_of
-        from shapechanger.transfer.policy_file import load_policy
+        from shapechanger.transfer.learners.cloning import is_clone, load_clone
+        from shapechanger.transfer.learners.policy_file import load_policy
 
         if is_clone(self.policy):
             return env, load_clone(self.policy).predict_many

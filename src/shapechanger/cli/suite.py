@@ -20,7 +20,7 @@ from shapechanger.cli.transfer import run_steps, write_study_report
 
 if TYPE_CHECKING:
     from shapechanger.transfer.plan import TransferTask
-    from shapechanger.transfer.suite import Crossing
+    from shapechanger.transfer.suite import StudyOutcome
 
 __all__ = ["Suite"]
 
@@ -56,9 +56,9 @@ class Suite:
         """Do the studies, write their reports, and print what they say together."""
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.files import write_json
-        from shapechanger.transfer.settings import learner_settings
-        from shapechanger.transfer.study import make_plan, unfinished
-        from shapechanger.transfer.suite import begin_beside, crossings, run_beside
+        from shapechanger.transfer.learners.settings import learner_settings
+        from shapechanger.transfer.study import make_plan, unfinished_runs
+        from shapechanger.transfer.suite import open_study_folder, run_in_suite, study_outcomes
 
         require_seed(self.seed)
         out = self.out or Path("results", self.name)
@@ -67,7 +67,7 @@ class Suite:
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
         settings = learner_settings("cloning")
-        found: list[Crossing] = []
+        found: list[StudyOutcome] = []
         for task in self._tasks():
             plan = make_plan(
                 task,
@@ -79,15 +79,15 @@ class Suite:
                 seed=self.seed,
             )
             try:
-                folder = begin_beside(plan, out)
-                with StudyProgress(run_steps(plan, unfinished(plan, folder))) as progress:
-                    study = run_beside(
+                folder = open_study_folder(plan, out)
+                with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
+                    study = run_in_suite(
                         plan, out, executor=executor, on_progress=progress, command=command
                     )
             except KeyboardInterrupt:
                 raise Interrupted(f"Stopped. Go on with: {command}") from None
             write_study_report(study, folder)
-            found += crossings([study])
+            found += study_outcomes([study])
             write_json(out / _SUMMARY, found)
             console.print(f"wrote {folder / 'report.html'}", soft_wrap=True)
         console.print(_table(found))
@@ -113,9 +113,9 @@ class Suite:
         return [TransferTask(driven(car), driven(car, (lens,))) for lens in _LENSES]
 
 
-def _table(found: list[Crossing]) -> Table:
+def _table(found: list[StudyOutcome]) -> Table:
     """What each study says: returns and minutes first, then gains with their intervals."""
-    from shapechanger.transfer.report.numbers import estimate_text
+    from shapechanger.reports.numbers import estimate_text
 
     table = Table(
         *("study", "scratch", "zero-shot", "fine-tuned", "scratch, min", "fine-tune, min"),

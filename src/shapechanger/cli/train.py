@@ -20,8 +20,8 @@ from shapechanger.errors import MissingExtra, OutputError
 
 if TYPE_CHECKING:
     from shapechanger.transfer.env_ref import EnvRef
-    from shapechanger.transfer.evaluation import Evaluation
-    from shapechanger.transfer.settings import CloningSettings, SacSettings
+    from shapechanger.transfer.learners.evaluation import Evaluation
+    from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
 
 __all__ = ["Train"]
 
@@ -49,9 +49,9 @@ class Train:
         """Train, showing the evaluations as they come."""
         from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.files import make_folder
-        from shapechanger.transfer.policy_file import save_policy
-        from shapechanger.transfer.settings import LearnerSettings, learner_settings
-        from shapechanger.transfer.training import require_budget, train, use_one_thread
+        from shapechanger.transfer.learners.policy_file import save_policy
+        from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
+        from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
@@ -112,15 +112,15 @@ def _learn_to_drive(
     progress: StudyProgress,
 ) -> None:
     """Learn from the demonstrator of an env, and write the policy and what it learned from."""
-    from shapechanger.transfer.by_camera import learn_by_camera
-    from shapechanger.transfer.cloning import Recording
+    from shapechanger.transfer.learners.cloning import DemonstrationFile
+    from shapechanger.transfer.learners.sac import train_camera_policy
 
-    policy = learn_by_camera(
+    policy = train_camera_policy(
         env,
         settings,
         settings.whole_updates(steps),
         seed,
-        demonstrations=Recording(
+        demonstrations=DemonstrationFile(
             Path("results", "demonstrations", f"{env.id.split('/')[-1]}-{seed}.npz"), seed
         ),
         on_evaluation=show,

@@ -97,17 +97,17 @@ class Transfer:
     def run(self) -> None:
         """Do the study, print its table, and write its report."""
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.study import holds, run_study, unfinished
+        from shapechanger.transfer.study import is_folder_of, run_study, unfinished_runs
 
         self._require_sense()
         # The report comes last; if what draws it is missing, say so before the work.
-        import_module("shapechanger.transfer.report.curves")
+        import_module("shapechanger.reports.charts")
         # A file has no width of its own; a table in it should not be folded.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         plan = self._plan()
         executor = Processes(1 if plan.exclusive else self.workers)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
-        to_do = unfinished(plan, out) if holds(plan, out) else plan.runs()
+        to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
             console.print(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
         try:
@@ -147,9 +147,9 @@ class Transfer:
 
     def _plan(self) -> Plan:
         """What to do."""
-        from shapechanger.transfer.likeness import arms_for
+        from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
+        from shapechanger.transfer.methods import default_arms
         from shapechanger.transfer.plan import TransferTask
-        from shapechanger.transfer.settings import LearnerSettings, learner_settings
         from shapechanger.transfer.study import make_plan
 
         source = driven(env_ref(self.source, self.source_body))
@@ -178,7 +178,7 @@ class Transfer:
             steps=steps,
             source_steps=self.source_steps,
             source_policy=self.source_policy,
-            arms=self.arms or arms_for(task),
+            arms=self.arms or default_arms(task),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),
             map_text=_read(self.map) if self.map else "",
@@ -188,7 +188,7 @@ class Transfer:
 
 def write_study_report(study: Study, out: Path) -> Path:
     """Write the report; a machine that cannot draw bodies gets one without their pictures."""
-    from shapechanger.transfer.report import write_report
+    from shapechanger.reports.study import write_report
 
     path = out / "report.html"
     pictures, note = None, ""
@@ -202,10 +202,10 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
     """The steps of each run, for the progress; an evaluation counts as one."""
-    from shapechanger.transfer.plan import LIKENED
+    from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS
 
     steps = {"scratch": plan.steps, "fine-tune": plan.steps}
-    steps |= dict.fromkeys(("source", *LIKENED), plan.source_steps)
+    steps |= dict.fromkeys(("source", *ADAPTED_SOURCE_ARMS), plan.source_steps)
     return {run.name: steps.get(run.kind, 1) for run in runs}
 
 
@@ -265,11 +265,11 @@ def _name(env: EnvRef) -> str:
 
 def _way_on(plan: Plan, out: Path) -> str:
     """What is kept of a study that was cut off, and how to go on; empty if it had not begun."""
-    from shapechanger.transfer.study import holds, unfinished
+    from shapechanger.transfer.study import is_folder_of, unfinished_runs
 
-    if not holds(plan, out):
+    if not is_folder_of(plan, out):
         return ""
-    if len(unfinished(plan, out)) == len(plan.runs()):
+    if len(unfinished_runs(plan, out)) == len(plan.runs()):
         return f"No run had ended; begin again with: {_command()}"
     return f"Runs that had ended are kept in {out}; go on with: {_command()}"
 
@@ -281,8 +281,7 @@ def _command() -> str:
 
 def _print(console: Console, study: Study) -> None:
     """The table of measures, and what they come to."""
-    from shapechanger.transfer.report.table import measure_rows
-    from shapechanger.transfer.report.verdict import verdict
+    from shapechanger.reports.verdict import measure_rows, verdict
 
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # What an arm leaves undefined, as zero-shot does most, is in the report with the reason.

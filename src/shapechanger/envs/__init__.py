@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shapechanger.envs.catalogue import CATALOGUE, Entry, find, register_all
+from shapechanger.envs.catalogue import CATALOGUE, CatalogueEntry, find, register_all
 
-__all__ = ["CATALOGUE", "Entry", "find", "register_all"]
+__all__ = ["CATALOGUE", "CatalogueEntry", "find", "register_all"]

@@ -18,10 +18,10 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.embodiments.ant import ANT
-from shapechanger.embodiments.family import BodyLike
+from shapechanger.bodies.ant import ANT
+from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
-from shapechanger.envs.stepping.actions import check_action
 from shapechanger.envs.stepping.tuned import (
     NO_WARNINGS,
     Binding,

@@ -18,7 +18,7 @@ __all__ = [
     "REMOTE_FINGER",
     "REMOTE_VEHICLE",
     "VEHICLE_ENVS",
-    "Entry",
+    "CatalogueEntry",
     "TaskEntry",
     "find",
     "find_task",
@@ -31,7 +31,7 @@ REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
 """Id of the env of a finger on a rig, which has the layout of `Finger-v1`."""
 
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
-"""Id of the env of a robot on the network; its body is whatever answers, so it is no `Entry`."""
+"""Id of the env of a robot on the network; its body is whatever answers, so it is no `CatalogueEntry`."""
 
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
@@ -80,7 +80,7 @@ FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
 """The envs of the finger by id."""
 
 
-class Entry(msgspec.Struct, frozen=True):
+class CatalogueEntry(msgspec.Struct, frozen=True):
     """One env of the catalogue.
 
     Attributes:
@@ -114,9 +114,9 @@ _EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
 _UP: Final = 950.0
 _RUNS: Final = 6000.0
 
-_PLANAR: Final = "shapechanger.envs.planar"
-_HUMANOID: Final = "shapechanger.envs.humanoid"
-_DOUBLE_PENDULUM: Final = "shapechanger.envs.double_pendulum"
+_PLANAR: Final = "shapechanger.envs.runners"
+_HUMANOID: Final = "shapechanger.envs.runners"
+_DOUBLE_PENDULUM: Final = "shapechanger.envs.pendulum"
 
 # Gymnasium's other bodies, unedited: name, summary, module, and the reward threshold of its v5 id.
 _OTHERS: Final = (
@@ -128,10 +128,10 @@ _OTHERS: Final = (
     ("InvertedDoublePendulum", "two poles on a cart", _DOUBLE_PENDULUM, 9100.0),
 )
 
-CATALOGUE: Final[dict[str, Entry]] = {
+CATALOGUE: Final[dict[str, CatalogueEntry]] = {
     entry.id: entry
     for entry in (
-        Entry(
+        CatalogueEntry(
             "InvertedPendulum",
             "InvertedPendulum",
             "a pole of 0.6 m on a cart",
@@ -140,7 +140,7 @@ CATALOGUE: Final[dict[str, Entry]] = {
             "InvertedPendulum",
             _UP,
         ),
-        Entry(
+        CatalogueEntry(
             "SmallInvertedPendulum",
             "InvertedPendulum",
             "a pole half as long",
@@ -149,7 +149,7 @@ CATALOGUE: Final[dict[str, Entry]] = {
             "SmallInvertedPendulum",
             _UP,
         ),
-        Entry(
+        CatalogueEntry(
             "BigInvertedPendulum",
             "InvertedPendulum",
             "a pole twice as long",
@@ -158,8 +158,8 @@ CATALOGUE: Final[dict[str, Entry]] = {
             "BigInvertedPendulum",
             _UP,
         ),
-        Entry("Ant", "Ant", "four legs of two joints", _ANT, "ppo-run", "Ant", _RUNS),
-        Entry(
+        CatalogueEntry("Ant", "Ant", "four legs of two joints", _ANT, "ppo-run", "Ant", _RUNS),
+        CatalogueEntry(
             "AmputatedAnt",
             "Ant",
             "one back shank cut to a quarter",
@@ -168,8 +168,10 @@ CATALOGUE: Final[dict[str, Entry]] = {
             "AmputatedAnt",
             _RUNS,
         ),
-        Entry("BigAnt", "Ant", "all shanks twice as long", _ANT, "ppo-run", "BigAnt", _RUNS),
-        Entry(
+        CatalogueEntry(
+            "BigAnt", "Ant", "all shanks twice as long", _ANT, "ppo-run", "BigAnt", _RUNS
+        ),
+        CatalogueEntry(
             "ExtendedAnt",
             "Ant",
             "a third segment with a motor on each leg",
@@ -179,7 +181,7 @@ CATALOGUE: Final[dict[str, Entry]] = {
             _RUNS,
         ),
         *(
-            Entry(
+            CatalogueEntry(
                 name,
                 name,
                 summary,
@@ -229,7 +231,7 @@ def register_all() -> None:
     if REMOTE_FINGER not in gym.registry:
         gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
             REMOTE_FINGER,
-            "shapechanger.envs.finger.remote:RemoteFingerEnv",
+            "shapechanger.envs.remote.finger:RemoteFingerEnv",
             max_episode_steps=FINGER_ENVS["shapechanger/Finger-v1"].episode_steps,
             nondeterministic=True,  # As with every robot.
         )
@@ -241,7 +243,7 @@ def register_all() -> None:
         )
 
 
-def find(env_id: str) -> Entry:
+def find(env_id: str) -> CatalogueEntry:
     """The entry of an id; its name alone, such as `BigAnt`, will do.
 
     Raises:

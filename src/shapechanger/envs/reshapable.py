@@ -18,12 +18,10 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.embodiments.family import BodyLike, Family
+from shapechanger.bodies.families import BodyLike, Family
+from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
-from shapechanger.envs.picture import body_reach, draw
-from shapechanger.envs.renderer import Renderer
-from shapechanger.envs.stepping.actions import check_action
-from shapechanger.envs.textures import halve_textures
+from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify

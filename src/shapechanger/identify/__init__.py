@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from shapechanger.identify.identified import Estimate, Identified
-from shapechanger.identify.log import FingerLog
-from shapechanger.identify.log_file import load_log, save_log
-from shapechanger.identify.whole import identify
+from shapechanger.identify.log import FingerLog, load_log, save_log
+from shapechanger.identify.result import IdentifiedFinger, ParameterEstimate, identify
 
-__all__ = ["Estimate", "FingerLog", "Identified", "identify", "load_log", "save_log"]
+__all__ = ["FingerLog", "IdentifiedFinger", "ParameterEstimate", "identify", "load_log", "save_log"]

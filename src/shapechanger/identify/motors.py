@@ -3,18 +3,70 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
-from shapechanger.embodiments.finger import NOMINAL, FingerParameters, drive_of
-from shapechanger.identify.commands import Commands
+from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
+from shapechanger.identify.kinematics import covariance
 from shapechanger.identify.log import FingerLog
-from shapechanger.identify.standard_errors import covariance
 
-__all__ = ["Motors", "fit_motors"]
+__all__ = ["CommandSignal", "Motors", "fit_motors"]
+
+
+class CommandSignal:
+    """The commands of a log as functions of time.
+
+    Args:
+        log: What was commanded; before its first row the first command is taken to have acted.
+    """
+
+    def __init__(self, log: FingerLog) -> None:
+        self._t = np.concatenate([[log.t[0] - 1.0], log.t])
+        steps = np.diff(self._t)[:, None] * log.commands
+        # Each command acts in the period that ends with its row.
+        self._sums = np.concatenate(
+            [np.zeros((1, log.commands.shape[1])), np.cumsum(steps, axis=0)]
+        )
+
+    def late(self, start: float, dt: float, steps: int, delay: float) -> NDArray[np.float64]:
+        """What acts in each of some steps, (steps, 7): the mean over the step.
+
+        Means make it a smooth function of the delay.
+
+        Args:
+            start: When the first step begins, s.
+            dt: Length of a step, s.
+            steps: How many.
+            delay: How much later commands act, s.
+        """
+        edges = start + dt * np.arange(steps + 1) - delay
+        sums = np.empty((steps + 1, self._sums.shape[1]))
+        for i, column in enumerate(self._sums.T):
+            sums[:, i] = np.interp(edges, self._t, column)
+        return (sums[1:] - sums[:-1]) / dt
+
+    def followed(
+        self, start: float, dt: float, steps: int, delay: float, lag: float
+    ) -> NDArray[np.float64]:
+        """What motors have made of it at the end of each step, (steps, 7).
+
+        Args:
+            start: When the first step begins, s; the motors are at their command then.
+            dt: Length of a step, s.
+            steps: How many.
+            delay: See `late`.
+            lag: Time constant of the motors, s.
+        """
+        given = self.late(start, dt, steps, delay)
+        keeps = np.exp(-dt / lag)
+        start_at = keeps * given[:1]
+        filtered = cast("Any", lfilter([1.0 - keeps], [1.0, -keeps], given, axis=0, zi=start_at))
+        return np.asarray(filtered[0], np.float64)
+
 
 _FINE_S: Final = 0.001
 # s. By then the motors have forgotten what was before the log.
@@ -61,7 +113,7 @@ def fit_motors(log: FingerLog, known: FingerParameters = NOMINAL) -> Motors:
     """
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)
-    commands = Commands(log)
+    commands = CommandSignal(log)
     speeds = np.gradient(log.lengths, log.control_dt, axis=0)
     pulled = drive.stiffness * log.lengths + drive.damping * speeds
     steps = int(np.ceil(log.seconds / _FINE_S)) + 1

@@ -16,7 +16,7 @@ try:
 except ImportError as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.morphology.codec import EDITS, Body, as_body, from_json, to_json
+from shapechanger.morphology.body import EDITS, Body, as_body, from_json, interpolate, to_json
 from shapechanger.morphology.edits import (
     AddLimb,
     AddSegment,
@@ -37,7 +37,6 @@ from shapechanger.morphology.edits import (
     Stiffness,
     Stretch,
 )
-from shapechanger.morphology.path import interpolate
 from shapechanger.morphology.reshape import compile_body, reshape
 from shapechanger.morphology.spec import name_elements
 

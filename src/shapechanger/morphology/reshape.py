@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import mujoco
 
 from shapechanger.errors import BrokenModel, ShapechangerError
-from shapechanger.morphology.codec import to_json
+from shapechanger.morphology.body import to_json
 from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.spec.explicit import make_explicit
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.transfer.learners.settings import LEARNERS, LearnerSettings
 from shapechanger.transfer.plan import Plan, TransferTask
-from shapechanger.transfer.settings import LEARNERS, LearnerSettings
 
 __all__ = [
     "LEARNERS",

@@ -16,12 +16,12 @@ from typing import Any, Final, Protocol
 
 from shapechanger.errors import ShapechangerError, StudyError
 
-__all__ = ["Executor", "Job", "OnProgress", "Processes", "Report", "Serial"]
+__all__ = ["Executor", "Job", "OnProgress", "Processes", "ReportSteps", "Serial"]
 
 _REPORT_EVERY_S: Final = 0.25
 
 # Called in the job with the number of steps done.
-Report = Callable[[int], None]
+ReportSteps = Callable[[int], None]
 # Called in the parent: name of the job, steps done, whether it has ended.
 OnProgress = Callable[[str, int, bool], None]
 
@@ -32,7 +32,7 @@ class Job:
 
     Attributes:
         name: Its name, unlike any other's.
-        function: What to call, with `arguments` and a `Report`; a function of a module, so that
+        function: What to call, with `arguments` and a `ReportSteps`; a function of a module, so that
             another process finds it.
         arguments: Its arguments, which another process must be able to receive.
         after: Names of jobs that must have ended before.
@@ -67,7 +67,7 @@ class Serial:
             on_progress(job.name, 0, True)
 
 
-def _reporting(name: str, on_progress: OnProgress) -> Report:
+def _reporting(name: str, on_progress: OnProgress) -> ReportSteps:
     """A report that passes on the steps under the job's name."""
     return lambda steps: on_progress(name, steps, False)
 
@@ -177,7 +177,7 @@ def _serve(connection: Connection) -> None:
             connection.send(("ended", None))
 
 
-def _throttled(connection: Connection) -> Report:
+def _throttled(connection: Connection) -> ReportSteps:
     """A report that passes on a few numbers a second: a run makes thousands."""
     last = 0.0
 

@@ -10,7 +10,7 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, OutputError
 
-__all__ = ["append_line", "make_folder", "read_json", "write_json", "write_whole"]
+__all__ = ["append_line", "make_folder", "read_json", "write_atomic", "write_json"]
 
 _T = TypeVar("_T")
 
@@ -30,7 +30,7 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"Cannot write to {folder}: {error.strerror or error}.") from error
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_atomic(path: Path, content: bytes) -> None:
     """Write a file that appears whole, or leaves what was there.
 
     Raises:
@@ -54,7 +54,7 @@ def write_json(path: Path, value: Any) -> None:
     Raises:
         OutputError: If it cannot be written.
     """
-    write_whole(path, msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n")
+    write_atomic(path, msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n")
 
 
 def append_line(path: Path, value: Any) -> None:

@@ -11,19 +11,28 @@ import numpy as np
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.settings import Settings
+from shapechanger.transfer.learners.settings import Settings
 
-__all__ = ["ARMS", "EVERY_ARM", "LIKENED", "Arm", "Plan", "Run", "RunKind", "TransferTask"]
+__all__ = [
+    "ADAPTED_SOURCE_ARMS",
+    "ARMS",
+    "EVERY_ARM",
+    "Arm",
+    "Plan",
+    "Run",
+    "RunKind",
+    "TransferTask",
+]
 
 Arm = Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"]
 RunKind = Literal["source", "random"] | Arm
 
 ARMS: Final[tuple[Arm, ...]] = ("scratch", "zero-shot", "fine-tune")
 """What every pair of envs can be compared by."""
-LIKENED: Final[tuple[Arm, ...]] = ("randomised", "identified")
+ADAPTED_SOURCE_ARMS: Final[tuple[Arm, ...]] = ("randomised", "identified")
 """What is learned in a source that was made more like the target; see
-`shapechanger.transfer.likeness`."""
-EVERY_ARM: Final[tuple[Arm, ...]] = (*ARMS, *LIKENED)
+`shapechanger.transfer.methods`."""
+EVERY_ARM: Final[tuple[Arm, ...]] = (*ARMS, *ADAPTED_SOURCE_ARMS)
 _KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM)
 # Welch's interval needs two of each; fewer than five are too wide to say much.
 _FEWEST_SEEDS: Final = 2

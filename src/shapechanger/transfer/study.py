@@ -15,18 +15,30 @@ import numpy as np
 import shapechanger
 from shapechanger.errors import ForeignStudy, StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.brought import steps_brought_along
 from shapechanger.transfer.env_ref import layouts_of
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
-from shapechanger.transfer.likeness import require_likeness
+from shapechanger.transfer.learners.ppo import require_budget
+from shapechanger.transfer.learners.settings import CloningSettings, LearnerSettings, Settings
+from shapechanger.transfer.methods import (
+    RunResult,
+    given_policy_steps,
+    load_result,
+    perform_run,
+    require_source_adaptation,
+)
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
-from shapechanger.transfer.runs import RunResult, finished, perform
-from shapechanger.transfer.settings import CloningSettings, LearnerSettings, Settings
-from shapechanger.transfer.training import require_budget
 
-__all__ = ["PLAN_FILE", "STUDY_FILE", "Study", "holds", "make_plan", "run_study", "unfinished"]
+__all__ = [
+    "PLAN_FILE",
+    "STUDY_FILE",
+    "Study",
+    "is_folder_of",
+    "make_plan",
+    "run_study",
+    "unfinished_runs",
+]
 
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
@@ -118,7 +130,7 @@ def make_plan(
     body_map, individual, exclusive = _looked_at(task, tuple(arms), rules, map_text, units)
     digest = ""
     if source_policy is not None:
-        source_budget = steps_brought_along(source_policy, task.source, learner, settings)
+        source_budget = given_policy_steps(source_policy, task.source, learner, settings)
         digest = _digest(source_policy)
     else:
         require_budget(source_budget, settings)
@@ -181,30 +193,30 @@ def run_study(
     jobs = [
         Job(
             run.name,
-            perform,
+            perform_run,
             (plan, run, str(out), str(source_policy or "")),
             after=_after(plan, run),
         )
-        for run in unfinished(plan, out)
+        for run in unfinished_runs(plan, out)
     ]
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
-    results = [finished(plan, out, run) for run in plan.runs()]
+    results = [load_result(plan, out, run) for run in plan.runs()]
     study = _study(plan, [result for result in results if result is not None], command, shift)
     write_json(out / STUDY_FILE, study)
     return study
 
 
-def unfinished(plan: Plan, out: Path) -> tuple[Run, ...]:
+def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
     """The runs of a plan that have not ended in `out`.
 
     Raises:
         CorruptStudy: If the file of one that has cannot be read.
     """
-    return tuple(run for run in plan.runs() if finished(plan, out, run) is None)
+    return tuple(run for run in plan.runs() if load_result(plan, out, run) is None)
 
 
-def holds(plan: Plan, out: Path) -> bool:
+def is_folder_of(plan: Plan, out: Path) -> bool:
     """Whether `out` is the folder of this study, done with as many seeds or with fewer.
 
     Raises:
@@ -265,7 +277,7 @@ def _looked_at(
     try:
         source_observation, source_action = layouts_of(source)
         target_observation, target_action = layouts_of(target)
-        require_likeness(task, arms, target.unwrapped)
+        require_source_adaptation(task, arms, target.unwrapped)
         individual: str = getattr(target.unwrapped, "individual", "")
         exclusive: bool = getattr(target.unwrapped, "exclusive", False)
     finally:

@@ -17,19 +17,19 @@ import msgspec
 from shapechanger.errors import OutputError
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
+from shapechanger.transfer.methods import load_result
 from shapechanger.transfer.metrics import Estimate, LearningCurves
 from shapechanger.transfer.plan import Plan, RunKind
-from shapechanger.transfer.runs import finished
 from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, run_study
 
-__all__ = ["Crossing", "begin_beside", "crossings", "run_beside", "study_folder"]
+__all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_folder", "study_outcomes"]
 
 _OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
 _DEMONSTRATIONS: Final = "demonstrations"
 
 
-class Crossing(msgspec.Struct, frozen=True):
+class StudyOutcome(msgspec.Struct, frozen=True):
     """What one study of a suite says, in steps on the target.
 
     Attributes:
@@ -68,7 +68,7 @@ def study_folder(plan: Plan, out: Path) -> Path:
     )
 
 
-def run_beside(
+def run_in_suite(
     plan: Plan,
     out: Path,
     *,
@@ -83,11 +83,11 @@ def run_beside(
         CorruptStudy: If a file in one cannot be read.
         OutputError: If `out` cannot be written.
     """
-    folder = begin_beside(plan, out)
+    folder = open_study_folder(plan, out)
     return run_study(plan, folder, executor=executor, on_progress=on_progress, command=command)
 
 
-def begin_beside(plan: Plan, out: Path) -> Path:
+def open_study_folder(plan: Plan, out: Path) -> Path:
     """Make a study's folder below `out`, with what the studies beside it have done already.
 
     Returns:
@@ -107,7 +107,7 @@ def begin_beside(plan: Plan, out: Path) -> Path:
     return folder
 
 
-def crossings(studies: Iterable[Study]) -> list[Crossing]:
+def study_outcomes(studies: Iterable[Study]) -> list[StudyOutcome]:
     """What each study says, in the order of the studies."""
     return [_crossing(study) for study in studies]
 
@@ -129,7 +129,7 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
         if (sibling / shown).exists() and not (folder / shown).exists():
             make_folder((folder / shown).parent)
             (folder / shown).hardlink_to(sibling / shown)
-        if finished(plan, folder, run) is None and finished(other, sibling, run) is not None:
+        if load_result(plan, folder, run) is None and load_result(other, sibling, run) is not None:
             _copy_whole(run.folder(sibling), run.folder(folder))
 
 
@@ -150,14 +150,14 @@ def _copy_whole(theirs: Path, mine: Path) -> None:
         raise OutputError(f"Cannot write {mine}: {error.strerror or error}.") from error
 
 
-def _crossing(study: Study) -> Crossing:
+def _crossing(study: Study) -> StudyOutcome:
     scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
     final = float(scratch.returns[:, -1].mean())
     zero_shot = study.of("zero-shot")
     summary = study.summaries["fine-tune"]
     measures = summary.in_target_steps
     first = _first_at(scratch, final)
-    return Crossing(
+    return StudyOutcome(
         study_folder(study.plan, Path()).name,
         final,
         sum(run.curve[0].mean_return for run in zero_shot) / len(zero_shot) if zero_shot else None,

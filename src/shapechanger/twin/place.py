@@ -53,7 +53,7 @@ def open_world(
     """
     if place.finger:
         try:
-            from shapechanger.embodiments.finger import FingerParameters
+            from shapechanger.bodies.finger import FingerParameters
             from shapechanger.twin.world.finger import FingerWorld
         except ModuleNotFoundError as error:
             raise MissingExtra(error.name or "mujoco", "sim") from error
@@ -61,7 +61,7 @@ def open_world(
     if not place.world:
         return DrivingWorld(frozenset(parts), size or ROOM, seed)
     try:
-        from shapechanger.embodiments.vehicles import require_fit
+        from shapechanger.bodies.vehicles import require_fit
         from shapechanger.worlds.simulation import MujocoWorld
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "mujoco", "sim") from error

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HELD_OUT", "TRAINING", "Course", "Lamp", "Surface", "Thing", "ThingKind", "Wall"]
+from shapechanger.errors import WorldError
+
+__all__ = [
+    "HELD_OUT",
+    "HOME",
+    "TRAINING",
+    "Course",
+    "Lamp",
+    "Surface",
+    "Thing",
+    "ThingKind",
+    "Wall",
+    "require_element",
+]
 
 TRAINING: Final = range(0, 1_000_000)
 """Seeds of the courses that vehicles learn on."""
@@ -133,3 +148,25 @@ class Course:
         """Once round, m."""
         steps = np.diff(self.route, axis=0, append=self.route[:1])
         return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+
+
+HOME: Final[Mapping[str, str]] = MappingProxyType(
+    {"boat": "harbour", "car": "corridor", "tank": "corridor", "truck": "yard"}
+)
+"""Kind of place by the name of the vehicle."""
+
+
+def require_element(vehicle: str, *, floats: bool, world: str) -> None:
+    """Refuse a place of the wrong element: who floats needs water, and nobody else drives on it.
+
+    Args:
+        vehicle: Name of the vehicle.
+        floats: Whether it floats.
+        world: Kind of place.
+
+    Raises:
+        WorldError: If the vehicle cannot drive there.
+    """
+    if floats != (world == HOME["boat"]):
+        what = "floats" if floats else "does not float"
+        raise WorldError(f"A {vehicle} {what}: it cannot drive in a {world}.")

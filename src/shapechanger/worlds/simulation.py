@@ -10,23 +10,85 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.vehicles import SIM_DT, add_vehicle, vehicle_model
+from shapechanger.bodies.vehicles import SIM_DT, add_vehicle, vehicle_model
 from shapechanger.errors import WorldError
-from shapechanger.worlds.camera import OnboardCamera
-from shapechanger.worlds.course import Course
-from shapechanger.worlds.home import HOME, require_element
+from shapechanger.worlds.camera import CameraJitter, OnboardCamera, move_camera
+from shapechanger.worlds.course import HOME, Course, require_element
+from shapechanger.worlds.expert.line import CourseProgress
+from shapechanger.worlds.expert.path import CoursePath, plan_path_for
+from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import lens
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.mount import Jitter, move_camera
-from shapechanger.worlds.pathfinder.path import Path, plan_path_for
-from shapechanger.worlds.pathfinder.progress import Progress
-from shapechanger.worlds.pathfinder.traits import traits_of
 from shapechanger.worlds.scene import add_course
-from shapechanger.worlds.touch import Touch
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
-__all__ = ["MujocoWorld"]
+__all__ = ["MujocoWorld", "Touch"]
+
+BUMPER_SPREAD: Final = math.radians(60.0)
+"""How far to each side the bumper at the front reaches, seen from the middle of the vehicle."""
+
+APART_S: Final = 0.5
+"""A touch within so many seconds after the last one belongs to the same collision."""
+
+
+class Touch:
+    """Follows what a vehicle touches.
+
+    Args:
+        model: The model; the vehicle's geoms are named "vehicle/...", walls and things
+            "world/wall/..." and "world/thing/...".
+
+    Attributes:
+        collisions: How many times it ran into something since `reset`.
+        bumped: Whether something presses its front now.
+        touches: Whether it touches anything now.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        self._hull = np.array([name.startswith("vehicle/") for name in names])
+        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was touched."""
+        self.collisions = 0
+        self.let_go()
+
+    def let_go(self) -> None:
+        """The vehicle was lifted off whatever it touched: what comes next is another collision."""
+        self.bumped = self.touches = False
+        self._since_s = math.inf
+
+    def follow(self, data: mujoco.MjData, pose: Pose, dt_s: float) -> None:
+        """Take in the contacts after a step of the simulation.
+
+        Args:
+            data: With the contacts.
+            pose: Of the vehicle.
+            dt_s: How long the step was, s.
+        """
+        self._since_s += dt_s
+        self.bumped = self.touches = False
+        if data.ncon == 0:
+            return
+        pairs = data.contact.geom
+        if not self._solid[pairs].any():
+            return  # As nearly always: wheels are on the ground, and nothing else is touched.
+        first, second = pairs[:, 0], pairs[:, 1]
+        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
+        hits &= data.contact.dist <= 0.0
+        if not hits.any():
+            return
+        self.touches = True
+        if self._since_s > APART_S:
+            self.collisions += 1
+        self._since_s = 0.0
+        for x, y, _ in data.contact.pos[hits]:
+            bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
+            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD
+
 
 _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
@@ -106,7 +168,9 @@ class MujocoWorld:
         """Where the vehicle is."""
         return self._bound.pose()
 
-    def lay_out(self, seed: int, look: Look | None = None, camera: Jitter | None = None) -> None:
+    def lay_out(
+        self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
+    ) -> None:
         """Another course, with the vehicle at a start; see `World.lay_out`.
 
         Args:
@@ -133,8 +197,8 @@ class MujocoWorld:
         self._bound = self.vehicle.bind(self.model, self.data)
         self._bound.set_current(*self.course.current_mps)
         self._touch = Touch(self.model)
-        self._progress = Progress(self.course)
-        self._path: Path | None = None
+        self._progress = CourseProgress(self.course)
+        self._path: CoursePath | None = None
         self._chassis = self.model.body(_CHASSIS).id
         self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
         self._solid[_SOLID_GROUP] = 1
@@ -152,7 +216,7 @@ class MujocoWorld:
         self._touch.reset()
         self._progress.reset(pose.x, pose.y)
 
-    def path(self) -> Path:
+    def path(self) -> CoursePath:
         """A way round the course for this vehicle; planned when it is first asked for.
 
         Raises:

@@ -69,7 +69,7 @@ def test_what_feels_or_sees_something_else_is_refused(tmp_path: Path) -> None:
         pilot_of(CorridorEnv("both"), policy, "", 0)
     with pytest.raises(PolicyError, match=r"battery.*no state"):
         pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.zip"), "", 0)
-    from shapechanger.envs.vehicle.clones import CLONES
+    from shapechanger.envs.vehicle.drivers import CLONES
 
     with pytest.raises(DemosError, match="drives by pictures"):
         pilot_of(CorridorEnv("state"), str(CLONES["car"]), "", 0)

@@ -9,7 +9,7 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.envs.vehicle.clones import CLONES
+from shapechanger.envs.vehicle.drivers import CLONES
 from tests.cli.demos.test_demos import refused, said
 
 SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
@@ -99,17 +99,17 @@ def test_ctrl_c_leaves_whole_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, and what was recorded until then is closed."""
-    from shapechanger.envs.vehicle.demonstrator import Demonstrator
+    from shapechanger.envs.vehicle.drivers import VehicleDemonstrator
 
-    acts = Demonstrator.act
+    acts = VehicleDemonstrator.act
     calls = iter(range(100))
 
-    def interrupted(self: Demonstrator) -> object:
+    def interrupted(self: VehicleDemonstrator) -> object:
         if next(calls) == 10:
             raise KeyboardInterrupt
         return acts(self)
 
-    monkeypatch.setattr(Demonstrator, "act", interrupted)
+    monkeypatch.setattr(VehicleDemonstrator, "act", interrupted)
     with pytest.raises(SystemExit) as stop:
         main(["demos", "record", "Car", "--out", str(tmp_path / "data"), *SHORT])
     assert stop.value.code == 130

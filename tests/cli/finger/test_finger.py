@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapechanger.bodies.finger import FingerParameters
 from shapechanger.cli import main
-from shapechanger.embodiments.finger import FingerParameters
 from shapechanger.identify import load_log
 from tests.identify.logs import recorded
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.cli.robot import serving
 from shapechanger.cli.robot.serving import TwinOptions, finger_of, place_of, start_twin
-from shapechanger.embodiments.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
@@ -77,7 +77,7 @@ def test_without_mujoco_everybody_is_in_the_room(monkeypatch: pytest.MonkeyPatch
         serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
     )
     assert place_of(_shipped("lab-car"), "", ()) == Place()
-    monkeypatch.setitem(__import__("sys").modules, "shapechanger.embodiments.vehicles", None)
+    monkeypatch.setitem(__import__("sys").modules, "shapechanger.bodies.vehicles", None)
     with pytest.raises(MissingExtra, match=r"shapechanger\[sim\]"):
         place_of(_shipped("lab-car"), "corridor", ())
 

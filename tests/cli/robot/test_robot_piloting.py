@@ -9,7 +9,7 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.cli.robot.recorded import recorded
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.envs.vehicle.clones import CLONES
+from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.link.messages import Observation
 from shapechanger.remote.known import KnownRobot, remember
 from shapechanger.twin.running import run_robot

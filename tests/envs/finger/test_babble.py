@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINTS
-from shapechanger.envs.finger.babble import FingerBabble
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINTS
+from shapechanger.envs.finger.identification import FingerBabble
 from shapechanger.errors import UnknownName
 from shapechanger.layout import Feature, Layout
 from tests.identify.logs import recorded

@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL
-from shapechanger.embodiments.finger.balance import spans_all_torques
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.bodies.finger.tensions import spans_all_torques
 from shapechanger.envs.finger import FingerReachEnv
-from shapechanger.envs.finger.gap import GAPS, Gap, gap_as_asked
+from shapechanger.envs.finger.gap import GAPS, Gap, resolve_gap
 from shapechanger.errors import FingerError, UnknownName
 
 _REAL_LIKE = GAPS["real-like"]
@@ -110,10 +110,10 @@ def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
 
 def test_a_gap_is_given_in_three_ways() -> None:
     """By name, as it is, and as its ranges."""
-    assert gap_as_asked("real-like") is _REAL_LIKE
-    assert gap_as_asked(_REAL_LIKE) is _REAL_LIKE
-    assert gap_as_asked(msgspec.to_builtins(_REAL_LIKE)) == _REAL_LIKE
-    assert gap_as_asked(msgspec.json.decode(msgspec.json.encode(_REAL_LIKE))) == _REAL_LIKE
+    assert resolve_gap("real-like") is _REAL_LIKE
+    assert resolve_gap(_REAL_LIKE) is _REAL_LIKE
+    assert resolve_gap(msgspec.to_builtins(_REAL_LIKE)) == _REAL_LIKE
+    assert resolve_gap(msgspec.json.decode(msgspec.json.encode(_REAL_LIKE))) == _REAL_LIKE
 
 
 @pytest.mark.parametrize(
@@ -134,16 +134,16 @@ def test_ranges_that_are_none_are_refused(changes: dict[str, Any], sentence: str
     with pytest.raises(FingerError, match=sentence):
         Gap(**{**msgspec.structs.asdict(_REAL_LIKE), **changes})
     with pytest.raises(FingerError, match=sentence):
-        gap_as_asked({**msgspec.to_builtins(_REAL_LIKE), **changes})
+        resolve_gap({**msgspec.to_builtins(_REAL_LIKE), **changes})
 
 
 def test_what_is_no_gap_is_refused() -> None:
     """A name of none, a mapping that lacks a range, or has one too much, and a number."""
     with pytest.raises(UnknownName, match=r"'reallike'. Did you mean 'real-like'"):
-        gap_as_asked("reallike")
+        resolve_gap("reallike")
     with pytest.raises(FingerError, match="missing required field `joint_factor`"):
-        gap_as_asked({"arm_error": 0.1})
+        resolve_gap({"arm_error": 0.1})
     with pytest.raises(FingerError, match="unknown field `fricton`"):
-        gap_as_asked({**msgspec.to_builtins(_REAL_LIKE), "fricton": (0.0, 1.0)})
+        resolve_gap({**msgspec.to_builtins(_REAL_LIKE), "fricton": (0.0, 1.0)})
     with pytest.raises(FingerError, match="Expected `object`, got `int`"):
-        gap_as_asked(3)  # pyright: ignore[reportArgumentType]
+        resolve_gap(3)  # pyright: ignore[reportArgumentType]

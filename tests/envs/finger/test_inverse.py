@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, PHALANX_LENGTH_M
-from shapechanger.envs.finger.inverse import angles_for
-from shapechanger.envs.finger.postures import draw_posture
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, PHALANX_LENGTH_M
+from shapechanger.envs.finger.postures import angles_for, draw_posture
 from shapechanger.tasks.finger import fingertip
 
 _LOW, _HIGH = JOINT_RANGE.T

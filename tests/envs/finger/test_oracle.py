@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import DRIVES, NOMINAL
+from shapechanger.bodies.finger import DRIVES, NOMINAL
 from shapechanger.envs.finger import FingerReachEnv, FingerTrackEnv
 from shapechanger.envs.finger.oracle import FingerOracle
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.embodiments.finger import NOMINAL
+from shapechanger.bodies.finger import NOMINAL
 from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.errors import FingerError, UnknownName
 

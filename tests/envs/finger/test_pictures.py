@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger.anatomy import JOINT_REST
-from shapechanger.embodiments.finger.looks import TENDON_COLOURS
+from shapechanger.bodies.finger.anatomy import JOINT_REST
+from shapechanger.bodies.finger.looks import TENDON_COLOURS
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 

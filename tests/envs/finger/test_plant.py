@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.finger import NOMINAL, drive_of
-from shapechanger.embodiments.finger.anatomy import JOINT_REST
+from shapechanger.bodies.finger import NOMINAL, drive_of
+from shapechanger.bodies.finger.anatomy import JOINT_REST
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 
 

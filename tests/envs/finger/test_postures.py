@@ -7,16 +7,16 @@ import itertools
 import mujoco
 import numpy as np
 
-from shapechanger.embodiments.finger.anatomy import (
+from shapechanger.bodies.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
 )
-from shapechanger.embodiments.finger.balance import hold
+from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.postures import can_hold, draw_posture, draw_start, moving_torque
-from tests.embodiments.finger.commands import made
+from tests.bodies.finger.commands import made
 
 _STILL = np.zeros(4)
 _LOW, _HIGH = JOINT_RANGE.T
@@ -42,7 +42,7 @@ def test_tensions_that_hold_a_posture_hold_it() -> None:
     for _ in range(10):
         posture = draw_posture(rng)
         torque = moving_torque(posture, _STILL, _STILL)
-        tensions, is_enough = hold(MOMENT_ARMS, torque, LEAST_TENSION_N, most)
+        tensions, is_enough = tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, most)
         assert is_enough
         data = mujoco.MjData(model)
         data.qpos[:] = posture

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from shapechanger.embodiments.finger import NOMINAL
-from shapechanger.embodiments.finger.anatomy import (
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.bodies.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
     PHALANX_LENGTH_M,
@@ -18,9 +18,8 @@ from shapechanger.embodiments.finger.anatomy import (
 )
 from shapechanger.envs.finger import FingerReachEnv
 from shapechanger.envs.finger.gap import GAPS
-from shapechanger.envs.finger.inverse import angles_for
 from shapechanger.envs.finger.oracle import FingerOracle
-from shapechanger.envs.finger.postures import can_hold
+from shapechanger.envs.finger.postures import angles_for, can_hold
 from shapechanger.errors import BadAction, FingerError, UnknownName
 from shapechanger.tasks.finger import fingertip
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import TENDONS
-from shapechanger.embodiments.finger.anatomy import (
+from shapechanger.bodies.finger import TENDONS
+from shapechanger.bodies.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
     MOMENT_ARMS,
     MOST_TENSION_N,
     PHALANX_LENGTH_M,
 )
-from shapechanger.envs.finger.rig_senses import RigSenses
-from shapechanger.envs.finger.velocities import JointVelocities
+from shapechanger.envs.finger.plant import JointVelocities
+from shapechanger.envs.remote.finger_rig import RigSenses
 from shapechanger.errors import RobotRefused
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.profile.load import find_profile, load_profile

@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from shapechanger.embodiments.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.bodies.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
 from shapechanger.envs.finger import FingerTrackEnv
-from shapechanger.envs.finger.inverse import angles_for
-from shapechanger.envs.finger.random_paths import draw_path
-from shapechanger.envs.finger.reachable import require_reachable
-from shapechanger.envs.finger.track import PREVIEW_S
+from shapechanger.envs.finger.postures import angles_for
+from shapechanger.envs.finger.track import PREVIEW_S, draw_path, require_reachable
 from shapechanger.errors import PathError, UnknownName
 from shapechanger.tasks.finger import fingertip
 from shapechanger.tasks.paths import KINDS, circle, from_callable, from_csv

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from shapechanger.embodiments.finger import NOMINAL, drive_of
-from shapechanger.embodiments.finger.anatomy import JOINT_REST
-from shapechanger.envs.finger.plant import FingerPlant
-from shapechanger.envs.finger.velocities import JointVelocities
+from shapechanger.bodies.finger import NOMINAL, drive_of
+from shapechanger.bodies.finger.anatomy import JOINT_REST
+from shapechanger.envs.finger.plant import FingerPlant, JointVelocities
 
 
 def test_a_steady_speed_is_found_with_a_lag_of_40_ms() -> None:

@@ -11,7 +11,8 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import ModelWatch, twin
+from shapechanger.envs.stepping import ModelWatch
+from shapechanger.envs.stepping import fast_model as twin
 from tests.envs.stepping.side_by_side import same
 
 _MODEL = AntEnv().model
@@ -145,7 +146,7 @@ def test_an_edit_is_stepped_with(edit: Edit) -> None:
 
 def test_an_edit_before_the_first_step_is_stepped_with() -> None:
     """The twin is looked for only when the model is as it was compiled."""
-    twin.forget()
+    twin.forget_fast_models()
     ours, theirs = envs = _ants()
     for env in envs:
         env.model.body_mass[1] *= 1.75

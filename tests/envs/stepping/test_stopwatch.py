@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import shapechanger
-from shapechanger.envs.stepping.stopwatch import Resting, resting_stopwatch
+from shapechanger.envs.stepping.tuned import PausedTimer, paused_timer
 from shapechanger.envs.vector.env import ThreadVectorEnv
 
 _STEP = int(mujoco.mjtTimer.mjTIMER_STEP)
@@ -99,17 +99,17 @@ def test_a_users_own_clock_goes_on(clocked: Callable[[], int]) -> None:
 
 def test_a_clock_that_was_there_first_is_left_alone(clocked: Callable[[], int]) -> None:
     """The usual one is not known then."""
-    resting_stopwatch.cache_clear()
+    paused_timer.cache_clear()
     try:
-        assert not isinstance(resting_stopwatch(), Resting)
+        assert not isinstance(paused_timer(), PausedTimer)
     finally:
-        resting_stopwatch.cache_clear()
+        paused_timer.cache_clear()
 
 
 def test_it_goes_on_when_the_last_of_several_threads_is_done() -> None:
     """And after an error."""
     clock = ctypes.c_void_p(4096)  # An address that nothing calls.
-    resting = Resting(clock)
+    resting = PausedTimer(clock)
     inside, leave = threading.Event(), threading.Event()
 
     def stay() -> None:
@@ -130,4 +130,4 @@ def test_it_goes_on_when_the_last_of_several_threads_is_done() -> None:
 
 def test_there_is_a_way_to_it_here() -> None:
     """Else every step would be slower, and nobody would know."""
-    assert isinstance(resting_stopwatch(), Resting)
+    assert isinstance(paused_timer(), PausedTimer)

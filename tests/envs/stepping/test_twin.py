@@ -11,8 +11,9 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import ModelWatch, find_twin, twin
-from shapechanger.envs.stepping.comparison import moves_equally
+from shapechanger.envs.stepping import ModelWatch, find_fast_model
+from shapechanger.envs.stepping import fast_model as twin
+from shapechanger.envs.stepping.fast_model import moves_equally
 
 _ISLAND = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 _CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -66,7 +67,7 @@ def _searches(fast: mujoco.MjModel) -> bool:
 
 def _twin(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
     model = spec.compile()
-    return model, find_twin(ModelWatch(model), spec.copy)
+    return model, find_fast_model(ModelWatch(model), spec.copy)
 
 
 def _knows_its_pairs(model: mujoco.MjModel) -> bool:
@@ -223,7 +224,7 @@ def test_a_filter_of_contacts_is_obeyed() -> None:
 def test_a_wrong_margin_is_found_out() -> None:
     """The test sees what the rules would have got wrong: here the larger margin, not the sum."""
     ant = AntEnv()
-    fast = copy.copy(find_twin(ant._watch, ant.body_spec))
+    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
     assert moves_equally(ant.model, fast)
     fast.pair_margin[:] = 0.01
     assert not moves_equally(ant.model, fast)
@@ -244,7 +245,7 @@ def test_a_wrong_margin_is_found_out() -> None:
 def test_any_other_difference_is_found_out(change: Any) -> None:
     """Of one pair, of one body, of the solver."""
     ant = AntEnv()
-    fast = copy.copy(find_twin(ant._watch, ant.body_spec))
+    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
     change(fast)
     assert not moves_equally(ant.model, fast)
 
@@ -252,7 +253,7 @@ def test_any_other_difference_is_found_out(change: Any) -> None:
 def test_a_twin_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not in the first steps of a body, unless another env has found it."""
     monkeypatch.setattr(AntEnv, "patience", 3)
-    twin.forget()
+    twin.forget_fast_models()
     first, second = AntEnv(), AntEnv()
     for env in (first, second):
         env.reset(seed=0)
@@ -264,7 +265,7 @@ def test_a_twin_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
 def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """What one finds serves all, so their steps count together."""
     monkeypatch.setattr(AntEnv, "patience", 6)
-    twin.forget()
+    twin.forget_fast_models()
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
         env.reset(seed=0)
@@ -277,7 +278,7 @@ def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_twins_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """A training with a new body in each episode must not grow."""
     monkeypatch.setattr(twin, "_REMEMBERED", 2)
-    twin.forget()
+    twin.forget_fast_models()
     for friction in (0.3, 0.4, 0.5, 0.4):
         assert _twin(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
     assert len(twin._twins) == 2

@@ -10,7 +10,7 @@ from gymnasium.vector import VectorEnv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.vector.infos import Columns, batched, in_columns
+from shapechanger.envs.vector.infos import InfoColumns, batched, in_columns
 from tests.envs.vector.sameness import require_same
 
 _VECTOR = np.arange(3.0)
@@ -68,12 +68,12 @@ def test_any_infos_are_batched_as_gymnasium_does(infos: list[dict[str, Any]]) ->
 def test_what_is_told_in_columns_is_batched_alike(told: list[int], order: Any) -> None:
     """Whichever thread was the first, and with envs among them that are told of by themselves."""
     infos = [{"a": np.float64(i), "b": i} if part else {"b": 0.5} for i, part in enumerate(told)]
-    parts: list[Columns] = []
+    parts: list[InfoColumns] = []
     for part in (1, 2):
         numbers = [i for i, each in enumerate(told) if each == part]
         if numbers:
             values = {"a": np.array(numbers, np.float64), "b": np.array(numbers)}
-            parts.append(Columns(numbers, values))
+            parts.append(InfoColumns(numbers, values))
     alone = [i for i, each in enumerate(told) if each == 0]
     parts += in_columns(alone, [infos[i] for i in alone])
     order.shuffle(parts)

@@ -9,7 +9,7 @@ from itertools import chain
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.vector.shares import Shares
+from shapechanger.envs.vector.threads import Shares
 
 
 @given(st.lists(st.integers(0, 7), min_size=1, max_size=4), st.data())

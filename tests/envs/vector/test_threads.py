@@ -19,7 +19,7 @@ import pytest
 
 import shapechanger
 from shapechanger.envs.vector import ThreadVectorEnv
-from shapechanger.envs.vector.pool import Pool
+from shapechanger.envs.vector.threads import Pool
 
 
 class _Plain(gym.Env[Any, Any]):

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle.courses import CourseDraw
+from shapechanger.envs.vehicle.arguments import CourseSampler
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 
 
-def _courses(draw: CourseDraw, n: int = 500) -> list[int]:
+def _courses(draw: CourseSampler, n: int = 500) -> list[int]:
     rng = np.random.default_rng(1)
     return [draw.draw(rng, "corridor", {}).course for _ in range(n)]
 
@@ -20,7 +20,7 @@ def _courses(draw: CourseDraw, n: int = 500) -> list[int]:
 @pytest.mark.parametrize(("name", "seeds"), [("training", TRAINING), ("held-out", HELD_OUT)])
 def test_kinds_of_courses_keep_apart(name: Any, seeds: range) -> None:
     """Nobody is judged on what was learned on, and nobody learns on what judges."""
-    drawn = _courses(CourseDraw(name, randomise=False))
+    drawn = _courses(CourseSampler(name, randomise=False))
     assert all(course in seeds for course in drawn)
     assert max(drawn) - min(drawn) > 0.9 * len(seeds)
 
@@ -28,7 +28,7 @@ def test_kinds_of_courses_keep_apart(name: Any, seeds: range) -> None:
 def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
     """Not even where somebody chose the courses."""
     for courses in ("training", "held-out", (3, 4)):
-        draw = CourseDraw(courses, randomise=False)
+        draw = CourseSampler(courses, randomise=False)
         draw.hold_out()
         assert not set(_courses(draw)) & set(TRAINING)
         assert all(course in HELD_OUT for course in _courses(draw))
@@ -36,14 +36,14 @@ def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
 
 def test_chosen_courses_are_all_drawn_and_no_others() -> None:
     """A handful of courses, to learn one's way with."""
-    draw = CourseDraw((7, np.int64(9), 8), randomise=False)
+    draw = CourseSampler((7, np.int64(9), 8), randomise=False)
     assert set(_courses(draw)) == {7, 8, 9}
     assert draw.first == 7
 
 
 def test_options_replace_what_is_drawn_and_nothing_else() -> None:
     """The same generator draws the same rest, whatever was asked for."""
-    draw = CourseDraw("training", randomise=True)
+    draw = CourseSampler("training", randomise=True)
     free = draw.draw(np.random.default_rng(5), "corridor", {})
     asked = draw.draw(np.random.default_rng(5), "corridor", {"course": 3})
     assert asked.course == 3
@@ -53,9 +53,9 @@ def test_options_replace_what_is_drawn_and_nothing_else() -> None:
 
 def test_looks_are_drawn_only_where_they_are_to_be() -> None:
     """Else every episode is in the usual light, with the camera in its place."""
-    plain = CourseDraw("training", randomise=False).draw(np.random.default_rng(5), "yard", {})
+    plain = CourseSampler("training", randomise=False).draw(np.random.default_rng(5), "yard", {})
     assert (plain.look, plain.camera) == (None, None)
-    draw, rng = CourseDraw("training", randomise=True), np.random.default_rng(5)
+    draw, rng = CourseSampler("training", randomise=True), np.random.default_rng(5)
     one, two = (draw.draw(rng, "yard", {}) for _ in range(2))
     assert one.look != two.look
     assert one.camera != two.camera
@@ -64,12 +64,12 @@ def test_looks_are_drawn_only_where_they_are_to_be() -> None:
 def test_what_is_no_course_is_refused() -> None:
     """Each in a sentence that says what would be one."""
     with pytest.raises(UnknownName, match=r"No kind of courses matches 'hold-out'. Did you mean"):
-        CourseDraw("hold-out", randomise=False)  # pyright: ignore[reportArgumentType]
+        CourseSampler("hold-out", randomise=False)  # pyright: ignore[reportArgumentType]
     with pytest.raises(WorldError, match="no courses to draw from: give at least one seed"):
-        CourseDraw((), randomise=False)
+        CourseSampler((), randomise=False)
     for seed in (-1, 1.5, "a", None):
         with pytest.raises(WorldError, match="The seed of a course is a whole number from 0"):
-            CourseDraw((seed,), randomise=False)  # pyright: ignore[reportArgumentType]
+            CourseSampler((seed,), randomise=False)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(
@@ -84,6 +84,6 @@ def test_what_is_no_course_is_refused() -> None:
 )
 def test_options_that_are_none_are_refused(options: dict[str, Any], sentence: str) -> None:
     """Whoever asks for a course gets that one, or hears why not."""
-    draw = CourseDraw("training", randomise=False)
+    draw = CourseSampler("training", randomise=False)
     with pytest.raises((UnknownName, WorldError), match=sentence):
         draw.draw(np.random.default_rng(5), "corridor", options)

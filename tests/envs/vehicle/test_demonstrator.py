@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.transfer.cloning import Demonstrator
-from shapechanger.worlds.home import HOME
+from shapechanger.transfer.learners.cloning import TaskDemonstrator
+from shapechanger.worlds.course import HOME
 
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_it_can_drive_what_it_shows(vehicle: str) -> None:
     """Mistakes and all, it comes along the course and hits nothing."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
-        driver: Demonstrator = env.demonstrator(3)
+        driver: TaskDemonstrator = env.demonstrator(3)
         env.reset(seed=2)
         driver.begin()
         mistakes = 0

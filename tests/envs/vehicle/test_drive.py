@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drive import Drive, DriveScore, drive, poisson_interval
-from shapechanger.envs.vehicle.pilot import Pilot
+from shapechanger.envs.vehicle.drivers import ExpertDriver
+from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive, poisson_interval
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import HELD_OUT
 
@@ -53,7 +53,9 @@ def test_more_confidence_is_a_wider_interval() -> None:
 
 def test_a_score_sums_before_it_divides() -> None:
     """A long drive counts for more than a short one."""
-    score = DriveScore.of([Drive(1, 30.0, 20.0, 0, True), Drive(2, 10.0, 60.0, 2, False)])
+    score = DriveScore.of(
+        [DriveResult(1, 30.0, 20.0, 0, True), DriveResult(2, 10.0, 60.0, 2, False)]
+    )
     assert score.speed == pytest.approx(0.5)
     assert (score.slowest, score.fastest) == pytest.approx((1.0 / 6.0, 1.5))
     assert score.collisions == 2
@@ -65,9 +67,9 @@ def test_a_score_sums_before_it_divides() -> None:
 
 def test_a_score_without_progress_has_no_bound() -> None:
     """Whoever stood in a corner and ran into it is not told to be safe."""
-    score = DriveScore.of([Drive(1, -0.5, 60.0, 3, False)])
+    score = DriveScore.of([DriveResult(1, -0.5, 60.0, 3, False)])
     assert score.per_100_m == score.low == score.high == float("inf")
-    still = DriveScore.of([Drive(1, 0.0, 60.0, 0, False)])
+    still = DriveScore.of([DriveResult(1, 0.0, 60.0, 0, False)])
     assert (still.per_100_m, still.low, still.high) == (0.0, 0.0, float("inf"))
 
 
@@ -79,7 +81,7 @@ def test_no_drives_are_no_score() -> None:
 
 def test_the_expert_gets_there(car: VehicleEnv) -> None:
     """It comes as far as it was to, and no farther than one step more."""
-    done = drive(car, Pilot(car.world), course=HELD_OUT[0], metres=5.0)
+    done = drive(car, ExpertDriver(car.world), course=HELD_OUT[0], metres=5.0)
     assert done.reached
     assert 5.0 <= done.metres < 5.2
     assert done.collisions == 0
@@ -90,7 +92,7 @@ def test_the_expert_gets_there(car: VehicleEnv) -> None:
 
 def test_a_collision_counts_once_and_the_drive_goes_on(car: VehicleEnv) -> None:
     """Straight into a wall; then the expert takes over and still gets there."""
-    pilot = Pilot(car.world)
+    pilot = ExpertDriver(car.world)
 
     def blind_at_first(observation: Any) -> NDArray[np.float32]:
         return pilot(observation) if car.world.collisions else _STRAIGHT

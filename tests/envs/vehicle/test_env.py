@@ -23,8 +23,7 @@ from shapechanger.errors import (
     UnknownName,
     WorldError,
 )
-from shapechanger.worlds.course import HELD_OUT
-from shapechanger.worlds.home import HOME
+from shapechanger.worlds.course import HELD_OUT, HOME
 from shapechanger.worlds.world import Pose
 
 _AHEAD = np.array([0.0, 0.6], np.float32)

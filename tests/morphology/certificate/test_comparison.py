@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology.certificate.comparison import compare
-from shapechanger.morphology.certificate.wording import Change, change, grouped
+from shapechanger.morphology.certificate.changes import Change, change, compare, grouped
 from shapechanger.morphology.effective.model import effective_model
 from tests.morphology.scenes import asset, asset_spec, everything
 

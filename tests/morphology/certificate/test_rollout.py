@@ -10,8 +10,11 @@ import pytest
 
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology.certificate.certifiable import attribute
-from shapechanger.morphology.certificate.commands import matched_commands, number_names
-from shapechanger.morphology.certificate.rollout import compare_rollouts
+from shapechanger.morphology.certificate.rollout import (
+    compare_rollouts,
+    matched_commands,
+    number_names,
+)
 from tests.morphology.swing import Broken, Dictionary, Longer, Noisy, Swing, Wrapper
 
 

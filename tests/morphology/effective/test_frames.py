@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology.effective.frames import (
+from shapechanger.morphology.effective.bodies import (
     Frames,
     geom_frames,
     inertial_frames,

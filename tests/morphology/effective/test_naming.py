@@ -6,7 +6,7 @@ import mujoco
 import pytest
 
 from shapechanger.morphology.effective import fingerprint
-from shapechanger.morphology.effective.naming import names_of
+from shapechanger.morphology.effective.elements import names_of
 from shapechanger.morphology.spec.elements import name_elements
 from tests.morphology.scenes import asset, asset_spec, everything
 

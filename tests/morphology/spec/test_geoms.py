@@ -7,7 +7,7 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Radius, Stretch
-from shapechanger.morphology.spec.geoms import (
+from shapechanger.morphology.spec.geometry import (
     axis_ends,
     move_by,
     orientation,

@@ -8,7 +8,7 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Cut, Radius, Stretch
-from shapechanger.morphology.spec.segments import (
+from shapechanger.morphology.spec.geometry import (
     anchor,
     far_end,
     held_at,

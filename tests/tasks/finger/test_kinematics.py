@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, PHALANX_LENGTH_M
-from shapechanger.embodiments.finger.model import FINGERTIP
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, PHALANX_LENGTH_M
+from shapechanger.bodies.finger.model import FINGERTIP
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
-from tests.embodiments.finger.commands import made
+from tests.bodies.finger.commands import made
 
 _RIGHT = np.pi / 2
 # Any posture, also those that no human joint takes.

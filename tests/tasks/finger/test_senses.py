@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINTS, MOST_TENSION_N, TENDONS
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINTS, MOST_TENSION_N, TENDONS
 from shapechanger.tasks.finger import FingerSenses, features_of_senses
 
 

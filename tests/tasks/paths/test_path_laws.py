@@ -15,7 +15,7 @@ from shapechanger.errors import PathError
 from shapechanger.tasks.paths import (
     FASTEST_MPS,
     KINDS,
-    Path,
+    FingertipPath,
     as_path,
     circle,
     curve_3d,
@@ -25,7 +25,7 @@ from shapechanger.tasks.paths import (
     line,
     sample,
 )
-from shapechanger.tasks.paths.spline import Spline
+from shapechanger.tasks.paths.sources import Spline
 
 # The same examples every time, so that a failure can be looked at twice.
 law = settings(max_examples=40)
@@ -42,14 +42,14 @@ def wave(t: float) -> tuple[float, float, float]:
     return 0.05 + 0.01 * math.sin(math.pi * t), 0.003 * math.cos(2 * math.pi * t), -0.04
 
 
-def recording(closed: bool, seed: int) -> Path:
+def recording(closed: bool, seed: int) -> FingertipPath:
     """A walk with uneven steps of 8 to 30 ms."""
     rng = np.random.default_rng(seed)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.008, 0.03, 40))])
     points = np.cumsum(rng.normal(0.0, 1e-3, (41, 3)), axis=0)
     if closed:
         points[-1] = points[0]
-    return Path(Spline.through(times, points, closed), float(times[-1]), closed)
+    return FingertipPath(Spline.through(times, points, closed), float(times[-1]), closed)
 
 
 shapes = st.one_of(
@@ -76,7 +76,7 @@ ending_paths = st.one_of(
 
 @law
 @given(path=st.one_of(closed_paths, ending_paths), part=st.floats(0.05, 0.95))
-def test_velocity_and_acceleration_are_derivatives(path: Path, part: float) -> None:
+def test_velocity_and_acceleration_are_derivatives(path: FingertipPath, part: float) -> None:
     """The reward looks at speeds: they must be those of the positions."""
     t, h = part * path.duration_s, 1e-5
     velocity = (path.at(t + h) - path.at(t - h)) / (2 * h)
@@ -89,7 +89,7 @@ def test_velocity_and_acceleration_are_derivatives(path: Path, part: float) -> N
 
 @law
 @given(path=closed_paths, part=st.floats(0.0, 1.0), rounds=st.integers(-3, 50))
-def test_a_closed_path_repeats(path: Path, part: float, rounds: int) -> None:
+def test_a_closed_path_repeats(path: FingertipPath, part: float, rounds: int) -> None:
     """Round after round the point comes to the same places at the same speeds, before 0 s too."""
     assert path.period_s == path.duration_s
     t = part * path.period_s
@@ -101,7 +101,7 @@ def test_a_closed_path_repeats(path: Path, part: float, rounds: int) -> None:
 
 @law
 @given(path=closed_paths)
-def test_nothing_jerks_where_a_round_ends(path: Path) -> None:
+def test_nothing_jerks_where_a_round_ends(path: FingertipPath) -> None:
     """Across the seam position, velocity and acceleration are continuous."""
     before, after = path.duration_s - 1e-9, path.duration_s + 1e-9
     np.testing.assert_allclose(path.at(before), path.at(after), atol=1e-8)
@@ -111,7 +111,7 @@ def test_nothing_jerks_where_a_round_ends(path: Path) -> None:
 
 @law
 @given(path=ending_paths, later=st.floats(0.01, 100.0))
-def test_a_path_that_ends_stays_where_it_ended(path: Path, later: float) -> None:
+def test_a_path_that_ends_stays_where_it_ended(path: FingertipPath, later: float) -> None:
     """The fingertip is to hold the last point, and waits at the first."""
     assert path.period_s is None
     for t, end in ((path.duration_s + later, path.duration_s), (-later, 0.0)):
@@ -126,7 +126,9 @@ def test_a_path_that_ends_stays_where_it_ended(path: Path, later: float) -> None
     path=st.one_of(closed_paths, ending_paths),
     times=st.lists(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), max_size=4),
 )
-def test_many_times_are_as_one_by_one(path: Path, times: Sequence[Sequence[float]]) -> None:
+def test_many_times_are_as_one_by_one(
+    path: FingertipPath, times: Sequence[Sequence[float]]
+) -> None:
     """An env asks for one time, a check for thousands, in any shape."""
     t = np.reshape(np.array(times, dtype=np.float64), (-1, 3))
     for ask in (path.at, path.velocity, path.acceleration):
@@ -140,7 +142,7 @@ def test_many_times_are_as_one_by_one(path: Path, times: Sequence[Sequence[float
 
 @law
 @given(path=shapes)
-def test_no_shape_is_too_fast(path: Path) -> None:
+def test_no_shape_is_too_fast(path: FingertipPath) -> None:
     """What is refused of recordings is refused of shapes."""
     speeds = np.linalg.norm(path.velocity(np.linspace(0.0, path.duration_s, 500)), axis=1)
     assert speeds.max() <= FASTEST_MPS + 1e-9
@@ -149,7 +151,7 @@ def test_no_shape_is_too_fast(path: Path) -> None:
 @law
 @given(path=shapes, digits=st.sampled_from([6, 12]))
 def test_a_path_survives_a_csv(
-    path: Path, digits: int, tmp_path_factory: pytest.TempPathFactory
+    path: FingertipPath, digits: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """Written to whole micrometres and read back it is the same to 0.01 mm, and still closed."""
     times, points = sample(path, hz=100.0)
@@ -168,7 +170,7 @@ def test_a_path_survives_a_csv(
 @pytest.mark.parametrize(
     "path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)], ids=repr
 )
-def test_paths_cross_between_processes(path: Path) -> None:
+def test_paths_cross_between_processes(path: FingertipPath) -> None:
     """A vector env sends its arguments to its workers."""
     copy = pickle.loads(pickle.dumps(path))
     times = np.linspace(-1.0, 3.0, 50)
@@ -177,7 +179,7 @@ def test_paths_cross_between_processes(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", [circle(), recording(False, 2), from_callable(wave)])
-def test_answers_share_no_memory_with_the_path(path: Path) -> None:
+def test_answers_share_no_memory_with_the_path(path: FingertipPath) -> None:
     """Whoever writes into an answer must not bend the path."""
     before = path.at([0.0, 0.3])
     for answer in (path.at([0.0, 0.3]), path.velocity([0.0, 0.3]), path.acceleration([0.0, 0.3])):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import PathError
-from shapechanger.tasks.paths import Path, circle, curve_3d, figure_eight, line
+from shapechanger.tasks.paths import FingertipPath, circle, curve_3d, figure_eight, line
 
 CENTRE = np.array([0.05, 0.0, -0.045])
 DISTAL, RADIAL, DORSAL = np.eye(3)
@@ -56,7 +56,7 @@ def test_a_figure_eight_crosses_itself_once() -> None:
 
 @pytest.mark.parametrize("make", [circle, figure_eight, curve_3d])
 @pytest.mark.parametrize("phase", [-1.0, 0.3, 2.0])
-def test_a_phase_is_a_head_start(make: Callable[..., Path], phase: float) -> None:
+def test_a_phase_is_a_head_start(make: Callable[..., FingertipPath], phase: float) -> None:
     """It changes when the point is where, and not where it goes."""
     t = np.linspace(0.0, 4.0, 50)
     ahead = phase / (2 * math.pi * 0.25)  # s
@@ -157,7 +157,9 @@ def test_a_curve_is_a_bent_figure_eight() -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_sentence(make: Callable[[], Path], message: str) -> None:
+def test_what_cannot_be_is_refused_in_a_sentence(
+    make: Callable[[], FingertipPath], message: str
+) -> None:
     """Each argument is checked, and the sentence says which one was wrong."""
     with pytest.raises(PathError) as caught:
         make()

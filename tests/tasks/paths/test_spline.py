@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.interpolate import CubicSpline
 
-from shapechanger.tasks.paths.spline import Spline
+from shapechanger.tasks.paths.sources import Spline
 
 # The same examples every time, so that a failure can be looked at twice.
 law = settings(max_examples=60)

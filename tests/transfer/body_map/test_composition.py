@@ -7,7 +7,7 @@ import pytest
 
 from shapechanger.errors import MapError
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero
 from tests.transfer.body_map.bodies import (
     ant_action,
     ant_observation,
@@ -38,7 +38,7 @@ def copied() -> BodyMap:
         rules={
             "height": "copy z",
             "foot/motor": "copy ankle/motor",
-            "toe/motor": Take("ankle/motor", -0.5),
+            "toe/motor": Copy("ankle/motor", -0.5),
         },
     )
 
@@ -54,7 +54,7 @@ def test_back_and_there_keeps_what_was_shared() -> None:
     there = grown(rules={"foot_*": "learn"})
     round_trip = there.inverse("hold").then(there)
     observation = {entry.feature: entry for entry in round_trip.observation}
-    assert observation["hip_1/angle"].rule == Take("hip_1/angle")
+    assert observation["hip_1/angle"].rule == Copy("hip_1/angle")
     assert isinstance(observation["foot_1/angle"].rule, Hold)
     action = {entry.feature: entry for entry in round_trip.action}
     assert (action["foot_1/motor"].rule, action["foot_1/motor"].why) == (Learn(), "rule 'foot_*'")
@@ -75,13 +75,13 @@ def test_rules_multiply_and_reasons_add_up() -> None:
         pendulum_observation(),
         motors,
         motors,
-        rules={"hinge/angle": Take("hinge/angle", -2.0), "hinge/velocity": Hold(3.0)},
+        rules={"hinge/angle": Copy("hinge/angle", -2.0), "hinge/velocity": Hold(3.0)},
     )
     both = first.then(second)
     assert [entry.rule for entry in both.observation] == [
-        Take("slider/position"),
-        Take("hinge/angle", -2.0),
-        Take("slider/velocity"),
+        Copy("slider/position"),
+        Copy("hinge/angle", -2.0),
+        Copy("slider/velocity"),
         Hold(3.0),
     ]
     assert both.observation[0].why == "same name"
@@ -128,14 +128,14 @@ def test_a_scale_is_undone() -> None:
     """The way back divides."""
     motors = pendulum_action(100.0), pendulum_action(400.0)
     there = BodyMap.between(pendulum_observation(), pendulum_observation(), *motors, units="torque")
-    assert there.inverse().action[0].rule == Take("slide/motor", 4.0)
+    assert there.inverse().action[0].rule == Copy("slide/motor", 4.0)
 
 
 def test_the_namesake_gives_a_copied_feature_back() -> None:
     """Of several copies the one of the same name is the original."""
     back = copied().inverse()
-    assert [entry.rule for entry in back.action] == [Take("ankle/motor")]
-    assert [entry.rule for entry in back.observation] == [Take("z")]
+    assert [entry.rule for entry in back.action] == [Copy("ankle/motor")]
+    assert [entry.rule for entry in back.observation] == [Copy("z")]
 
 
 def test_copies_without_a_namesake_have_no_way_back() -> None:

@@ -11,7 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.errors import MapError, SpaceMismatch
 from shapechanger.layout import Layout
-from shapechanger.transfer.body_map import BodyMap, MappedEnv, Take, body_map, wrap
+from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv, body_map, wrap
 from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 
@@ -123,7 +123,7 @@ def test_a_mapped_env_is_rebuilt_from_its_spec() -> None:
     gym.register("body_map_test/Recorder-v0", f"{__name__}:Recorder", kwargs={"feet": True})
     try:
         target = gym.make("body_map_test/Recorder-v0", disable_env_checker=True)
-        built = body_map(Recorder(), target, action_rules={"foot_1/motor": Take("hip_1/motor")})
+        built = body_map(Recorder(), target, action_rules={"foot_1/motor": Copy("hip_1/motor")})
         spec = wrap(target, built).spec
         assert spec is not None
         again = gym.make(EnvSpec.from_json(spec.to_json()), disable_env_checker=True)

@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.errors import MapError, SpaceMismatch, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Entry, Hold, Learn, Row, Take, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, MapRow, Zero
 from tests.transfer.body_map.bodies import (
     ant_action,
     ant_observation,
@@ -30,9 +30,9 @@ def small() -> BodyMap:
         Layout((motor("ankle"), motor("foot"), motor("toe"), motor("hip"))),
         observation_rules={"rest": Hold(0.25)},
         action_rules={
-            "foot/motor": Take("ankle/motor", -2.0),
+            "foot/motor": Copy("ankle/motor", -2.0),
             "toe/motor": "learn",
-            "hip/motor": Take("hip/motor", 0.5),
+            "hip/motor": Copy("hip/motor", 0.5),
         },
     )
 
@@ -136,13 +136,13 @@ def test_a_vector_of_another_body_is_refused() -> None:
 def test_the_table_states_each_rule() -> None:
     """Every entry of the map says what it does and why."""
     assert small().table() == (
-        Row("observation", "z", "z", "same name"),
-        Row("observation", "lost", "zero", "default"),
-        Row("observation", "rest", "hold 0.25", "rule 'rest'"),
-        Row("action", "ankle/motor", "ankle/motor", "same name"),
-        Row("action", "foot/motor", "ankle/motor times -2", "rule 'foot/motor'"),
-        Row("action", "toe/motor", "learn", "rule 'toe/motor'"),
-        Row("action", "hip/motor", "hip/motor times 0.5", "rule 'hip/motor'"),
+        MapRow("observation", "z", "z", "same name"),
+        MapRow("observation", "lost", "zero", "default"),
+        MapRow("observation", "rest", "hold 0.25", "rule 'rest'"),
+        MapRow("action", "ankle/motor", "ankle/motor", "same name"),
+        MapRow("action", "foot/motor", "ankle/motor times -2", "rule 'foot/motor'"),
+        MapRow("action", "toe/motor", "learn", "rule 'toe/motor'"),
+        MapRow("action", "hip/motor", "hip/motor times 0.5", "rule 'hip/motor'"),
     )
     lines = str(small()).splitlines()
     assert lines[0].split() == ["side", "entry", "rule", "why"]
@@ -167,15 +167,15 @@ def test_each_feature_needs_its_rule_in_order() -> None:
     with pytest.raises(MapError, match="the rules given are for none"):
         msgspec.structs.replace(good, action=())
     with pytest.raises(UnknownName, match="No target observation feature matches 'y'"):
-        msgspec.structs.replace(good, observation=(Entry("z", Take("y")), *good.observation[1:]))
+        msgspec.structs.replace(good, observation=(MapEntry("z", Copy("y")), *good.observation[1:]))
 
 
 def test_entries_are_equal_if_they_do_the_same() -> None:
     """Where a rule came from is a remark."""
-    assert Entry("a", Zero(), "default") == Entry("a", Zero(), "rule 'a'")
-    assert hash(Entry("a", Zero(), "default")) == hash(Entry("a", Zero(), "rule 'a'"))
-    assert Entry("a", Zero()) != Entry("a", Learn())
-    assert not Entry("a", Zero(), "default") != Entry("a", Zero(), "rule 'a'")  # noqa: SIM202
+    assert MapEntry("a", Zero(), "default") == MapEntry("a", Zero(), "rule 'a'")
+    assert hash(MapEntry("a", Zero(), "default")) == hash(MapEntry("a", Zero(), "rule 'a'"))
+    assert MapEntry("a", Zero()) != MapEntry("a", Learn())
+    assert not MapEntry("a", Zero(), "default") != MapEntry("a", Zero(), "rule 'a'")  # noqa: SIM202
 
 
 def test_a_map_crosses_to_another_process() -> None:

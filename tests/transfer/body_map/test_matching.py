@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, RuleLike, Take, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, RuleLike, Zero
 from tests.transfer.body_map.bodies import (
     DEGREE,
     ant_action,
@@ -47,9 +47,9 @@ def rules_of(built: BodyMap) -> dict[str, object]:
 def test_features_of_one_name_are_partners() -> None:
     """An ant with feet has everything that an ant has."""
     built = grown()
-    assert all(entry.rule == Take(entry.feature) for entry in built.observation)
+    assert all(entry.rule == Copy(entry.feature) for entry in built.observation)
     assert {entry.why for entry in built.observation} == {"same name"}
-    assert built.action[0].rule == Take("hip_4/motor")
+    assert built.action[0].rule == Copy("hip_4/motor")
     assert (built.action[-1].rule, built.action[-1].why) == (Zero(), "default")
 
 
@@ -60,8 +60,8 @@ def test_features_of_one_name_are_partners() -> None:
         ("learn", Learn()),
         ("hold", Hold(0.0)),
         (Hold(0.5), Hold(0.5)),
-        ("copy ankle_2/motor", Take("ankle_2/motor")),
-        (Take("ankle_2/motor", 0.5), Take("ankle_2/motor", 0.5)),
+        ("copy ankle_2/motor", Copy("ankle_2/motor")),
+        (Copy("ankle_2/motor", 0.5), Copy("ankle_2/motor", 0.5)),
     ],
 )
 def test_a_rule_can_be_said_in_words(like: RuleLike, rule: object) -> None:
@@ -94,14 +94,14 @@ def test_only_an_exact_name_overrules_a_namesake() -> None:
     """A glob fills gaps; to cut a joint off it has to be named."""
     rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
     assert rules["hip_1/motor"] == Zero()
-    assert rules["hip_2/motor"] == Take("hip_2/motor")
+    assert rules["hip_2/motor"] == Copy("hip_2/motor")
     assert rules["foot_2/motor"] == Learn()
 
 
 def test_stars_carry_over() -> None:
     """Each foot copies the ankle of its own leg."""
     rules = rules_of(grown(rules={"foot_*/motor": "copy ankle_*/motor"}))
-    assert rules["foot_3/motor"] == Take("ankle_3/motor")
+    assert rules["foot_3/motor"] == Copy("ankle_3/motor")
 
 
 def test_rules_can_be_for_one_side_only() -> None:
@@ -173,8 +173,8 @@ def test_units_are_not_mixed() -> None:
         *sides,
         *motors,
         observation_rules={
-            "hinge/angle": Take("hinge/angle", DEGREE),
-            "hinge/velocity": Take("hinge/velocity", DEGREE),
+            "hinge/angle": Copy("hinge/angle", DEGREE),
+            "hinge/velocity": Copy("hinge/velocity", DEGREE),
         },
     )
     sensed = built.adapt_observation([0.0, 180.0, 0.0, 90.0])
@@ -224,13 +224,13 @@ def test_equal_torque_is_a_scale() -> None:
     """A motor twice as strong is driven half as hard."""
     weak, strong = pendulum_action(100.0), pendulum_action(200.0)
     sides = pendulum_observation(), pendulum_observation()
-    assert BodyMap.between(*sides, weak, strong).action[0].rule == Take("slide/motor")
+    assert BodyMap.between(*sides, weak, strong).action[0].rule == Copy("slide/motor")
     built = BodyMap.between(*sides, weak, strong, units="torque")
-    assert built.action[0].rule == Take("slide/motor", 0.5)
+    assert built.action[0].rule == Copy("slide/motor", 0.5)
     built = BodyMap.between(
-        *sides, weak, strong, units="torque", rules={"slide/motor": Take("slide/motor", -1.0)}
+        *sides, weak, strong, units="torque", rules={"slide/motor": Copy("slide/motor", -1.0)}
     )
-    assert built.action[0].rule == Take("slide/motor", -0.5)
+    assert built.action[0].rule == Copy("slide/motor", -0.5)
 
 
 def test_a_force_is_no_torque() -> None:
@@ -245,4 +245,4 @@ def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
     silent = Layout((motor("slide", 1.0, ""),))
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
-    assert built.action[0].rule == Take("slide/motor")
+    assert built.action[0].rule == Copy("slide/motor")

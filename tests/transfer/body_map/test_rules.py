@@ -8,22 +8,22 @@ import pytest
 
 from shapechanger.errors import MapError
 from shapechanger.transfer.body_map.rules import (
+    Copy,
     Hold,
     Learn,
     Rule,
-    Take,
     Zero,
-    in_words,
-    substituted,
+    compose_rules,
+    describe_rule,
+    expand_template,
 )
-from shapechanger.transfer.body_map.wildcards import filled_in
 
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
 def test_a_scale_that_cannot_be_undone_is_refused(scale: float) -> None:
     """A map is inverted by dividing by its scales."""
     with pytest.raises(MapError, match="'hip/angle' must be finite and not zero"):
-        Take("hip/angle", scale)
+        Copy("hip/angle", scale)
 
 
 def test_a_value_that_is_no_number_is_refused() -> None:
@@ -35,8 +35,8 @@ def test_a_value_that_is_no_number_is_refused() -> None:
 @pytest.mark.parametrize(
     ("rule", "words"),
     [
-        (Take("hip/angle"), "hip/angle"),
-        (Take("hip/angle", -1.0), "hip/angle times -1"),
+        (Copy("hip/angle"), "hip/angle"),
+        (Copy("hip/angle", -1.0), "hip/angle times -1"),
         (Zero(), "zero"),
         (Hold(0.25), "hold 0.25"),
         (Learn(), "learn"),
@@ -44,13 +44,13 @@ def test_a_value_that_is_no_number_is_refused() -> None:
 )
 def test_each_rule_has_words(rule: Rule, words: str) -> None:
     """A table of rules is read by people."""
-    assert in_words(rule) == words
+    assert describe_rule(rule) == words
 
 
 @pytest.mark.parametrize(
     ("inner", "result"),
     [
-        (Take("shank", 3.0), Take("shank", -6.0)),
+        (Copy("shank", 3.0), Copy("shank", -6.0)),
         (Hold(0.5), Hold(-1.0)),
         (Zero(), Zero()),
         (Learn(), Learn()),
@@ -58,7 +58,7 @@ def test_each_rule_has_words(rule: Rule, words: str) -> None:
 )
 def test_two_rules_in_a_row_are_one(inner: Rule, result: Rule) -> None:
     """Scales multiply, and what is constant stays constant."""
-    assert substituted(Take("shin", -2.0), inner) == result
+    assert compose_rules(Copy("shin", -2.0), inner) == result
 
 
 @pytest.mark.parametrize(
@@ -76,11 +76,11 @@ def test_stars_stand_for_what_the_wildcards_fitted(
     template: str, pattern: str, name: str, result: str
 ) -> None:
     """One line of a map serves four legs."""
-    assert filled_in(template, pattern, name) == result
+    assert expand_template(template, pattern, name) == result
 
 
 @pytest.mark.parametrize("pattern", ["foot_2/motor", "*_*/motor"])
 def test_as_many_stars_as_wildcards(pattern: str) -> None:
     """A star with nothing to stand for is a slip of the pen."""
     with pytest.raises(MapError, match="must have a star for each wildcard"):
-        filled_in("ankle_*/motor", pattern, "foot_2/motor")
+        expand_template("ankle_*/motor", pattern, "foot_2/motor")

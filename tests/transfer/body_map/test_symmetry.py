@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Symmetry, Take, mirror
+from shapechanger.transfer.body_map import BodyMap, Copy, Symmetry, mirror
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
     ANT_SWAP,
@@ -33,24 +33,24 @@ def legs(*names: str, low: float = -1.0, high: float = 1.0) -> Layout:
 def test_the_mirror_of_an_ant() -> None:
     """Worked out by hand: y turns, axial x and z turn, hips turn, ankles do not."""
     taken = dict(zip(ant_observation().names, ant_mirror().observation, strict=True))
-    assert taken["torso/z"] == Take("torso/z")
+    assert taken["torso/z"] == Copy("torso/z")
     assert [taken[f"torso/{q}"].scale for q in ("qw", "qx", "qy", "qz")] == [1, -1, 1, -1]
     assert [taken[f"torso/{v}"].scale for v in ("vx", "vy", "vz")] == [1, -1, 1]
     assert [taken[f"torso/{w}"].scale for w in ("wx", "wy", "wz")] == [-1, 1, -1]
-    assert taken["hip_1/angle"] == Take("hip_4/angle", -1.0)
-    assert taken["hip_2/velocity"] == Take("hip_3/velocity", -1.0)
-    assert taken["ankle_3/angle"] == Take("ankle_2/angle")
+    assert taken["hip_1/angle"] == Copy("hip_4/angle", -1.0)
+    assert taken["hip_2/velocity"] == Copy("hip_3/velocity", -1.0)
+    assert taken["ankle_3/angle"] == Copy("ankle_2/angle")
     assert [taken[f"shank_1/contact/{c}"] for c in ("tx", "ty", "tz", "fx", "fy", "fz")] == [
-        Take("shank_4/contact/tx", -1.0),
-        Take("shank_4/contact/ty"),
-        Take("shank_4/contact/tz", -1.0),
-        Take("shank_4/contact/fx"),
-        Take("shank_4/contact/fy", -1.0),
-        Take("shank_4/contact/fz"),
+        Copy("shank_4/contact/tx", -1.0),
+        Copy("shank_4/contact/ty"),
+        Copy("shank_4/contact/tz", -1.0),
+        Copy("shank_4/contact/fx"),
+        Copy("shank_4/contact/fy", -1.0),
+        Copy("shank_4/contact/fz"),
     ]
     moved = dict(zip(ant_action().names, ant_mirror().action, strict=True))
-    assert moved["hip_3/motor"] == Take("hip_2/motor", -1.0)
-    assert moved["ankle_4/motor"] == Take("ankle_1/motor")
+    assert moved["hip_3/motor"] == Copy("hip_2/motor", -1.0)
+    assert moved["ankle_4/motor"] == Copy("ankle_1/motor")
 
 
 def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
@@ -80,7 +80,7 @@ def test_two_mirrors_are_none() -> None:
 def test_a_turned_policy_is_equivariant() -> None:
     """With g the turn of a four-legged body, the map makes of p the policy g⁻¹ p(g o)."""
     names = ("a", "b", "c", "d")
-    turn = {name: Take(names[(i + 1) % 4], -1.0 if i == 0 else 1.0) for i, name in enumerate(names)}
+    turn = {name: Copy(names[(i + 1) % 4], -1.0 if i == 0 else 1.0) for i, name in enumerate(names)}
     symmetry = Symmetry.of(legs(*names), legs(*names), observation=turn, action=turn)
     built = BodyMap.identity(legs(*names), legs(*names)).with_symmetry(symmetry)
     g = built.observation_matrix
@@ -119,12 +119,12 @@ def test_the_symmetry_of_a_third_body_is_refused() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"a": Take("b")}, "'a' and 'b' both take 'b'"),
-        ({"a": Take("b", 2.0), "b": Take("a", 0.5)}, "in a symmetry the scale is 1 or -1"),
+        ({"a": Copy("b")}, "'a' and 'b' both take 'b'"),
+        ({"a": Copy("b", 2.0), "b": Copy("a", 0.5)}, "in a symmetry the scale is 1 or -1"),
     ],
 )
 def test_what_is_no_signed_permutation_is_refused(
-    changes: Mapping[str, Take], message: str
+    changes: Mapping[str, Copy], message: str
 ) -> None:
     """A symmetry loses nothing and stretches nothing."""
     with pytest.raises(MapError, match=message):
@@ -134,17 +134,17 @@ def test_what_is_no_signed_permutation_is_refused(
 def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
     """A slip in a name is found, and so is a rule too few."""
     with pytest.raises(UnknownName, match="No feature matches 'hip'"):
-        Symmetry.of(legs("hop"), legs("a"), observation={"hip": Take("hop")})
+        Symmetry.of(legs("hop"), legs("a"), observation={"hip": Copy("hop")})
     with pytest.raises(UnknownName, match="No action feature matches 'b'"):
-        Symmetry.of(legs("a"), legs("a"), action={"a": Take("b")})
+        Symmetry.of(legs("a"), legs("a"), action={"a": Copy("b")})
     with pytest.raises(MapError, match="needs 1 action rules, one a feature: 0 given"):
-        Symmetry(legs("a"), legs("a"), (Take("a"),), ())
+        Symmetry(legs("a"), legs("a"), (Copy("a"),), ())
 
 
 def test_only_like_features_change_places() -> None:
     """An angle does not stand for a length, nor a strong motor for a weak one."""
     mixed = Layout((Feature("a", "m"), Feature("b", "rad")))
-    swap = {"a": Take("b"), "b": Take("a")}
+    swap = {"a": Copy("b"), "b": Copy("a")}
     with pytest.raises(MapError, match="their unit is 'm' and 'rad'"):
         Symmetry.of(mixed, legs("a"), observation=swap)
 

@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Hold, Learn, Take, Zero, mirror
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero, mirror
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
     ANT_SWAP,
@@ -37,10 +37,10 @@ def test_a_person_can_write_a_map() -> None:
     """The example of the documentation does what it says."""
     built = BodyMap.from_toml(EXAMPLE, *GROWN)
     rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
-    assert rules["torso/vx"] == Take("torso/vx", 0.5)
-    assert rules["foot_1/motor"] == Take("ankle_1/motor", -0.5)
+    assert rules["torso/vx"] == Copy("torso/vx", 0.5)
+    assert rules["foot_1/motor"] == Copy("ankle_1/motor", -0.5)
     assert rules["foot_2/motor"] == Learn()
-    assert rules["foot_3/motor"] == Take("ankle_3/motor")
+    assert rules["foot_3/motor"] == Copy("ankle_3/motor")
     assert rules["foot_4/motor"] == Hold(0.1)
 
 
@@ -55,7 +55,7 @@ def test_units_come_from_the_text() -> None:
     built = BodyMap.from_toml(
         'units = "torque"', *sides, pendulum_action(100.0), pendulum_action(200.0)
     )
-    assert built.action[0].rule == Take("slide/motor", 0.5)
+    assert built.action[0].rule == Copy("slide/motor", 0.5)
 
 
 @pytest.mark.parametrize(

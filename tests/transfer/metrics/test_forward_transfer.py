@@ -7,7 +7,7 @@ import pytest
 
 from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics import (
-    LEAST_HEADROOM,
+    MIN_HEADROOM,
     Estimate,
     LearningCurves,
     forward_transfer,
@@ -71,7 +71,7 @@ def test_headroom_is_needed(height: float, is_defined: bool) -> None:
     estimate = transfer(ARM, curves((height, height, height)))
     assert (estimate.value is not None) is is_defined
     if not is_defined:
-        assert f"less than {LEAST_HEADROOM:g}" in estimate.note
+        assert f"less than {MIN_HEADROOM:g}" in estimate.note
 
 
 @pytest.mark.parametrize("outside", [-0.1, 1.1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.transfer.report.page import report_html
+from shapechanger.reports.study import report_html
 from shapechanger.transfer.study import Study
 from tests.transfer.report.studies import make_study
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.evaluation import Evaluation
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.settings import LearnerSettings
+from shapechanger.transfer.methods import RunResult
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
-from shapechanger.transfer.runs import RunResult
-from shapechanger.transfer.settings import LearnerSettings
 from shapechanger.transfer.study import Study
 
 STEPS = np.linspace(0, 10_240, 11)

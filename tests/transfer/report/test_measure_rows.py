@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shapechanger.reports.numbers import estimate_text
+from shapechanger.reports.study import MeasureRow, arm_rows, measure_rows
 from shapechanger.transfer.metrics import DEFAULT_THRESHOLDS
-from shapechanger.transfer.report import Row, arm_rows, measure_rows
-from shapechanger.transfer.report.numbers import estimate_text
 from shapechanger.transfer.study import Study
 from tests.transfer.report.studies import STEPS, make_study, rising
 
@@ -16,7 +16,7 @@ from tests.transfer.report.studies import STEPS, make_study, rising
 SLOPE = STEPS / STEPS[-1]
 
 
-def by_name(study: Study, arm: str) -> dict[str, Row]:
+def by_name(study: Study, arm: str) -> dict[str, MeasureRow]:
     """The rows of one arm."""
     return {row.measure: row for row in measure_rows(study) if row.arm == arm}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.transfer.report.spread import spread_text, t_interval
+from shapechanger.reports.numbers import spread_text, t_interval
 
 
 def test_one_run_has_a_mean_and_no_interval() -> None:

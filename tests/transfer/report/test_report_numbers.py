@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.transfer.metrics import Estimate, undefined
-from shapechanger.transfer.report.numbers import (
+from shapechanger.reports.numbers import (
     count,
     estimate_text,
     interval_text,
     list_text,
     number,
+    spread_text,
+    t_interval,
 )
-from shapechanger.transfer.report.spread import spread_text, t_interval
+from shapechanger.transfer.metrics import Estimate, undefined
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MissingExtra, OutputError
-from shapechanger.pages.pictures import png
+from shapechanger.reports import verdict
+from shapechanger.reports.page import png
+from shapechanger.reports.study import measure_rows, report_html, write_report
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.report import measure_rows, verdict, write_report
-from shapechanger.transfer.report.page import report_html
 from shapechanger.transfer.study import Study
 from tests.transfer.report.studies import make_study, rising, same_body
 
@@ -261,7 +261,7 @@ def test_without_matplotlib_the_extra_is_named(
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "shapechanger.transfer.report.curves", raising=False)
+    monkeypatch.delitem(sys.modules, "shapechanger.reports.charts", raising=False)
     assert measure_rows(study)
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):

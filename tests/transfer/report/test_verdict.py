@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shapechanger.reports.verdict import Direction, caveats, direction, verdict
 from shapechanger.transfer.metrics import Estimate
-from shapechanger.transfer.report.verdict import Direction, caveats, direction, verdict
 from tests.transfer.report.studies import STEPS, make_study, rising
 
 SCRATCH = rising(0.0, 1000.0, 3000.0)

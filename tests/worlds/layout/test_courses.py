@@ -12,7 +12,7 @@ from scipy import ndimage
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import HELD_OUT, Course, Thing
 from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
-from shapechanger.worlds.layout.distances import (
+from shapechanger.worlds.layout.geometry import (
     between,
     cross_each_other,
     from_thing,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.worlds.course import Thing
-from shapechanger.worlds.layout.distances import between, cross_each_other, from_thing, outline
+from shapechanger.worlds.layout.geometry import between, box_sides, cross_each_other, from_thing
 
 
 def _random_thing(rng: np.random.Generator) -> Thing:
@@ -56,7 +56,7 @@ def test_a_thing_inside_another_is_no_distance_away() -> None:
     small = Thing("box", 0.1, 0.0, 1.0, 0.2, 0.3, 1.0)
     assert between(large, small) == 0.0
     assert between(small, large) == 0.0
-    assert from_thing(large, outline(small)) == pytest.approx(0.0)
+    assert from_thing(large, box_sides(small)) == pytest.approx(0.0)
 
 
 def test_pieces_cross_only_in_their_middles() -> None:

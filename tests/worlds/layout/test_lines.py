@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.worlds.layout.lines import (
+from shapechanger.worlds.layout.geometry import (
     length,
     normals,
     resampled,

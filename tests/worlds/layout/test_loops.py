@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.worlds.layout.loops import grown, outline, spread
+from shapechanger.worlds.layout.geometry import grow_cells, scale_grid, trace_outline
 
 
 def test_outlines_go_round_counter_clockwise() -> None:
     """Three squares in the shape of an L have eight sides round them."""
-    loop = outline(frozenset({(0, 0), (1, 0), (0, 1)}))
+    loop = trace_outline(frozenset({(0, 0), (1, 0), (0, 1)}))
     assert loop is not None
     corners = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2), (0, 1)]
     assert [tuple(point) for point in loop] == corners
@@ -27,22 +27,22 @@ def test_outlines_go_round_counter_clockwise() -> None:
 )
 def test_outlines_that_meet_themselves_are_refused(cells: frozenset[tuple[int, int]]) -> None:
     """No lane can follow an outline of two pieces, or one that touches itself."""
-    assert outline(cells) is None
+    assert trace_outline(cells) is None
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_grown_squares_hang_together(seed: int) -> None:
     """Every outline that is accepted takes one step at a time and comes to no point twice."""
     rng = np.random.default_rng(seed)
-    cells = grown(rng, 6)
+    cells = grow_cells(rng, 6)
     assert len(cells) == 6
-    loop = outline(cells)
+    loop = trace_outline(cells)
     if loop is None:
         return
     steps = np.abs(np.diff(loop, axis=0, append=loop[:1])).sum(axis=1)
     assert (steps == 1).all()
     assert len({tuple(point) for point in loop}) == len(loop)
-    metres = spread(rng, loop, 4.0, 6.0)
+    metres = scale_grid(rng, loop, 4.0, 6.0)
     apart = np.hypot(*np.diff(metres, axis=0, append=metres[:1]).T)
     assert apart.min() >= 4.0
     assert apart.max() <= 6.0

@@ -8,7 +8,7 @@ import pytest
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Surface, Thing, Wall
 from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
-from shapechanger.worlds.layout.distances import segments, to_segments
+from shapechanger.worlds.layout.geometry import segments, to_segments
 
 
 def _ring(*things: Thing) -> Course:

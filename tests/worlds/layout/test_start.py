@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.worlds.course import HELD_OUT, Thing
 from shapechanger.worlds.layout import WORLDS, lay_out, start_pose
-from shapechanger.worlds.layout.distances import from_thing, segments
+from shapechanger.worlds.layout.geometry import from_thing, segments
 
 
 @pytest.mark.parametrize("world", WORLDS)

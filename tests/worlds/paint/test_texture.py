@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import UnknownName
-from shapechanger.worlds.paint import PAINTERS, texture
-from shapechanger.worlds.paint.noise import clouds
+from shapechanger.worlds.paint import PAINTERS, clouds, texture
 
 _TILED = ("floor", "asphalt", "water", "grass", "hedge", "ceiling", "brick", "fence")
 

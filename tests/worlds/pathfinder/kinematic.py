@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.pathfinder.clearance import Obstacles
+from shapechanger.worlds.expert.lattice import ClearanceField
 from shapechanger.worlds.world import Pose
 
 SIZES = {"car": (0.40, 0.20), "tank": (0.32, 0.24), "truck": (0.50, 0.20), "boat": (0.60, 0.20)}
@@ -30,7 +30,7 @@ class Kinematic:
         self.yaw_rate = 0.0
         self.touches = 0
         self._touching = False
-        self._obstacles = Obstacles(course)
+        self._obstacles = ClearanceField(course)
         self._current = course.current_mps
         self._steering = 0.0
         self._slide = 0.0

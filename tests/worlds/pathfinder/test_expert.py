@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from shapechanger.embodiments.vehicles import VEHICLES
+from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.errors import UnknownName
 from shapechanger.worlds.course import Course
+from shapechanger.worlds.expert import CourseExpert, CourseProgress, Disturbance
+from shapechanger.worlds.expert.driver import ThreeWay
+from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out, start_pose
-from shapechanger.worlds.pathfinder import Disturbance, Expert, Progress
-from shapechanger.worlds.pathfinder.three_way import ThreeWay
-from shapechanger.worlds.pathfinder.traits import TRAITS
 from shapechanger.worlds.world import Pose
 from tests.worlds.pathfinder.courses import ring
 from tests.worlds.pathfinder.kinematic import SIZES, TOP, Kinematic
@@ -24,13 +24,13 @@ _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbo
 
 def _drive(
     vehicle: Kinematic,
-    expert: Expert,
+    expert: CourseExpert,
     course: Course,
     seconds: float,
     disturbance: Disturbance | None = None,
 ) -> float:
     """Net progress after some time, m."""
-    progress = Progress(course)
+    progress = CourseProgress(course)
     progress.reset(vehicle.pose.x, vehicle.pose.y)
     for _ in range(round(seconds / 0.05)):
         action = expert.act(vehicle.pose, vehicle.speed, vehicle.yaw_rate)
@@ -48,7 +48,7 @@ def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
     """From a start on the middle of the lane, fast and without touching anything."""
     course = lay_out(_HOMES[name], seed)
     vehicle = Kinematic(name, course, start_pose(course, seed))
-    metres = _drive(vehicle, Expert(course, name), course, 30.0)
+    metres = _drive(vehicle, CourseExpert(course, name), course, 30.0)
     assert vehicle.touches == 0
     assert metres > 0.7 * 30.0 * TOP[name]
 
@@ -58,7 +58,7 @@ def test_steering_with_three_levels_drives_round(name: str) -> None:
     """Left, straight on and right are enough, each for its share of time."""
     course = lay_out(_HOMES[name], 5)
     vehicle = Kinematic(name, course, start_pose(course, 5))
-    expert = Expert(course, name, levels="three")
+    expert = CourseExpert(course, name, levels="three")
     steerings = {float(expert.act(vehicle.pose, 0.0)[0]) for _ in range(20)}
     assert steerings <= {-1.0, 0.0, 1.0}
     expert.reset(vehicle.pose)
@@ -71,7 +71,7 @@ def test_disturbances_are_put_right(name: str) -> None:
     """What wanders and jerks comes back to its line, mostly without touching anything."""
     course = lay_out(_HOMES[name], 6)
     vehicle = Kinematic(name, course, start_pose(course, 6))
-    expert = Expert(course, name)
+    expert = CourseExpert(course, name)
     assert (
         _drive(vehicle, expert, course, 40.0, Disturbance.of(name, "both", 1))
         > 0.5 * 40.0 * TOP[name]
@@ -85,7 +85,7 @@ def test_a_boat_holds_against_the_current() -> None:
     x, y = course.route[0]
     ahead = course.route[1] - course.route[0]
     vehicle = Kinematic("boat", course, Pose(x, y, math.atan2(ahead[1], ahead[0])))
-    expert = Expert(course, "boat")
+    expert = CourseExpert(course, "boat")
     _drive(vehicle, expert, course, 20.0)
     worst = 0.0
     for _ in range(40):
@@ -106,13 +106,13 @@ def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
     near = half_width - SIZES[name][0] / 2 - 0.1
     x, y = course.route[30] + near * np.array((math.cos(heading), math.sin(heading)))
     vehicle = Kinematic(name, course, Pose(float(x), float(y), heading))
-    assert _drive(vehicle, Expert(course, name), course, 30.0) > 0.4 * 30.0 * TOP[name]
+    assert _drive(vehicle, CourseExpert(course, name), course, 30.0) > 0.4 * 30.0 * TOP[name]
 
 
 def test_it_backs_up_when_it_stands_still() -> None:
     """After 0.7 s of throttle without motion, and forward again later."""
     course = ring(0)
-    expert = Expert(course, "car")
+    expert = CourseExpert(course, "car")
     pose = Pose(*expert.path.points[0], float(expert.path.heading[0]))
     throttles = [float(expert.act(pose, 0.0)[1]) for _ in range(80)]
     assert min(throttles[:14]) > 0.25
@@ -127,7 +127,7 @@ def test_the_same_seed_does_the_same() -> None:
     course = ring(1)
 
     def track(seed: int) -> list[float]:
-        expert = Expert(course, "car", seed)
+        expert = CourseExpert(course, "car", seed)
         pose = Pose(*expert.path.points[0], float(expert.path.heading[0]))
         return [float(value) for _ in range(120) for value in expert.act(pose, 0.0)]
 
@@ -138,7 +138,7 @@ def test_the_same_seed_does_the_same() -> None:
 def test_a_reset_forgets_everything() -> None:
     """The next episode begins as the first did, its randomness aside."""
     course = ring(1)
-    expert = Expert(course, "boat")
+    expert = CourseExpert(course, "boat")
     pose = Pose(*expert.path.points[50], float(expert.path.heading[50]))
     expert.reset(pose)
     first = [expert.act(pose, 0.5, 0.1) for _ in range(5)]
@@ -151,7 +151,7 @@ def test_a_reset_forgets_everything() -> None:
 def test_an_unknown_vehicle_is_named() -> None:
     """With the nearest spelling."""
     with pytest.raises(UnknownName, match="Did you mean 'truck'"):
-        Expert(ring(0), "trukc")
+        CourseExpert(ring(0), "trukc")
 
 
 @pytest.mark.parametrize("name", _HOMES)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.worlds.pathfinder import Progress
-from shapechanger.worlds.pathfinder.line import ClosedLine
+from shapechanger.worlds.expert import CourseProgress
+from shapechanger.worlds.expert.line import ClosedLine
 from tests.worlds.pathfinder.courses import ring
 
 _SQUARE = ClosedLine(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]))
@@ -51,7 +51,7 @@ def test_progress_counts_laps_and_counts_down() -> None:
     """Three laps are three lengths, and the same way backward leaves nothing."""
     course = ring(0)
     line = ClosedLine(course.route)
-    progress = Progress(course)
+    progress = CourseProgress(course)
     progress.reset(*line.at(5.0))
     for station in np.arange(5.0, 5.0 + 3 * line.length, 0.1):
         progress.update(*line.at(float(station)))
@@ -64,7 +64,7 @@ def test_progress_counts_laps_and_counts_down() -> None:
 def test_standing_still_is_no_progress() -> None:
     """Nor is swaying across the lane."""
     course = ring(1)
-    progress = Progress(course)
+    progress = CourseProgress(course)
     x, y = course.route[7]
     progress.reset(x, y)
     for _ in range(50):

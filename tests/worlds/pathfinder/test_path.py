@@ -10,18 +10,18 @@ import pytest
 
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Thing
+from shapechanger.worlds.expert import CoursePath, plan_path
+from shapechanger.worlds.expert.lattice import FAR_M, ClearanceField
+from shapechanger.worlds.expert.line import ClosedLine
+from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
-from shapechanger.worlds.pathfinder import Path, plan_path
-from shapechanger.worlds.pathfinder.clearance import FAR_M, Obstacles
-from shapechanger.worlds.pathfinder.line import ClosedLine
-from shapechanger.worlds.pathfinder.traits import TRAITS
 from tests.worlds.pathfinder.courses import ring
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 _CASES = list(itertools.product(_HOMES, range(3)))
 
 
-def _planned(vehicle: str, seed: int) -> tuple[Course, Path, float]:
+def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
     """A course where the vehicle is at home, its path, and the clearance it was asked for."""
     traits = TRAITS[vehicle]
     course = lay_out(_HOMES[vehicle], seed)
@@ -41,7 +41,7 @@ def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
     np.testing.assert_allclose(turns, path.curvature * 0.05, atol=0.05)
     # Between two points a line comes nearer by no more than half of what lies between them.
     between = (path.points + steps / 2).reshape(-1, 2)
-    obstacles = Obstacles(course)
+    obstacles = ClearanceField(course)
     assert obstacles.distance(path.points).min() >= least
     assert obstacles.distance(between).min() >= least - 0.01
     lane = ClosedLine(course.route)
@@ -114,14 +114,14 @@ def test_distances_are_exact() -> None:
     box = Thing("box", 1.0, 1.0, np.pi / 4, 0.4, 0.2, 0.3)
     post = Thing("post", 3.0, 0.0, 0.0, 0.4, 0.4, 0.3)
     empty = ring(0, things=0, radius=50.0)
-    obstacles = Obstacles(dataclasses.replace(empty, walls=(), things=(box, post)))
+    obstacles = ClearanceField(dataclasses.replace(empty, walls=(), things=(box, post)))
     far = np.sqrt(0.5)
     points = np.array([(1.0, 1.0), (1.0 + far, 1.0 + far), (1.0 - far, 1.0 + far), (3.0, 1.0)])
     np.testing.assert_allclose(obstacles.distance(points), [0.0, 0.8, 0.9, 0.8])
     assert obstacles.distance(np.array([(30.0, 0.0)])) == FAR_M
     assert obstacles.distance(np.empty((0, 2))).shape == (0,)
     # A wall is a line with two ends.
-    walls = Obstacles(dataclasses.replace(empty, things=()))
+    walls = ClearanceField(dataclasses.replace(empty, things=()))
     wall = empty.walls[0]
     middle = (np.array(wall.start) + np.array(wall.end)) / 2
     assert walls.distance(middle[None])[0] == pytest.approx(0.0, abs=1e-9)

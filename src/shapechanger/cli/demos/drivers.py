@@ -49,7 +49,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         return ExpertPilot(_expert(env, seed))
     if not Path(driver).is_file():
         raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
-    from shapechanger.transfer.training import use_one_thread
+    from shapechanger.transfer.learners.ppo import use_one_thread
 
     use_one_thread()  # A policy of one picture at a time is slower on more.
     act = _policy(Path(driver), env)
@@ -73,7 +73,7 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> Expert:
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """A policy that takes the observations of this env, and whose actions fit it."""
-    from shapechanger.transfer.cloning import is_clone, load_clone
+    from shapechanger.transfer.learners.cloning import is_clone, load_clone
 
     box = cast("gym.spaces.Box", env.action_space)
 
@@ -85,7 +85,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
         part = _parts(clone, path, env)
         return lambda seen: fitting(clone.predict_many(part(seen, "image"), part(seen, "state")))
     from shapechanger.transfer.env_ref import layouts_of
-    from shapechanger.transfer.policy_file import load_policy
+    from shapechanger.transfer.learners.policy_file import load_policy
 
     policy = load_policy(path)
     if (policy.card.observation, policy.card.action) != layouts_of(env):

@@ -46,7 +46,7 @@ class Evaluate:
                 told += f" On the others its accuracy is {unseen.accuracy:.3f}."
             console.print(told, soft_wrap=True)
         if self.report is not None:
-            from shapechanger.cli.demos.clone_report import write_clone_report, write_numbers
+            from shapechanger.reports.clone import write_clone_report, write_numbers
             from shapechanger.transfer.files import make_folder
 
             make_folder(self.report.parent)

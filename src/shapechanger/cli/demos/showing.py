@@ -29,7 +29,7 @@ class Show:
 
     def run(self) -> None:
         """Print the numbers, and write the page."""
-        from shapechanger.cli.demos.spreads import spreads
+        from shapechanger.reports.demonstrations import distributions
 
         if self.out is not None and self.out.is_dir():
             raise OutputError(f"Cannot write {self.out}: it is a folder.")
@@ -43,7 +43,7 @@ class Show:
         console = plain_console()
         for line in _told(episodes):
             console.print(line, soft_wrap=True)
-        for name, unit, found in spreads(episodes):
+        for name, unit, found in distributions(episodes):
             of = "" if unit == "1" else f" {unit}"
             console.print(
                 f"{name}: {found.least:.3g} to {found.most:.3g}{of}, median {found.median:.3g}",
@@ -53,12 +53,12 @@ class Show:
             console.print(sentence, soft_wrap=True)
         if self.out is None:
             return
-        from shapechanger.cli.demos.page import recording_html
-        from shapechanger.transfer.files import make_folder, write_whole
+        from shapechanger.reports.demonstrations import recording_html
+        from shapechanger.transfer.files import make_folder, write_atomic
 
         make_folder(self.out.parent)
         name = self.data.resolve().name
-        write_whole(self.out, recording_html(name, episodes, broken).encode())
+        write_atomic(self.out, recording_html(name, episodes, broken).encode())
         console.print(f"wrote {self.out}", soft_wrap=True)
 
 

@@ -58,13 +58,13 @@ class Train:
         """Train, judge, and write."""
         self._require_files()
         # The report comes last; if what draws it is missing, say so before the work.
-        import_module("shapechanger.cli.demos.clone_report")
-        from shapechanger.cli.demos.clone_report import write_clone_report, write_numbers
+        import_module("shapechanger.reports.clone")
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
         from shapechanger.demos.cloning.split import judged_steps
         from shapechanger.demos.dataset import count_steps, load_dataset
-        from shapechanger.transfer.training import use_one_thread
+        from shapechanger.reports.clone import write_clone_report, write_numbers
+        from shapechanger.transfer.learners.ppo import use_one_thread
 
         console = plain_console()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
@@ -137,13 +137,13 @@ class Train:
         if self.sac is None and self.ppo is None:
             return written
         from shapechanger.demos.cloning.sb3_file import as_ppo, as_sac
-        from shapechanger.transfer.files import write_whole
+        from shapechanger.transfer.files import write_atomic
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
             if path is not None:
                 whole = io.BytesIO()  # Stable-Baselines3 would write it bit by bit, to FILE.zip.
                 make(policy, size, seed=self.seed).save(whole)
-                write_whole(path, whole.getvalue())
+                write_atomic(path, whole.getvalue())
                 written.append(path)
         return written
 

@@ -13,7 +13,7 @@ from shapechanger.cli.console import plain_console
 from shapechanger.errors import OutputError
 
 if TYPE_CHECKING:
-    from shapechanger.identify import Identified
+    from shapechanger.identify import IdentifiedFinger
 
 __all__ = ["Identify"]
 
@@ -33,9 +33,8 @@ class Identify:
     def run(self) -> None:
         """Print the parameters, and write them and the page."""
         from shapechanger.identify import identify, load_log
-        from shapechanger.identify.page import identified_html
-        from shapechanger.identify.words import told
-        from shapechanger.transfer.files import make_folder, write_whole
+        from shapechanger.reports.finger import finger_html, summary_line
+        from shapechanger.transfer.files import make_folder, write_atomic
 
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
@@ -49,18 +48,18 @@ class Identify:
             make_folder(path.parent)
         console, notes = plain_console(), plain_console(stderr=True)
         found = identify(log, lambda words: notes.print(f"{words} …", soft_wrap=True))
-        write_whole(page, identified_html(found, self.log.name).encode())
+        write_atomic(page, finger_html(found, self.log.name).encode())
         if self.out is not None:
-            write_whole(self.out, found.parameters.to_json().encode())
+            write_atomic(self.out, found.parameters.to_json().encode())
         console.print(_table(found))
         for name, why in found.untold:
             console.print(f"{name} cannot be told: {why}", soft_wrap=True)
         console.print(f"wrote {' and '.join(str(path) for path in files)}", soft_wrap=True)
-        console.print(told(found), soft_wrap=True)
+        console.print(summary_line(found), soft_wrap=True)
 
 
-def _table(found: Identified) -> Table:
-    from shapechanger.identify.words import interval, label, number
+def _table(found: IdentifiedFinger) -> Table:
+    from shapechanger.reports.finger import interval, label, number
 
     table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
     for e in found.estimates:

@@ -40,7 +40,7 @@ class Record:
 
     def run(self) -> None:
         """Record, and say what came of it."""
-        from shapechanger.envs.finger.recording import record_babble
+        from shapechanger.envs.finger.identification import record_babble
         from shapechanger.identify import save_log
         from shapechanger.transfer.env_ref import EnvRef
         from shapechanger.transfer.files import make_folder

@@ -25,7 +25,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.place import Place
 from shapechanger.twin.start import BoardAt, RunningBoard, start_board
-from shapechanger.worlds.home import HOME, require_element
+from shapechanger.worlds.course import HOME, require_element
 
 __all__ = [
     "ServeOptions",
@@ -136,7 +136,7 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         if gap:
             raise MissingExtra("mujoco", "sim")
         return None
-    from shapechanger.embodiments.finger import NOMINAL, TENDONS
+    from shapechanger.bodies.finger import NOMINAL, TENDONS
 
     if tendons != set(TENDONS):
         if gap:
@@ -149,9 +149,9 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         return Place(finger=NOMINAL.to_json())
     import numpy as np
 
-    from shapechanger.envs.finger.gap import gap_as_asked
+    from shapechanger.envs.finger.gap import resolve_gap
 
-    return Place(finger=gap_as_asked(gap).draw(np.random.default_rng(seed or 0)).to_json())
+    return Place(finger=resolve_gap(gap).draw(np.random.default_rng(seed or 0)).to_json())
 
 
 def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
@@ -174,7 +174,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
             raise RobotError("The plain room has a plain camera: choose a --world for a --lens.")
         return Place()
     try:
-        from shapechanger.embodiments.vehicles import VEHICLES, require_fit
+        from shapechanger.bodies.vehicles import VEHICLES, require_fit
         from shapechanger.worlds.layout import WORLDS
         from shapechanger.worlds.lens import lens as find_lens
     except ModuleNotFoundError as error:

@@ -12,22 +12,21 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import (
+from shapechanger.bodies.finger import (
     JOINTS,
     NOMINAL,
     TENDONS,
     FingerParameters,
     drive_of,
 )
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
-from shapechanger.embodiments.finger.figure import FingerFigure
-from shapechanger.envs.finger.gap import Gap, gap_as_asked
-from shapechanger.envs.finger.likeness import identified
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
+from shapechanger.bodies.finger.model import FingerFigure
+from shapechanger.envs.actions import check_action
+from shapechanger.envs.finger.gap import Gap, resolve_gap
+from shapechanger.envs.finger.identification import identified
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
-from shapechanger.envs.picture import body_reach, draw
-from shapechanger.envs.renderer import Renderer
-from shapechanger.envs.stepping.actions import check_action
+from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.headless import choose_gl, require_screen
 from shapechanger.layout import Element, Feature, Layout
@@ -55,7 +54,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     What the fingertip should do belongs to the classes derived from this one.
 
     Args:
-        actions: What an action commands; see `shapechanger.embodiments.finger.DRIVES`.
+        actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
         parameters: Of the finger, as `FingerParameters`, their JSON, or some by name; the nominal
             finger if not given.
         gap: Name of the distribution, or the distribution, that the finger is drawn from in place
@@ -111,7 +110,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.render_mode = render_mode
         self.width, self.height = width, height
         self._actions = actions
-        self._gap = None if gap is None else gap_as_asked(gap)
+        self._gap = None if gap is None else resolve_gap(gap)
         self._is_drawn_anew = gap is not None and finger_seed is None
         self._reward = FingertipReward.from_weights(reward or {})
         self._figure: FingerFigure | None = None

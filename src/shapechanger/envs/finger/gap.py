@@ -11,11 +11,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import NOMINAL, FingerParameters
-from shapechanger.embodiments.finger.balance import spans_all_torques
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.bodies.finger.tensions import spans_all_torques
 from shapechanger.errors import FingerError, UnknownName
 
-__all__ = ["GAPS", "Gap", "gap_as_asked", "geared_around", "with_gears"]
+__all__ = ["GAPS", "Gap", "geared_around", "resolve_gap", "with_gears"]
 
 # How often draws whose tendons cannot balance one another are thrown away before giving up. With
 # arms off by 25 % about one in two hundred is.
@@ -228,7 +228,7 @@ def geared_around(found: FingerParameters) -> Gap:
     )
 
 
-def gap_as_asked(value: str | Gap | Mapping[str, object]) -> Gap:
+def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
     """The gap that a user means: its name, its ranges, or a gap.
 
     Raises:

@@ -10,19 +10,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import (
+from shapechanger.bodies.finger import (
     NOMINAL,
     TENDONS,
-    Drive,
     FingerParameters,
+    TendonDrive,
     build_finger,
     drive_of,
 )
-from shapechanger.embodiments.finger.anatomy import LEAST_TENSION_N
-from shapechanger.embodiments.finger.balance import hold
-from shapechanger.envs.finger.inverse import angles_for
+from shapechanger.bodies.finger.anatomy import LEAST_TENSION_N
+from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.plant import CONTROL_DT
-from shapechanger.envs.finger.postures import joint_torque
+from shapechanger.envs.finger.postures import angles_for, joint_torque
 from shapechanger.layout import Layout
 
 __all__ = ["FingerOracle"]
@@ -61,7 +60,7 @@ class FingerOracle:
         parameters: FingerParameters = NOMINAL,
         gain: float = _GAIN,
     ) -> None:
-        self._drive: Drive = drive_of(actions, NOMINAL)
+        self._drive: TendonDrive = drive_of(actions, NOMINAL)
         self._gain = gain
         self._arms = parameters.arms
         self._most = np.array(parameters.most_tension)
@@ -92,7 +91,7 @@ class FingerOracle:
         low, high = (self._drive.tension(end, length, pulling) for end in _ENDS)
         low = np.clip(low, LEAST_TENSION_N, self._most)
         high = np.clip(high, low, self._most)
-        tensions, _ = hold(self._arms, self._torque(seen, speed), low, high)
+        tensions, _ = tensions_for_torque(self._arms, self._torque(seen, speed), low, high)
         ahead = seen.tensions + (tensions - seen.tensions) / self._follows
         command = self._drive.command(ahead, length, pulling)
         return np.clip(command, -1.0, 1.0).astype(np.float32)

@@ -2,19 +2,51 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import JOINTS, TENDONS, Drive, FingerParameters, build_finger
-from shapechanger.embodiments.finger.anatomy import PHALANX_LENGTH_M
-from shapechanger.embodiments.finger.model import FINGERTIP, TARGET
-from shapechanger.envs.finger.velocities import JointVelocities
+from shapechanger.bodies.finger import JOINTS, TENDONS, FingerParameters, TendonDrive, build_finger
+from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.bodies.finger.model import FINGERTIP, TARGET
 from shapechanger.tasks.finger import FingerSenses, fingertip
 
-__all__ = ["CONTROL_DT", "FingerPlant"]
+__all__ = ["CONTROL_DT", "FingerPlant", "JointVelocities"]
+
+# Time constant, s, with which noisy angles become velocities: two periods of control.
+_LAG_S: Final = 0.040
+
+
+class JointVelocities:
+    """Differences of what was measured, smoothed.
+
+    Args:
+        period_s: Time from one measurement to the next, s.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._share = 1.0 - math.exp(-period_s / _LAG_S)
+        self._angles: NDArray[np.float64] | None = None
+        self._velocities = np.zeros(0)
+
+    def forget(self) -> None:
+        """Begin anew: what is measured next is at rest."""
+        self._angles = None
+
+    def of(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The velocities, rad/s, after these angles, rad, of the same shape."""
+        if self._angles is None:
+            self._velocities = np.zeros_like(angles)
+        else:
+            speed = (angles - self._angles) / self._period_s
+            self._velocities = self._velocities + self._share * (speed - self._velocities)
+        self._angles = angles.copy()
+        return self._velocities
+
 
 CONTROL_DT: Final = 0.020
 """Duration of one action, s."""
@@ -36,7 +68,7 @@ class FingerPlant:
         data: Its state.
     """
 
-    def __init__(self, parameters: FingerParameters, drive: Drive, control_dt: float) -> None:
+    def __init__(self, parameters: FingerParameters, drive: TendonDrive, control_dt: float) -> None:
         self.parameters = parameters
         self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
         self.data = mujoco.MjData(self.model)

@@ -11,18 +11,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import NOMINAL, build_finger, drive_of
-from shapechanger.embodiments.finger.anatomy import (
+from shapechanger.bodies.finger import NOMINAL, build_finger, drive_of
+from shapechanger.bodies.finger.anatomy import (
     DIP_BY_PIP,
     JOINT_RANGE,
     JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
+    PHALANX_LENGTH_M,
 )
-from shapechanger.embodiments.finger.balance import hold
+from shapechanger.bodies.finger.tensions import tensions_for_torque
+from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 
-__all__ = ["can_hold", "draw_posture", "draw_start", "joint_torque", "moving_torque"]
+__all__ = ["angles_for", "can_hold", "draw_posture", "draw_start", "joint_torque", "moving_torque"]
 
 # Of its range, how far a joint stays from either end.
 _MARGIN: Final = 0.1
@@ -60,7 +62,7 @@ def draw_start(rng: np.random.Generator) -> NDArray[np.float64]:
 def can_hold(angles: NDArray[np.float64]) -> bool:
     """Whether tensions in their range hold the nominal finger at these angles, rad, (4,)."""
     torque = moving_torque(angles, np.zeros(4), np.zeros(4))
-    return hold(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
+    return tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
 
 
 def moving_torque(
@@ -107,3 +109,92 @@ def _inner_range() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 @functools.cache
 def _nominal() -> mujoco.MjModel:
     return build_finger(NOMINAL, drive_of("tension", NOMINAL)).compile()
+
+
+_STEPS: Final = 60
+# m. Well below what any finger is asked for.
+_CLOSE_ENOUGH_M: Final = 1e-6
+# Weight of the wish that the end joint follows the middle one, and of being near to where the
+# search began, m/rad, beside being at the point.
+_WISH: Final = 1e-3
+_DAMPING: Final = 1e-3
+_MOST_STEP_RAD: Final = 0.5
+# How the damping grows after a step that led away, and falls after one that led nearer.
+_GROWS: Final = 4.0
+_FALLS: Final = 16.0
+# Farther off than this, m, other beginnings are tried, too: hyperextended, half and fully flexed.
+_FAR_M: Final = 1e-5
+_STARTS: Final = tuple(
+    np.array([low + share * (high - low), 0.0, *(share * JOINT_RANGE[2:, 1])])
+    for low, high in JOINT_RANGE[:1]
+    for share in (0.1, 0.5, 0.9)
+)
+
+
+def angles_for(
+    place: NDArray[np.float64], near: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], float]:
+    """Angles within the ranges of the joints whose fingertip is nearest to a point.
+
+    Gauss-Newton steps with damping, kept within the ranges.
+
+    Args:
+        place: m, (3,).
+        near: Angles to stay near to, rad, (4,); if not given, those are preferred whose end joint
+            bends about 0.6 times as far as the middle one.
+
+    Returns:
+        The angles, rad, (4,), and how far their fingertip is from the point, m.
+    """
+    best = _search(place, JOINT_REST if near is None else near, near is None)
+    if best[1] > _FAR_M:
+        # No angles reach it, or the search ended where it only seems nearest from.
+        others = (_search(place, start, False) for start in _STARTS)
+        best = min((best, *others), key=lambda found: found[1])
+    return best
+
+
+def _search(
+    place: NDArray[np.float64], start: NDArray[np.float64], coupled: bool
+) -> tuple[NDArray[np.float64], float]:
+    """Angles near to a start whose fingertip is nearest, rad, (4,), and how far off it is, m."""
+    low, high = JOINT_RANGE.T
+    q = np.clip(start, low, high)
+    coupling = np.array([[0.0, 0.0, -DIP_BY_PIP, 1.0]])
+    wish = _WISH if coupled else 0.0
+    error = place - fingertip(q, PHALANX_LENGTH_M)
+    damping = _DAMPING
+    for step in range(_STEPS):
+        if step == _STEPS // 3:
+            wish = 0.0  # It has led the way, and must not keep the fingertip off the point.
+        if wish == 0.0 and float(np.linalg.norm(error)) < _CLOSE_ENOUGH_M:
+            break
+        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), wish * coupling, damping * np.eye(4)]
+        goal = [error, -wish * (coupling @ q), np.zeros(4)]
+        free = np.ones(4, bool)
+        change = np.zeros(4)
+        # A joint at its limit that would go beyond stays, and the others make up for it.
+        for _ in range(4):
+            matrix = np.concatenate(rows)[:, free]
+            change[:] = 0.0
+            change[free] = np.linalg.lstsq(matrix, np.concatenate(goal), rcond=None)[0]
+            stuck = free & (((q <= low) & (change < 0.0)) | ((q >= high) & (change > 0.0)))
+            if not stuck.any():
+                break
+            free &= ~stuck
+        next_q = np.clip(q + np.clip(change, -_MOST_STEP_RAD, _MOST_STEP_RAD), low, high)
+        next_error = place - fingertip(next_q, PHALANX_LENGTH_M)
+        # Where no angles reach the point, full steps jump to and fro around the nearest ones.
+        if wish == 0.0 and next_error @ next_error > error @ error:
+            damping *= _GROWS
+            continue
+        gained = float(np.linalg.norm(error) - np.linalg.norm(next_error))
+        damping = max(damping / _FALLS, _DAMPING)
+        q, error = next_q, next_error
+        if (
+            wish == 0.0
+            and gained < _CLOSE_ENOUGH_M * 1e-2
+            and damping <= _GROWS * _FALLS * _DAMPING
+        ):
+            break
+    return q, float(np.linalg.norm(error))

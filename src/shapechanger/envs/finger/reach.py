@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
 from shapechanger.envs.finger.env import FingerEnv, numbers
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_posture

@@ -10,16 +10,158 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
+from shapechanger.bodies.finger.anatomy import (
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+    PHALANX_LENGTH_M,
+)
+from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.env import FingerEnv
-from shapechanger.envs.finger.inverse import angles_for
 from shapechanger.envs.finger.plant import CONTROL_DT
-from shapechanger.envs.finger.random_paths import draw_path
-from shapechanger.envs.finger.reachable import require_reachable
+from shapechanger.envs.finger.postures import angles_for, draw_posture, moving_torque
+from shapechanger.errors import PathError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.tasks.finger import FingerSenses, place_features
-from shapechanger.tasks.paths import Path, PathSource, as_path
+from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
+from shapechanger.tasks.paths import (
+    FingertipPath,
+    PathSource,
+    as_path,
+    circle,
+    figure_eight,
+    line,
+    sample,
+)
 
-__all__ = ["PREVIEW_S", "RANDOM", "FingerTrackEnv"]
+__all__ = [
+    "PREVIEW_S",
+    "RANDOM",
+    "FingerTrackEnv",
+    "beginning_if_reachable",
+    "draw_path",
+    "require_reachable",
+]
+
+_CHECK_HZ: Final = 50.0
+# A path that goes on for ever is looked at for so long, s.
+_LOOK_S: Final = 60.0
+# How far off a point may be that counts as reached, m: a tenth of what counts as success.
+_OFF_M: Final = 0.0005
+_LOOKS: Final = 20
+
+
+def beginning_if_reachable(path: FingertipPath, looks: int) -> NDArray[np.float64] | None:
+    """Angles that begin a path, rad, (4,); None for one that the nominal finger cannot follow.
+
+    Args:
+        path: In the finger's axes, m.
+        looks: At how many points it is looked at, about.
+    """
+    times, points = sample(path, looks / path.duration_s)
+    angles, left = _angles_along(points)
+    return None if left is not None or _weakness(times, angles) else angles[0]
+
+
+def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
+    """Let pass a path that the nominal finger can follow.
+
+    Args:
+        path: In the finger's axes, m.
+
+    Returns:
+        Angles that begin it, rad, (4,).
+
+    Raises:
+        PathError: If a point is out of reach, and where and by how much; or if the tendons cannot
+            move the finger as fast, and what is missing.
+    """
+    times, points = sample(path, _CHECK_HZ, min(path.duration_s, _LOOK_S))
+    angles, left = _angles_along(points)
+    if left is not None:
+        # Where it is farthest off says more than where it leaves.
+        later = range(left, len(points), max(1, len(points) // _LOOKS))
+        worst, k = max((angles_for(points[k])[1], k) for k in later)
+        raise PathError(
+            f"The path leaves what the finger reaches: at {times[k]:.2f} s it is at "
+            f"{_in_mm(points[k])} mm, {worst * 1e3:.1f} mm beyond. "
+            "The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
+        )
+    if weakness := _weakness(times, angles):
+        t, missing = weakness
+        raise PathError(
+            f"The tendons are too weak for the path: at {t:.2f} s a joint lacks "
+            f"{missing * 1e3:.1f} mN·m. Make it slower."
+        )
+    return angles[0]
+
+
+def _angles_along(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], int | None]:
+    """Angles for each point, rad, (n, 4), and which point is the first out of reach, if any is."""
+    angles = np.empty((len(points), 4))
+    near: NDArray[np.float64] | None = None
+    for i, point in enumerate(points):
+        near, off = angles_for(point, near)
+        angles[i] = near
+        if off > _OFF_M:
+            return angles, i
+    return angles, None
+
+
+def _weakness(
+    times: NDArray[np.float64], angles: NDArray[np.float64]
+) -> tuple[float, float] | None:
+    """When the tendons are too weak, s, and what a joint lacks, N·m; None if never."""
+    speeds: NDArray[np.float64] = np.asarray(np.gradient(angles, times, axis=0))
+    accelerations: NDArray[np.float64] = np.asarray(np.gradient(speeds, times, axis=0))
+    for t, q, speed, acceleration in zip(times, angles, speeds, accelerations, strict=True):
+        torque = moving_torque(q, speed, acceleration)
+        tensions, is_enough = tensions_for_torque(
+            MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N
+        )
+        if not is_enough:
+            return float(t), float(np.abs(torque - MOMENT_ARMS.T @ tensions).max())
+    return None
+
+
+def _in_mm(point: NDArray[np.float64]) -> str:
+    return "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * point))
+
+
+# m, and m/s: up to a circle of 15 mm, and up to the speed of one of 12 mm once a second.
+_SIZE: Final = (0.003, 0.015)
+_SPEED: Final = (0.01, 0.08)
+_SLOWEST_HZ: Final = 0.1
+_FASTEST_HZ: Final = 2.0
+# Points of a path at which it is checked.
+_RANDOM_PATHS_LOOKS: Final = 32
+
+
+def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float64]]:
+    """A circle, an eight or a line that the finger can follow, and angles that begin it, rad."""
+    while True:
+        centre = fingertip(draw_posture(rng), PHALANX_LENGTH_M)
+        size = rng.uniform(*_SIZE)
+        hz = rng.uniform(*_SPEED) / (2.0 * math.pi * size)
+        hz = min(max(hz, _SLOWEST_HZ), _FASTEST_HZ)
+        normal = _direction(rng)
+        kind = rng.integers(3)
+        if kind == 0:
+            path = circle(size, tuple(centre), hz, tuple(normal))
+        elif kind == 1:
+            path = figure_eight(size, tuple(centre), hz, tuple(normal))
+        else:
+            path = line(tuple(centre - size * normal), tuple(centre + size * normal), hz)
+        # At as many points of a slow one as of a fast one: they are smooth, and each reset draws
+        # one.
+        begin = beginning_if_reachable(path, _RANDOM_PATHS_LOOKS)
+        if begin is not None:
+            return path, begin
+
+
+def _direction(rng: np.random.Generator) -> NDArray[np.float64]:
+    drawn = rng.standard_normal(3)
+    return drawn / np.linalg.norm(drawn)
+
 
 PREVIEW_S: Final = (0.06, 0.12, 0.20)
 """How far ahead the observation sees besides the end of the next step, s."""
@@ -76,7 +218,7 @@ class FingerTrackEnv(FingerEnv):
         super().__init__(**arguments)
         EzPickle.__init__(self, path=path, **arguments)
         self._is_random = path == RANDOM
-        self._path: Path = as_path("circle" if self._is_random else path)
+        self._path: FingertipPath = as_path("circle" if self._is_random else path)
         self._begin = require_reachable(self._path)
         self._t = 0.0
         self._look()
@@ -98,7 +240,7 @@ class FingerTrackEnv(FingerEnv):
         self.observation_space = gym.spaces.Box(-np.inf, np.inf, (len(features),), np.float64)
 
     @property
-    def path(self) -> Path:
+    def path(self) -> FingertipPath:
         """The path that is followed now."""
         return self._path
 

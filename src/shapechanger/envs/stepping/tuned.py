@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import threading
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple, cast
 
 import gymnasium as gym
@@ -12,12 +16,61 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.reshapable import Reshapable
-from shapechanger.envs.stepping.stopwatch import resting_stopwatch
-from shapechanger.envs.stepping.twin import demand_for, find_twin, known_twin
+from shapechanger.envs.stepping.fast_model import demand_for, find_fast_model, known_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
 
-__all__ = ["NO_WARNINGS", "Binding", "Outcomes", "StepResult", "TunedStep"]
+__all__ = [
+    "NO_WARNINGS",
+    "Binding",
+    "Outcomes",
+    "PausedTimer",
+    "StepResult",
+    "TunedStep",
+    "paused_timer",
+]
+
+
+class PausedTimer:
+    """A context in which MuJoCo measures nothing, for all threads; threads may be in it together.
+
+    A clock that somebody has installed with `mujoco.set_mjcb_time` goes on.
+
+    Args:
+        clock: Where the address of the function is that tells the time.
+    """
+
+    def __init__(self, clock: ctypes.c_void_p) -> None:
+        self._clock = clock
+        self._usual = clock.value
+        self._inside = 0
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._clock.value == self._usual:
+                self._clock.value = None
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside and self._clock.value is None:
+                self._clock.value = self._usual
+
+
+@cache
+def paused_timer() -> contextlib.AbstractContextManager[None]:
+    """The context in which the stopwatch rests; it does nothing where there is no way to it."""
+    if mujoco.get_mjcb_time() is not None:
+        return contextlib.nullcontext()  # Somebody's own clock, and ours is not known.
+    try:
+        # The bindings are linked to the library, wherever it lies.
+        bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
+        return PausedTimer(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
+    except (AttributeError, OSError, ValueError):
+        return contextlib.nullcontext()
+
 
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
 StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any]]
@@ -241,7 +294,7 @@ class TunedStep(Reshapable):
         if bound.has_fast_model is None and self.fast_model:
             bound.demand.steps += 1
             if bound.demand.steps > self.patience and bound.unedited():
-                bound.step_with(find_twin(bound.watch, self.body_spec))
+                bound.step_with(find_fast_model(bound.watch, self.body_spec))
         # Without a fast model the public one steps; only its timestep was copied.
         return bound if bound.dt == self.dt else None
 
@@ -253,8 +306,8 @@ class TunedStep(Reshapable):
             return None
         bound = self._bound = self._bind(watch)
         if self.fast_model:
-            bound.timer = resting_stopwatch()
-            if (fast := known_twin(watch)) is not None:
+            bound.timer = paused_timer()
+            if (fast := known_fast_model(watch)) is not None:
                 bound.step_with(fast)
         return bound
 

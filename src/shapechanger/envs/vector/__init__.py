@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shapechanger.envs.vector.env import ThreadVectorEnv
+from shapechanger.envs.vector.infos import Restart
 from shapechanger.envs.vector.make import make_vec
-from shapechanger.envs.vector.results import Restart
 
 __all__ = ["Restart", "ThreadVectorEnv", "make_vec"]

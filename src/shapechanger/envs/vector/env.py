@@ -10,35 +10,115 @@ from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from shapechanger.envs.vector.access import Access
-from shapechanger.envs.vector.actions import checked
-from shapechanger.envs.vector.crew import Crew, Failures, work_through
-from shapechanger.envs.vector.infos import batched, in_columns
-from shapechanger.envs.vector.member import Member
-from shapechanger.envs.vector.resets import masked_options, one_seed_each
-from shapechanger.envs.vector.results import Restart, Results
-from shapechanger.envs.vector.spaces import require_boxes, require_same_spaces
-from shapechanger.envs.vector.stride import BatchStep
+from shapechanger.envs.actions import checked
+from shapechanger.envs.vector.batch import BatchStep
+from shapechanger.envs.vector.checks import (
+    masked_options,
+    one_seed_each,
+    require_boxes,
+    require_same_spaces,
+)
+from shapechanger.envs.vector.infos import Restart, Results, SubEnv, batched, in_columns
+from shapechanger.envs.vector.threads import Crew, Failures, work_through
 from shapechanger.errors import VectorEnvError
 
-__all__ = ["ThreadVectorEnv"]
+__all__ = ["EnvAccess", "ThreadVectorEnv"]
+
+
+class EnvAccess(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
+    """What a vector env passes on to its envs, as Gymnasium's `SyncVectorEnv` does.
+
+    Attributes:
+        envs: The envs.
+    """
+
+    envs: list[gym.Env[Any, Any]]
+    observation_space: gym.Space[Any]
+    action_space: gym.Space[Any]
+    single_observation_space: gym.Space[Any]
+    single_action_space: gym.Space[Any]
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The seed of each env's generator."""
+        return self.get_attr("np_random_seed")
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Each env's generator."""
+        return self.get_attr("np_random")
+
+    def render(self) -> tuple[Any, ...]:
+        """One frame per env."""
+        self._require_open()
+        return self._of_each(lambda i: cast("Any", self.envs[i]).render())
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of each env, or read an attribute.
+
+        Args:
+            name: Its name.
+            *args: Arguments of the method.
+            **kwargs: Named arguments of the method.
+        """
+
+        def ask(i: int) -> Any:
+            found = self.envs[i].get_wrapper_attr(name)
+            return found(*args, **kwargs) if callable(found) else found
+
+        return self._of_each(ask)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each env."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each env.
+
+        Args:
+            name: Its name.
+            values: A list or tuple with one value per env, or one value for all.
+
+        Raises:
+            VectorEnvError: If there are not as many values as envs.
+        """
+        each = cast("Sequence[Any]", values) if isinstance(values, list | tuple) else None
+        if each is not None and len(each) != self.num_envs:
+            raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
+        self._of_each(
+            lambda i: self.envs[i].set_wrapper_attr(name, values if each is None else each[i])
+        )
+
+    def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
+        """What `work` gives for the number of each env, where that env is at home."""
+        raise NotImplementedError
+
+    def _require_open(self) -> None:
+        """Refuse to go on after `close`.
+
+        Raises:
+            ClosedEnvironmentError: If there is nothing to go on with.
+        """
+        if self.closed:
+            raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
+
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 
 
-class ThreadVectorEnv(Access):
+class ThreadVectorEnv(EnvAccess):
     """Envs of one class, stepped together, with the numbers of Gymnasium's `SyncVectorEnv`.
 
     MuJoCo steps outside Python's lock, so threads share the cores: each has a row of neighbouring
     envs of its own, and is given work once a step. Observations, rewards, ends and infos are those
     of `SyncVectorEnv` to the last bit, with any number of threads. Two things are better told:
     actions are looked at before any env steps, and an env whose simulation diverges is terminated
-    with `info["diverged"]` (see `Member`).
+    with `info["diverged"]` (see `SubEnv`).
 
     If an env raises, the others finish the step; if somebody presses Ctrl-C, the threads do. Both
     leave the envs apart in time, so the next call must be `reset` or `close`.
@@ -91,7 +171,7 @@ class ThreadVectorEnv(Access):
         space = self.observation_space
         self._observations = np.zeros(cast("tuple[int, ...]", space.shape), space.dtype)
         self._members = [
-            Member(env, row) for env, row in zip(self.envs, self._observations, strict=True)
+            SubEnv(env, row) for env, row in zip(self.envs, self._observations, strict=True)
         ]
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._nowhere = np.zeros(self.num_envs, np.bool_)

@@ -17,7 +17,7 @@ from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
-    from shapechanger.embodiments.family import BodyLike
+    from shapechanger.bodies.families import BodyLike
 
 __all__ = ["make_vec"]
 

@@ -9,15 +9,21 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.vehicles import require_fit, vehicle_model
-from shapechanger.envs.vehicle.asked import Steering, profile_as_asked, size_as_asked
-from shapechanger.envs.vehicle.courses import CourseDraw, Courses
-from shapechanger.envs.vehicle.demonstrator import Demonstrator
-from shapechanger.envs.vehicle.picture import draw_vehicle, vehicle_reach
+from shapechanger.bodies.vehicles import add_vehicle, require_fit, vehicle_model
+from shapechanger.envs.renderer import body_reach, draw
+from shapechanger.envs.vehicle.arguments import (
+    Courses,
+    CourseSampler,
+    Steering,
+    check_frame_size,
+    resolve_profile,
+)
+from shapechanger.envs.vehicle.drivers import VehicleDemonstrator
 from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
 from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldError
 from shapechanger.layout import Layout
@@ -29,7 +35,44 @@ from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["VehicleEnv"]
+__all__ = ["VehicleEnv", "draw_vehicle", "vehicle_reach"]
+
+# The ground that it stands on: half of its side, m, and its colour on land and on water.
+_GROUND_M: Final = 2.0
+_LAND: Final = (0.62, 0.60, 0.56, 1.0)
+_WATER: Final = (0.24, 0.40, 0.46, 1.0)
+
+
+def vehicle_reach(vehicle: str) -> float:
+    """How far from its middle the farthest point of a vehicle is, m.
+
+    Raises:
+        UnknownName: If there is no such vehicle.
+    """
+    model = _alone(vehicle)
+    return body_reach(model, model.qpos0)
+
+
+def draw_vehicle(vehicle: str, width: int, height: int, reach: float) -> NDArray[np.uint8]:
+    """A vehicle on even ground, shape (height, width, 3), with `reach` metres around its middle.
+
+    Raises:
+        UnknownName: If there is no such vehicle.
+        RenderError: If the size is no size, or there is nothing to draw with.
+    """
+    model = _alone(vehicle)
+    return draw(model, model.qpos0, width, height, reach)
+
+
+def _alone(vehicle: str) -> mujoco.MjModel:
+    """A model of nothing but the vehicle and the ground."""
+    spec = mujoco.MjSpec()
+    model = add_vehicle(spec, vehicle)
+    ground = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE)
+    ground.size = (_GROUND_M, _GROUND_M, 1.0)
+    ground.rgba = _WATER if model.floats else _LAND
+    return spec.compile()
+
 
 _MODES: Final = ("rgb_array",)
 
@@ -124,10 +167,10 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if render_mode is not None and render_mode not in _MODES:
             raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
-        wide, high = size_as_asked(size)
+        wide, high = check_frame_size(size)
         name = f"lab-{vehicle}" if robot is None else robot
-        profile = profile_as_asked(name, steering, (wide, high))
-        self._draw = CourseDraw(courses, randomise)
+        profile = resolve_profile(name, steering, (wide, high))
+        self._draw = CourseSampler(courses, randomise)
         self._world = MujocoWorld(
             vehicle,
             world,
@@ -225,13 +268,13 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Draw, from the next reset on, courses that no vehicle learns on."""
         self._draw.hold_out()
 
-    def demonstrator(self, seed: int) -> Demonstrator:
+    def demonstrator(self, seed: int) -> VehicleDemonstrator:
         """A driver that knows the whole course, and shows how to drive here.
 
         Args:
             seed: Of the mistakes that it makes and puts right.
         """
-        return Demonstrator(self._world, seed)
+        return VehicleDemonstrator(self._world, seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """What the camera sees now, shape (height, width, 3); None without a render mode.

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped
 from shapechanger.morphology.certificate.certify import Certificate, certify
-from shapechanger.morphology.certificate.comparison import compare
+from shapechanger.morphology.certificate.changes import Change, compare
 from shapechanger.morphology.certificate.consistency import inconsistencies
 from shapechanger.morphology.certificate.rollout import Rollout
-from shapechanger.morphology.certificate.wording import Change
 
 __all__ = [
     "Certifiable",

@@ -14,10 +14,9 @@ import mujoco
 
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped, attribute
-from shapechanger.morphology.certificate.comparison import compare
+from shapechanger.morphology.certificate.changes import Change, compare, grouped
 from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
 from shapechanger.morphology.certificate.rollout import Rollout, compare_rollouts
-from shapechanger.morphology.certificate.wording import Change, grouped
 from shapechanger.morphology.effective import fingerprint
 
 __all__ = ["Certificate", "certify"]

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 import numpy as np
 
-from shapechanger.morphology.effective.naming import Names, names_of
-from shapechanger.morphology.effective.reading import named
+from shapechanger.morphology.effective.elements import Names, named, names_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

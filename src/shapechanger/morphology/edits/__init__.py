@@ -5,9 +5,18 @@ from __future__ import annotations
 from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
-from shapechanger.morphology.edits.shapes import Radius, Stretch
-from shapechanger.morphology.edits.values import Damping, Density, Friction, Gear, Mass, Stiffness
-from shapechanger.morphology.edits.world import Gravity, StartHeight
+from shapechanger.morphology.edits.values import (
+    Damping,
+    Density,
+    Friction,
+    Gear,
+    Gravity,
+    Mass,
+    Radius,
+    StartHeight,
+    Stiffness,
+    Stretch,
+)
 
 __all__ = [
     "AddLimb",

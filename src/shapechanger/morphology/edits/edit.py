@@ -1,7 +1,7 @@
 """A change of body is a value: frozen, printable, comparable, and the same as JSON.
 
 Every edit carries an `amount`, the part of the change that is made. It is 1 except between two
-bodies, where it makes the path continuous (see `shapechanger.morphology.path`).
+bodies, where it makes the path continuous (see `shapechanger.morphology.body`).
 """
 
 from __future__ import annotations

@@ -10,9 +10,8 @@ import numpy as np
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit, part_of_the_way
-from shapechanger.morphology.spec.elements import select
-from shapechanger.morphology.spec.geoms import orientation, rotation
-from shapechanger.morphology.spec.references import delete_joint
+from shapechanger.morphology.spec.elements import delete_joint, select
+from shapechanger.morphology.spec.geometry import orientation, rotation
 
 __all__ = ["JointRange", "Lock", "set_limits"]
 

@@ -25,22 +25,20 @@ from shapechanger.morphology.spec.elements import (
     select,
     subtree,
 )
-from shapechanger.morphology.spec.geoms import (
-    move_by,
-    place_of,
-    scale_geom_mass,
-    stretch_geom,
-    volume,
-)
-from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
-from shapechanger.morphology.spec.segments import (
+from shapechanger.morphology.spec.geometry import (
     anchor,
     far_end,
     held_at,
+    move_by,
+    place_of,
     require_geometry,
     resize_limb,
+    scale_geom_mass,
+    stretch_geom,
     stretch_segment,
+    volume,
 )
+from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
 
 __all__ = ["AddLimb", "AddSegment", "Cut", "Remove", "Split"]
 

@@ -12,14 +12,37 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, part_of_the_way, require_factor
+from shapechanger.morphology.edits.edit import (
+    Edit,
+    Vector,
+    part_of_the_way,
+    require_factor,
+    require_vector,
+)
 from shapechanger.morphology.spec.elements import limbs_and_trunks, select
-from shapechanger.morphology.spec.segments import inertia_is_written_out, scale_mass
+from shapechanger.morphology.spec.geometry import (
+    inertia_is_written_out,
+    require_geometry,
+    scale_mass,
+    stretch_segment,
+    thicken_segment,
+)
 
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["Damping", "Density", "Friction", "Gear", "Mass", "Stiffness"]
+__all__ = [
+    "Damping",
+    "Density",
+    "Friction",
+    "Gear",
+    "Gravity",
+    "Mass",
+    "Radius",
+    "StartHeight",
+    "Stiffness",
+    "Stretch",
+]
 
 # Beyond this, in any unit here, a value is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST_VALUE: Final = 1e6
@@ -174,3 +197,114 @@ def _first_changed(edit: ValueEdit, polynomial: np.ndarray) -> np.ndarray:
     if edit.scale is not None:
         new[1:] = [edit.changed(float(x)) for x in old[1:]]
     return new
+
+
+class Stretch(Edit, frozen=True):
+    """Make segments longer or shorter at the same thickness, held at their joints.
+
+    What hangs on a segment is carried outwards. Mass and inertia follow from the new geometry at
+    the same density. Of a box or ellipsoid the longest half-size is its length; along an axis it is
+    the one that lies along it.
+
+    Attributes:
+        body: Name or glob of the bodies.
+        factor: New length over old length, 0.01 to 100.
+        axis: Axis of the body to stretch along; None for all three, which keeps a limb straight.
+    """
+
+    body: str
+    factor: float
+    axis: Literal["x", "y", "z"] | None = None
+
+    def check(self) -> None:
+        """Refuse an absurd factor."""
+        require_factor("The factor of a stretch", self.factor)
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Stretch every body that fits."""
+        factor = part_of_the_way(1.0, self.factor, self.amount)
+        for body in select("body", self.body, limbs_and_trunks(spec)):
+            require_geometry(spec, body)
+            stretch_segment(spec, body, factor, self.axis)
+
+
+class Radius(Edit, frozen=True):
+    """Make segments thicker or thinner at the same length; mass and inertia follow.
+
+    Attributes:
+        body: Name or glob of the bodies.
+        factor: New radius over old radius, 0.01 to 100. Of a box or ellipsoid the two smaller
+            half-sizes are scaled.
+    """
+
+    body: str
+    factor: float
+
+    def check(self) -> None:
+        """Refuse an absurd factor."""
+        require_factor("The factor of a radius", self.factor)
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Thicken every body that fits."""
+        factor = part_of_the_way(1.0, self.factor, self.amount)
+        for body in select("body", self.body, limbs_and_trunks(spec)):
+            require_geometry(spec, body)
+            thicken_segment(spec, body, factor)
+
+
+# Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
+_LARGEST_GRAVITY: Final = 250.0
+_LARGEST_HEIGHT_M: Final = 100.0
+
+
+class Gravity(Edit, frozen=True):
+    """Change the gravity of the world.
+
+    Attributes:
+        to: Acceleration of free fall along x, y and z, m/s²; (0, 0, -9.81) on Earth. A vector that
+            leans is a floor that slopes.
+    """
+
+    to: Vector
+
+    def check(self) -> None:
+        """Refuse what is not finite or absurdly strong."""
+        require_vector("Gravity", self.to, nonzero=False)
+        if math.hypot(*self.to) > _LARGEST_GRAVITY:
+            raise MorphologyError(
+                f"Gravity is at most {_LARGEST_GRAVITY:g} m/s², got {math.hypot(*self.to):g}."
+            )
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Set the model's gravity."""
+        spec.option.gravity = [
+            part_of_the_way(old, new, self.amount)
+            for old, new in zip(spec.option.gravity.tolist(), self.to, strict=True)
+        ]
+
+
+class StartHeight(Edit, frozen=True):
+    """Change the height at which a trunk starts.
+
+    Attributes:
+        body: Name of a body that hangs on the world.
+        to: Height of its origin above the world's, m.
+    """
+
+    body: str
+    to: float
+
+    def check(self) -> None:
+        """Refuse a height that is no number."""
+        if not abs(self.to) <= _LARGEST_HEIGHT_M:  # Also refuses NaN.
+            raise MorphologyError(
+                f"A start height is at most {_LARGEST_HEIGHT_M:g} m, got {self.to}."
+            )
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Raise or lower every trunk that fits."""
+        trunks = [body for body in limbs_and_trunks(spec) if body.parent.parent is None]
+        for body in select("trunk", self.body, trunks):
+            position = body.pos.copy()
+            position[2] = part_of_the_way(float(position[2]), self.to, self.amount)
+            body.pos = position

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.contacts import safe_solref
-from shapechanger.morphology.effective.reading import is_any, word
-from shapechanger.morphology.effective.rows import Rows, Section, Value
+from shapechanger.morphology.effective.elements import Rows, Section, Value, is_any, word
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.effective.naming import Names
+    from shapechanger.morphology.effective.elements import Names
 
 __all__ = ["actuators", "equalities", "tendons"]
 

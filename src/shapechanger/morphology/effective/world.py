@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.bodies import digest
-from shapechanger.morphology.effective.reading import word
-from shapechanger.morphology.effective.rows import Rows, Section, Value
+from shapechanger.morphology.effective.elements import Rows, Section, Value, word
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.effective.naming import Names
+    from shapechanger.morphology.effective.elements import Names
 
 __all__ = ["derived", "flexes", "options", "plugins", "sizes"]
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import limbs_and_trunks, name_elements
-from shapechanger.morphology.spec.geoms import Array, has_ends, orientation, rotation
-from shapechanger.morphology.spec.segments import scale_mass
+from shapechanger.morphology.spec.geometry import Array, has_ends, orientation, rotation, scale_mass
 
 __all__ = ["make_explicit", "resolve_frames"]
 

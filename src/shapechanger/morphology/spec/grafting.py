@@ -14,7 +14,7 @@ import mujoco
 
 from shapechanger.morphology.spec.elements import require_free_name, subtree
 from shapechanger.morphology.spec.explicit import resolve_frames
-from shapechanger.morphology.spec.geoms import orientation
+from shapechanger.morphology.spec.geometry import orientation
 
 __all__ = ["copy_geom", "graft_copy", "move_limb", "move_point"]
 

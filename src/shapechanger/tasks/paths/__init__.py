@@ -11,17 +11,14 @@ time is in seconds. Whether a finger reaches a path is for the env to say.
 
 from __future__ import annotations
 
-from shapechanger.tasks.paths.function import from_callable
-from shapechanger.tasks.paths.given import KINDS, PathSource, as_path
-from shapechanger.tasks.paths.path import Path, sample
+from shapechanger.tasks.paths.path import FASTEST_MPS, FingertipPath, sample
 from shapechanger.tasks.paths.shapes import circle, curve_3d, figure_eight, line
-from shapechanger.tasks.paths.speed import FASTEST_MPS
-from shapechanger.tasks.paths.table import from_csv
+from shapechanger.tasks.paths.sources import KINDS, PathSource, as_path, from_callable, from_csv
 
 __all__ = [
     "FASTEST_MPS",
     "KINDS",
-    "Path",
+    "FingertipPath",
     "PathSource",
     "as_path",
     "circle",

@@ -4,15 +4,89 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from numbers import Real
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import PathError
-from shapechanger.tasks.paths.asked import positive
 
-__all__ = ["CLOSED_M", "Motion", "Path", "Points", "Times", "sample"]
+__all__ = [
+    "CLOSED_M",
+    "FASTEST_MPS",
+    "FingertipPath",
+    "PathMotion",
+    "Points",
+    "Times",
+    "Vector",
+    "finite",
+    "jumps",
+    "positive",
+    "sample",
+    "too_fast",
+    "vector",
+]
+
+Vector = tuple[float, float, float]
+"""x, y and z."""
+
+_DIMENSIONS: Final = (3,)
+
+
+def finite(what: str, value: Any) -> float:
+    """A number that is one.
+
+    Args:
+        what: What to call it.
+        value: As it was given.
+
+    Raises:
+        PathError: If it is no number, or not finite.
+    """
+    if not _is_number(value) or not math.isfinite(value):
+        raise PathError(f"{what} must be a finite number, got {value!r}.")
+    return float(value)
+
+
+def positive(what: str, value: Any) -> float:
+    """A number above 0.
+
+    Args:
+        what: What to call it.
+        value: As it was given.
+
+    Raises:
+        PathError: If it is no number, not finite or not above 0.
+    """
+    if not _is_number(value) or not (math.isfinite(value) and value > 0.0):
+        raise PathError(f"{what} must be a finite number above 0, got {value!r}.")
+    return float(value)
+
+
+def vector(what: str, value: Any) -> Vector:
+    """Three numbers.
+
+    Args:
+        what: What to call them.
+        value: As they were given: a tuple, a list or an array of shape (3,).
+
+    Raises:
+        PathError: If they are not three, no numbers or not finite.
+    """
+    try:
+        numbers = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != _DIMENSIONS or not np.isfinite(numbers).all():
+        raise PathError(f"{what} must be three finite numbers (x, y, z), got {value!r}.")
+    x, y, z = numbers.tolist()
+    return x, y, z
+
+
+def _is_number(value: Any) -> bool:
+    return not isinstance(value, bool) and isinstance(value, Real)
+
 
 Times = NDArray[np.float64]
 """Seconds, shape (n,)."""
@@ -24,7 +98,7 @@ CLOSED_M: Final = 1e-4
 """How far from its beginning a path may end that counts as closed, m."""
 
 
-class Motion(Protocol):
+class PathMotion(Protocol):
     """How a point moves from 0 s until its path ends, or begins again."""
 
     def derivative(self, t: Times, order: int) -> Points:
@@ -41,7 +115,7 @@ class Motion(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class FingertipPath:
     """A path that a fingertip follows; the functions of this package make them.
 
     A closed path repeats for ever, to both sides of 0 s. Another one begins at 0 s and ends at
@@ -54,7 +128,7 @@ class Path:
         closed: Whether it repeats.
     """
 
-    motion: Motion
+    motion: PathMotion
     duration_s: float
     closed: bool
 
@@ -118,7 +192,7 @@ class Path:
 
 
 def sample(
-    path: Path, hz: float, duration_s: float | None = None
+    path: FingertipPath, hz: float, duration_s: float | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times and points of a path, evenly and from end to end.
 
@@ -142,3 +216,20 @@ def sample(
     steps = max(1, math.ceil(length * hz - 1e-9))  # 1.1 s at 50 Hz are 55.00000000000001 steps.
     times = np.linspace(0.0, length, steps + 1)
     return times, path.at(times)
+
+
+FASTEST_MPS: Final = 2.0
+"""The fastest that a path may be, m/s: a fingertip 0.1 m from its knuckle turns at 20 rad/s."""
+
+
+def jumps(distance_m: float, seconds: float) -> bool:
+    """Whether that distance, m, at least 0, in that time, s, at least 0, is a jump."""
+    return distance_m > FASTEST_MPS * seconds
+
+
+def too_fast(distance_m: float, seconds: float) -> str:
+    """What to say of a jump of that distance, m, in that time, s: the end of a sentence."""
+    return (
+        f"the point moves {distance_m:.3g} m in {seconds:.3g} s, and no fingertip is faster than "
+        f"{FASTEST_MPS:g} m/s"
+    )

@@ -6,18 +6,62 @@ which it bends.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import PathError
-from shapechanger.tasks.paths.asked import Vector, finite, positive, vector
-from shapechanger.tasks.paths.harmonics import Harmonics
-from shapechanger.tasks.paths.path import Path
-from shapechanger.tasks.paths.speed import FASTEST_MPS
+from shapechanger.tasks.paths.path import (
+    FASTEST_MPS,
+    FingertipPath,
+    Points,
+    Times,
+    Vector,
+    finite,
+    positive,
+    vector,
+)
 
-__all__ = ["circle", "curve_3d", "figure_eight", "line"]
+__all__ = ["Harmonics", "circle", "curve_3d", "figure_eight", "line"]
+
+
+@dataclass(frozen=True, slots=True)
+class Harmonics:
+    """A Fourier series.
+
+    At the angle a = 2π `hz` t + `phase` the point is at
+    `centre` + Σ (cos(k a) `cosines[k - 1]` + sin(k a) `sines[k - 1]`), with k = 1, 2, …
+
+    Attributes:
+        hz: Rounds in a second, above 0.
+        phase: Where on the round it begins, rad.
+        centre: The middle over time, m.
+        cosines: What goes with the cosine of each multiple of the angle, m.
+        sines: What goes with its sine, m; as many.
+    """
+
+    hz: float
+    phase: float
+    centre: Vector
+    cosines: tuple[Vector, ...]
+    sines: tuple[Vector, ...]
+
+    def derivative(self, t: Times, order: int) -> Points:
+        """Position, velocity or acceleration, as `Motion` says, at times of any size and sign."""
+        multiples = np.arange(1.0, len(self.cosines) + 1.0)
+        rates = math.tau * self.hz * multiples  # rad/s, shape (k,).
+        # Each derivative of a sine or cosine is a quarter of a turn ahead, and grows by the rate.
+        angles = rates * t[:, None] + self.phase * multiples + order * math.pi / 2.0
+        grown = rates**order
+        points = (grown * np.cos(angles)) @ np.array(self.cosines)
+        points += (grown * np.sin(angles)) @ np.array(self.sines)
+        if order == 0:
+            points += self.centre
+        return points
+
 
 _CENTRE: Final = (0.050, 0.0, -0.045)
 _RADIAL: Final = (0.0, 1.0, 0.0)
@@ -33,7 +77,7 @@ def circle(
     hz: float = 0.5,
     normal: Vector = _RADIAL,
     phase: float = 0.0,
-) -> Path:
+) -> FingertipPath:
     """A circle, at a steady speed.
 
     It begins on its distal side (on its dorsal side, if `normal` points along x) and goes round
@@ -60,7 +104,7 @@ def figure_eight(
     hz: float = 0.5,
     normal: Vector = _RADIAL,
     phase: float = 0.0,
-) -> Path:
+) -> FingertipPath:
     """A figure eight that lies on its side: the lemniscate of Gerono.
 
     It begins where it crosses itself, towards its distal loop. Seen from where `normal` points to,
@@ -87,7 +131,7 @@ def line(
     start: Vector = (0.060, 0.0, -0.040),
     end: Vector = (0.040, 0.0, -0.050),
     hz: float = 0.5,
-) -> Path:
+) -> FingertipPath:
     """A straight line, there and back, as a pendulum goes: it rests at both ends for a moment.
 
     Args:
@@ -113,7 +157,7 @@ def curve_3d(
     hz: float = 0.5,
     normal: Vector = _RADIAL,
     phase: float = 0.0,
-) -> Path:
+) -> FingertipPath:
     """A figure eight that is bent out of its plane: a Lissajous curve in three dimensions.
 
     It is `figure_eight`, with both loops bent towards `normal` and the crossing away from it.
@@ -161,7 +205,7 @@ def _closed(
     centre: Vector,
     cosines: list[NDArray[np.float64]],
     sines: list[NDArray[np.float64]],
-) -> Path:
+) -> FingertipPath:
     """A path of oscillations, unless no finger is so fast."""
     n = max(len(cosines), len(sines))
     hz = positive(f"The hz of a {what}", hz)
@@ -172,7 +216,7 @@ def _closed(
         cosines=_padded(cosines, n),
         sines=_padded(sines, n),
     )
-    path = Path(motion, duration_s=1.0 / hz, closed=True)
+    path = FingertipPath(motion, duration_s=1.0 / hz, closed=True)
     with np.errstate(over="ignore", invalid="ignore"):
         around = motion.derivative(np.linspace(0.0, path.duration_s, 721), 1)
         fastest = np.hypot(np.hypot(around[:, 0], around[:, 1]), around[:, 2]).max()

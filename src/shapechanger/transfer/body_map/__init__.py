@@ -15,25 +15,23 @@ action       knee/motor  hip/motor  rule 'knee/motor'
 array([0.5, 0.5])
 """
 
-from shapechanger.transfer.body_map.entries import Entry
 from shapechanger.transfer.body_map.envs import MappedEnv, body_map, wrap
-from shapechanger.transfer.body_map.map import BodyMap, Row
+from shapechanger.transfer.body_map.map import BodyMap, MapRow
 from shapechanger.transfer.body_map.matching import Units
-from shapechanger.transfer.body_map.mirror import mirror
-from shapechanger.transfer.body_map.rules import Hold, Learn, Rule, RuleLike, Take, Zero
-from shapechanger.transfer.body_map.symmetry import Symmetry
+from shapechanger.transfer.body_map.rules import Copy, Hold, Learn, MapEntry, Rule, RuleLike, Zero
+from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
 __all__ = [
     "BodyMap",
-    "Entry",
+    "Copy",
     "Hold",
     "Learn",
+    "MapEntry",
+    "MapRow",
     "MappedEnv",
-    "Row",
     "Rule",
     "RuleLike",
     "Symmetry",
-    "Take",
     "Units",
     "Zero",
     "body_map",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,27 +12,79 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import MapError
-from shapechanger.layout import Layout
-from shapechanger.transfer.body_map import toml
-from shapechanger.transfer.body_map.composition import chained, inverted
-from shapechanger.transfer.body_map.entries import (
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import matching as toml
+from shapechanger.transfer.body_map.matching import Units, check_patterns, constant_rule, resolve
+from shapechanger.transfer.body_map.rules import (
+    BY_DEFAULT,
     SAME_NAME,
-    Entry,
+    Copy,
+    Gather,
+    MapEntry,
+    RuleLike,
     Side,
     SideName,
+    Zero,
     check_entries,
+    compose_rules,
+    describe_rule,
     same_meaning,
 )
-from shapechanger.transfer.body_map.gather import Gather
-from shapechanger.transfer.body_map.matching import Units, check_patterns, resolve
-from shapechanger.transfer.body_map.mirror import mirror
-from shapechanger.transfer.body_map.rules import RuleLike, Take, Zero, in_words
-from shapechanger.transfer.body_map.symmetry import Symmetry
+from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
-__all__ = ["BodyMap", "Row"]
+__all__ = ["BodyMap", "MapRow", "compose_entries", "invert_entries"]
 
 
-class Row(NamedTuple):
+def compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
+    """Replace each feature that `outer` takes by what `inner` fills it with."""
+    filled_by = {entry.feature: entry for entry in inner}
+    result: list[MapEntry] = []
+    for entry in outer:
+        if isinstance(entry.rule, Copy):
+            through = filled_by[entry.rule.feature]
+            reasons = [why for why in (entry.why, through.why) if why != SAME_NAME]
+            rule = compose_rules(entry.rule, through.rule)
+            result.append(MapEntry(entry.feature, rule, ", then ".join(reasons) or SAME_NAME))
+        else:
+            result.append(entry)
+    return tuple(result)
+
+
+def invert_entries(
+    side: Side, entries: Sequence[MapEntry], otherwise: RuleLike
+) -> tuple[MapEntry, ...]:
+    """For each feature of `side.over` a rule over `side.into`.
+
+    Raises:
+        MapError: If a feature is taken more than once, and by none of the same name.
+    """
+    takers: dict[str, list[tuple[MapEntry, float]]] = {}
+    for entry in entries:
+        if isinstance(entry.rule, Copy):
+            takers.setdefault(entry.rule.feature, []).append((entry, entry.rule.scale))
+    return tuple(
+        _backwards(feature, takers.get(feature.name, []), otherwise) for feature in side.over
+    )
+
+
+def _backwards(
+    feature: Feature, takers: list[tuple[MapEntry, float]], otherwise: RuleLike
+) -> MapEntry:
+    """The entry that gives `feature` back from what took it."""
+    if not takers:
+        return MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT)
+    namesakes = [taker for taker in takers if taker[0].feature == feature.name]
+    if len(takers) > 1 and not namesakes:
+        names = " and ".join(repr(entry.feature) for entry, _ in takers)
+        raise MapError(
+            f"{feature.name!r} is taken by {names}, and none of them bears its name: "
+            "the way back is not unique."
+        )
+    entry, scale = (namesakes or takers)[0]
+    return MapEntry(feature.name, Copy(entry.feature, 1.0 / scale), entry.why)
+
+
+class MapRow(NamedTuple):
     """One line of `BodyMap.table`.
 
     Attributes:
@@ -74,8 +126,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     target_observation: Layout
     source_action: Layout
     target_action: Layout
-    observation: tuple[Entry, ...]
-    action: tuple[Entry, ...]
+    observation: tuple[MapEntry, ...]
+    action: tuple[MapEntry, ...]
 
     def __post_init__(self) -> None:
         check_entries(self._observation_side, self.observation)
@@ -106,7 +158,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             source_action: What the source body moves.
             target_action: What the target body moves.
             rules: For a name or a glob its rule, where names are those of source observation and
-                of target action features. A rule is a `Take`, `Zero`, `Hold` or `Learn`, or one of
+                of target action features. A rule is a `Copy`, `Zero`, `Hold` or `Learn`, or one of
                 "zero", "hold" (the middle of the range), "learn" and "copy NAME"; the stars of
                 NAME are what the wildcards of the glob stood for, as in
                 `{"foot_*/motor": "copy ankle_*/motor"}`.
@@ -151,8 +203,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation=observation,
             source_action=action,
             target_action=action,
-            observation=tuple(Entry(name, Take(name), SAME_NAME) for name in observation.names),
-            action=tuple(Entry(name, Take(name), SAME_NAME) for name in action.names),
+            observation=tuple(MapEntry(name, Copy(name), SAME_NAME) for name in observation.names),
+            action=tuple(MapEntry(name, Copy(name), SAME_NAME) for name in action.names),
         )
 
     def adapt_observation(self, target_observation: ArrayLike) -> NDArray[Any]:
@@ -220,8 +272,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation=following.target_observation,
             source_action=self.source_action,
             target_action=following.target_action,
-            observation=chained(self.observation, following.observation),
-            action=chained(following.action, self.action),
+            observation=compose_entries(self.observation, following.observation),
+            action=compose_entries(following.action, self.action),
         )
 
     def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
@@ -241,8 +293,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation=self.source_observation,
             source_action=self.target_action,
             target_action=self.source_action,
-            observation=inverted(self._observation_side, self.observation, otherwise),
-            action=inverted(self._action_side, self.action, otherwise),
+            observation=invert_entries(self._observation_side, self.observation, otherwise),
+            action=invert_entries(self._action_side, self.action, otherwise),
         )
 
     def with_symmetry(self, symmetry: Symmetry) -> BodyMap:
@@ -266,21 +318,21 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             f"between it and the source {where}."
         )
 
-    def table(self) -> tuple[Row, ...]:
+    def table(self) -> tuple[MapRow, ...]:
         """Each feature that is filled, its rule in words, and where that came from."""
-        sides: tuple[tuple[SideName, tuple[Entry, ...]], ...] = (
+        sides: tuple[tuple[SideName, tuple[MapEntry, ...]], ...] = (
             ("observation", self.observation),
             ("action", self.action),
         )
         return tuple(
-            Row(name, entry.feature, in_words(entry.rule), entry.why)
+            MapRow(name, entry.feature, describe_rule(entry.rule), entry.why)
             for name, entries in sides
             for entry in entries
         )
 
     def __str__(self) -> str:
         """The table, one line for each feature."""
-        rows = [Row._fields, *self.table()]
+        rows = [MapRow._fields, *self.table()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return "\n".join(
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -322,7 +374,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         source_action: Layout,
         target_action: Layout,
     ) -> BodyMap:
-        """Build a map by the rules of a TOML text, see `shapechanger.transfer.body_map.toml`.
+        """Build a map by the rules of a TOML text, see `shapechanger.transfer.body_map.matching`.
 
         Raises:
             MapError: If the text is no TOML, or asks for what does not exist.
@@ -400,7 +452,7 @@ def _missing(
     return {pattern: rule for pattern, rule in shared.items() if pattern not in special}
 
 
-def _counted(entries: tuple[Entry, ...]) -> str:
+def _counted(entries: tuple[MapEntry, ...]) -> str:
     counts = Counter(type(entry.rule).__name__ for entry in entries)
     return ", ".join(f"{number} {kind}" for kind, number in counts.items()) or "none"
 

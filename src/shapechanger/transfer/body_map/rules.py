@@ -11,15 +11,40 @@ Hold(value=1.0)
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.errors import MapError
+from shapechanger.errors import MapError, SpaceMismatch, UnknownName
+from shapechanger.layout import Feature, Layout
 
-__all__ = ["Hold", "Learn", "Rule", "RuleLike", "Take", "Zero", "in_words", "substituted"]
+__all__ = [
+    "BY_DEFAULT",
+    "SAME_NAME",
+    "Copy",
+    "Gather",
+    "Hold",
+    "Learn",
+    "MapEntry",
+    "Rule",
+    "RuleLike",
+    "Side",
+    "SideName",
+    "Zero",
+    "check_entries",
+    "compose_rules",
+    "describe_rule",
+    "expand_template",
+    "same_meaning",
+]
 
 
-class Take(msgspec.Struct, frozen=True, tag="take", omit_defaults=True):
+class Copy(msgspec.Struct, frozen=True, tag="take", omit_defaults=True):
     """Take the number of another feature, times a scale.
 
     A partner of the same name, a copied sibling and a mirror partner are all this rule.
@@ -69,16 +94,16 @@ class Learn(msgspec.Struct, frozen=True, tag="learn"):
     """0 until it is trained: a transplanted policy gets fresh weights here."""
 
 
-Rule = Take | Zero | Hold | Learn
+Rule = Copy | Zero | Hold | Learn
 
 RuleLike = Rule | str
 """A rule, or one in words: "zero", "hold" (the middle of the range), "learn", "copy NAME"."""
 
 
-def in_words(rule: Rule) -> str:
+def describe_rule(rule: Rule) -> str:
     """The rule as a person would say it, such as `hip_4/angle times -1`."""
     match rule:
-        case Take(feature, scale):
+        case Copy(feature, scale):
             return feature if scale == 1.0 else f"{feature} times {scale:g}"
         case Zero():
             return "zero"
@@ -88,12 +113,232 @@ def in_words(rule: Rule) -> str:
             return "learn"
 
 
-def substituted(outer: Take, inner: Rule) -> Rule:
+def compose_rules(outer: Copy, inner: Rule) -> Rule:
     """The one rule that does `inner` and then scales the result as `outer` does."""
     match inner:
-        case Take(feature, scale):
-            return Take(feature, outer.scale * scale)
+        case Copy(feature, scale):
+            return Copy(feature, outer.scale * scale)
         case Hold(value):
             return Hold(outer.scale * value)
         case Zero() | Learn():
             return inner
+
+
+_TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
+
+
+def expand_template(template: str, pattern: str, name: str) -> str:
+    """Replace each `*` of `template`, in order, by what a wildcard of `pattern` fits in `name`.
+
+    Args:
+        template: A name with stars; one without is given back as it is.
+        pattern: A glob that fits `name`; `?` and `[...]` count as wildcards too.
+        name: The name that `pattern` fits.
+
+    Raises:
+        MapError: If the template has stars, and not as many as the pattern has wildcards.
+    """
+    if "*" not in template:
+        return template
+    fit = re.fullmatch("".join(map(_as_group, _TOKEN.findall(pattern))), name, re.DOTALL)
+    found = fit.groups() if fit else ()
+    if len(found) != template.count("*"):
+        raise MapError(
+            f"{template!r} must have a star for each wildcard of {pattern!r}, which has "
+            f"{len(found)}."
+        )
+    literal = template.split("*")
+    return "".join(a + b for a, b in zip(literal, (*found, ""), strict=True))
+
+
+def _as_group(token: str) -> str:
+    """One token of a glob as a regular expression; a wildcard becomes a group."""
+    if token == "*":
+        return "(.*)"
+    if token == "?":
+        return "(.)"
+    if len(token) > 1:
+        inside = token[1:-1].replace("\\", r"\\")
+        return f"([^{inside[1:]}])" if inside.startswith("!") else f"([{inside}])"
+    return re.escape(token)
+
+
+SideName = Literal["observation", "action"]
+
+SAME_NAME: Final = "same name"
+BY_DEFAULT: Final = "default"
+
+
+@dataclass(frozen=True, slots=True)
+class MapEntry:
+    """One feature and the rule that fills it.
+
+    Two entries are equal if they do the same; where a rule came from is a remark.
+
+    Attributes:
+        feature: Name of the feature that is filled.
+        rule: What fills it.
+        why: Where the rule came from: "same name", "rule 'foot_*'", "default" or "symmetry".
+    """
+
+    feature: str
+    rule: Rule
+    why: str = field(default=BY_DEFAULT, compare=False)
+
+
+class Side(NamedTuple):
+    """Which layout is filled, and from which.
+
+    Attributes:
+        name: "observation" or "action".
+        into: The layout that is filled: the source's observation, or the target's action.
+        over: The layout that it is filled from: the target's observation, or the source's action.
+    """
+
+    name: SideName
+    into: Layout
+    over: Layout
+
+    @property
+    def into_kind(self) -> str:
+        """What a feature of `into` is called in a message."""
+        owner = "source" if self.name == "observation" else "target"
+        return f"{owner} {self.name} feature"
+
+    @property
+    def over_kind(self) -> str:
+        """What a feature of `over` is called in a message."""
+        owner = "target" if self.name == "observation" else "source"
+        return f"{owner} {self.name} feature"
+
+    def taken(self, name: str) -> Feature:
+        """The feature of `over` that a rule takes.
+
+        Raises:
+            UnknownName: If there is none.
+        """
+        if name not in self.over:
+            raise UnknownName(self.over_kind, name, self.over.names)
+        return self.over[name]
+
+
+def check_entries(side: Side, entries: tuple[MapEntry, ...]) -> None:
+    """See that each feature has its one rule, in order, and that what is taken exists and fits.
+
+    Raises:
+        MapError: If a feature has no rule, is out of place, or takes a block of another shape.
+        UnknownName: If a rule takes a feature that is not there.
+    """
+    filled = tuple(entry.feature for entry in entries)
+    if filled != side.into.names:
+        raise MapError(
+            f"Each {side.into_kind} needs one rule, in the order of the layout: "
+            f"{', '.join(side.into.names)}; the rules given are for {', '.join(filled) or 'none'}."
+        )
+    for feature, entry in zip(side.into, entries, strict=True):
+        if isinstance(entry.rule, Copy):
+            taken = side.taken(entry.rule.feature)
+            if taken.shape != feature.shape:
+                raise MapError(
+                    f"{feature.name!r} has the shape {feature.shape} and cannot take "
+                    f"{taken.name!r}, which has the shape {taken.shape}."
+                )
+
+
+def same_meaning(left: Layout, right: Layout) -> str:
+    """Empty if the numbers of both layouts mean the same; otherwise where they first differ.
+
+    Ranges may differ, since a longer leg only widens them; names, order, units, shapes and gains
+    may not.
+    """
+    for place, (a, b) in enumerate(zip(left, right, strict=False)):
+        for aspect in ("name", "unit", "shape", "gain", "gain_unit"):
+            ours, theirs = getattr(a, aspect), getattr(b, aspect)
+            if ours != theirs:
+                return f"feature {place} is {a} and {b}, whose {aspect} is {ours!r} and {theirs!r}"
+    if len(left) != len(right):
+        return f"one has {len(left)} features and the other {len(right)}"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Gather:
+    """What fills each number of a flat vector.
+
+    A number that is taken with scale 1 is copied to the last bit.
+
+    Attributes:
+        kind: What the vectors that go in are, for messages.
+        n_over: How many numbers go in.
+        rows: Places that are taken from the input, shape (n_taken,).
+        columns: For each of them the place in the input, shape (n_taken,).
+        scale: For each of them the factor, shape (n_taken,).
+        offset: The constant at every place, 0 where it is taken, shape (n_into,).
+    """
+
+    kind: str
+    n_over: int
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    scale: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, side: Side, entries: Sequence[MapEntry]) -> Gather:
+        """The arithmetic of one half of a map."""
+        into, over = side.into.slices, side.over.slices
+        rows: list[int] = []
+        columns: list[int] = []
+        scale: list[float] = []
+        offset = np.zeros(side.into.size)
+        for entry in entries:
+            place = into[entry.feature]
+            match entry.rule:
+                case Copy(feature, factor):
+                    taken = over[feature]
+                    rows += range(place.start, place.stop)
+                    columns += range(taken.start, taken.stop)
+                    scale += [factor] * (place.stop - place.start)
+                case Hold(value):
+                    offset[place] = value
+                case Zero() | Learn():
+                    pass
+        return cls(
+            kind=side.over_kind,
+            n_over=side.over.size,
+            rows=np.asarray(rows, dtype=np.intp),
+            columns=np.asarray(columns, dtype=np.intp),
+            scale=np.asarray(scale, dtype=np.float64),
+            offset=offset,
+        )
+
+    def __call__(self, values: ArrayLike) -> NDArray[Any]:
+        """Fill a vector for each vector given.
+
+        Args:
+            values: Shape (..., n_over).
+
+        Returns:
+            A new array of shape (..., n_into): float32 for float32, float64 for float64 and for
+            integers that float32 cannot hold.
+
+        Raises:
+            SpaceMismatch: If the last axis has another length.
+        """
+        given = np.asarray(values)
+        if given.shape[-1:] != (self.n_over,):
+            raise SpaceMismatch(
+                f"The layout holds {self.n_over} numbers, one or more to a {self.kind}: "
+                f"the last axis must have that length, and the shape given is {given.shape}."
+            )
+        dtype = np.result_type(given.dtype, np.float32)
+        filled = np.empty((*given.shape[:-1], self.offset.size), dtype)
+        filled[...] = self.offset
+        filled[..., self.rows] = given[..., self.columns] * self.scale
+        return filled
+
+    def matrix(self) -> NDArray[np.float64]:
+        """The linear part, shape (n_into, n_over)."""
+        dense = np.zeros((self.offset.size, self.n_over))
+        dense[self.rows, self.columns] = self.scale
+        return dense

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Final
 
 import msgspec
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map.entries import SAME_NAME, Entry, SideName, same_meaning
-from shapechanger.transfer.body_map.rules import Take
+from shapechanger.transfer.body_map.rules import (
+    SAME_NAME,
+    Copy,
+    MapEntry,
+    SideName,
+    expand_template,
+    same_meaning,
+)
 
-__all__ = ["Symmetry"]
+__all__ = ["Symmetry", "mirror"]
 
 
 class Symmetry(msgspec.Struct, frozen=True):
@@ -33,8 +41,8 @@ class Symmetry(msgspec.Struct, frozen=True):
 
     observation_layout: Layout
     action_layout: Layout
-    observation: tuple[Take, ...]
-    action: tuple[Take, ...]
+    observation: tuple[Copy, ...]
+    action: tuple[Copy, ...]
 
     def __post_init__(self) -> None:
         _check("observation", self.observation_layout, self.observation)
@@ -46,8 +54,8 @@ class Symmetry(msgspec.Struct, frozen=True):
         observation_layout: Layout,
         action_layout: Layout,
         *,
-        observation: Mapping[str, Take] | None = None,
-        action: Mapping[str, Take] | None = None,
+        observation: Mapping[str, Copy] | None = None,
+        action: Mapping[str, Copy] | None = None,
     ) -> Symmetry:
         """The symmetry in which some features change; the others stay as they are.
 
@@ -69,12 +77,12 @@ class Symmetry(msgspec.Struct, frozen=True):
         )
 
     @property
-    def observation_entries(self) -> tuple[Entry, ...]:
+    def observation_entries(self) -> tuple[MapEntry, ...]:
         """One entry for each observation feature, as in a body map."""
         return _entries(self.observation_layout, self.observation)
 
     @property
-    def action_entries(self) -> tuple[Entry, ...]:
+    def action_entries(self) -> tuple[MapEntry, ...]:
         """One entry for each action feature, as in a body map."""
         return _entries(self.action_layout, self.action)
 
@@ -95,7 +103,7 @@ class Symmetry(msgspec.Struct, frozen=True):
         )
 
 
-def _check(side: SideName, layout: Layout, takes: tuple[Take, ...]) -> None:
+def _check(side: SideName, layout: Layout, takes: tuple[Copy, ...]) -> None:
     if len(takes) != len(layout):
         raise MapError(
             f"A symmetry needs {len(layout)} {side} rules, one a feature: {len(takes)} given."
@@ -141,22 +149,117 @@ def _close(a: float, b: float) -> bool:
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
 
 
-def _completed(layout: Layout, changes: Mapping[str, Take]) -> tuple[Take, ...]:
+def _completed(layout: Layout, changes: Mapping[str, Copy]) -> tuple[Copy, ...]:
     for name in changes:
         if name not in layout:
             raise UnknownName("feature", name, layout.names)
-    return tuple(changes.get(name, Take(name)) for name in layout.names)
+    return tuple(changes.get(name, Copy(name)) for name in layout.names)
 
 
-def _undone(layout: Layout, takes: tuple[Take, ...]) -> tuple[Take, ...]:
+def _undone(layout: Layout, takes: tuple[Copy, ...]) -> tuple[Copy, ...]:
     back = {
-        take.feature: Take(name, take.scale) for name, take in zip(layout.names, takes, strict=True)
+        take.feature: Copy(name, take.scale) for name, take in zip(layout.names, takes, strict=True)
     }
     return tuple(back[name] for name in layout.names)
 
 
-def _entries(layout: Layout, takes: tuple[Take, ...]) -> tuple[Entry, ...]:
+def _entries(layout: Layout, takes: tuple[Copy, ...]) -> tuple[MapEntry, ...]:
     return tuple(
-        Entry(name, take, SAME_NAME if take == Take(name) else "symmetry")
+        MapEntry(name, take, SAME_NAME if take == Copy(name) else "symmetry")
         for name, take in zip(layout.names, takes, strict=True)
     )
+
+
+# The last part of a feature's name, where it is a component along an axis of the world.
+# Of an inertia the products with y turn; the cosine of an angle is that of the opposite.
+_TURNED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz", "xy", "yz", "my"})
+_KEPT: Final = frozenset(
+    {"x", "z", "vx", "vz", "fx", "fz", "wy", "ty", "qw", "qy", "xx", "yy", "zz", "xz", "mx", "mz"}
+    | {"cos"}
+)
+
+
+def mirror(
+    observation_layout: Layout,
+    action_layout: Layout,
+    *,
+    swap: Mapping[str, str] | None = None,
+    flip: Iterable[str] = (),
+) -> Symmetry:
+    """The symmetry that exchanges left and right.
+
+    The element of a feature is what stands before the first "/" of its name.
+
+    Args:
+        observation_layout: What the body senses.
+        action_layout: What the body moves.
+        swap: For an element on one side the one on the other, such as `{"hip_1": "hip_4"}`, or a
+            glob, such as `{"*_1": "*_4"}`; each pair is named once or both ways. An element that
+            is not named stays where it is.
+        flip: Globs of elements whose coordinate changes its sign, such as the hinges about a
+            vertical axis; both elements of a pair or neither. Components along axes of the world,
+            such as `torso/vy`, need no mention.
+
+    Raises:
+        MapError: If the pairs contradict each other, one element of a pair flips and the other
+            does not, a feature is a block, or the ranges of a pair are no mirror images.
+        UnknownName: If an element or the partner of a feature is not there.
+    """
+    features = (*observation_layout, *action_layout)
+    elements = tuple(dict.fromkeys(_element(feature) for feature in features))
+    partners = _both_ways(swap or {}, elements)
+    flipped = frozenset(name for glob in flip for name in _fitting(glob, elements))
+    for element, partner in partners.items():
+        if (element in flipped) != (partner in flipped):
+            raise MapError(
+                f"{element!r} and {partner!r} mirror each other: flip both of them or neither."
+            )
+    return Symmetry(
+        observation_layout,
+        action_layout,
+        tuple(_reflected(feature, partners, flipped) for feature in observation_layout),
+        tuple(_reflected(feature, partners, flipped) for feature in action_layout),
+    )
+
+
+def _element(feature: Feature) -> str:
+    return feature.name.split("/", 1)[0]
+
+
+def _both_ways(swap: Mapping[str, str], elements: tuple[str, ...]) -> dict[str, str]:
+    partners: dict[str, str] = {}
+    for glob, template in swap.items():
+        for element in _fitting(glob, elements):
+            other = template if template in elements else expand_template(template, glob, element)
+            for name, partner in ((element, other), (other, element)):
+                if name not in elements:
+                    raise UnknownName("element", name, elements)
+                if partners.setdefault(name, partner) != partner:
+                    raise MapError(
+                        f"{name!r} is to mirror both {partners[name]!r} and {partner!r}: "
+                        "choose one."
+                    )
+    return partners
+
+
+def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
+    """The elements that bear this name or fit this glob."""
+    fits = [glob] if glob in elements else [e for e in elements if fnmatch.fnmatchcase(e, glob)]
+    if not fits:
+        raise UnknownName("element", glob, elements)
+    return fits
+
+
+def _reflected(feature: Feature, partners: Mapping[str, str], flipped: frozenset[str]) -> Copy:
+    """What the mirrored body has in the place of `feature`."""
+    if feature.shape:
+        raise MapError(f"{feature.name!r} is a block of numbers, which no mirror turns by name.")
+    element, *path = feature.name.split("/", 1)
+    component = feature.name.rsplit("/", 1)[-1]
+    if component in _KEPT:
+        sign = 1.0
+    elif component in _TURNED or element in flipped:
+        sign = -1.0
+    else:
+        sign = 1.0
+    return Copy("/".join((partners.get(element, element), *path)), sign)

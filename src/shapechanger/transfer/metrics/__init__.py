@@ -8,37 +8,33 @@ The unit of everything statistical here is the seed, that is one training run. E
 share a policy, and counting them as independent would make every interval too narrow.
 """
 
-from shapechanger.transfer.metrics.curves import LearningCurves, in_total_steps
-from shapechanger.transfer.metrics.forward_transfer import LEAST_HEADROOM, forward_transfer
+from shapechanger.transfer.metrics.curves import LearningCurves, Reference, in_total_steps
 from shapechanger.transfer.metrics.intervals import (
     Estimate,
     estimate_difference,
     estimate_ratio,
     undefined,
 )
-from shapechanger.transfer.metrics.scores import Reference
-from shapechanger.transfer.metrics.summary import (
+from shapechanger.transfer.metrics.measures import (
     DEFAULT_THRESHOLDS,
+    MIN_HEADROOM,
     Measures,
+    ReachTimes,
     Summary,
-    summarise,
-)
-from shapechanger.transfer.metrics.taylor_stone import (
+    TimeToThreshold,
     asymptotic_gain,
     auc_ratio,
+    forward_transfer,
     jumpstart,
-    total_reward_gain,
-)
-from shapechanger.transfer.metrics.thresholds import (
-    ReachTimes,
-    TimeToThreshold,
     steps_to_reach,
+    summarise,
     time_to_threshold,
+    total_reward_gain,
 )
 
 __all__ = [
     "DEFAULT_THRESHOLDS",
-    "LEAST_HEADROOM",
+    "MIN_HEADROOM",
     "Estimate",
     "LearningCurves",
     "Measures",

@@ -17,7 +17,7 @@ except ImportError as error:
 
     raise MissingExtra("torch and stable-baselines3", "learn") from error
 
+from shapechanger.transfer.transplant.layers import transplant_normalisation
 from shapechanger.transfer.transplant.model import transplant
-from shapechanger.transfer.transplant.normalisation import transplant_normalisation
 
 __all__ = ["transplant", "transplant_normalisation"]

@@ -2,43 +2,142 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar, cast
+import copy
+import inspect
+from typing import Any, Final, TypeVar, cast
 
 import gymnasium as gym
 import numpy as np
 import torch
 from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.buffers import NStepReplayBuffer
+from stable_baselines3.common.distributions import DiagGaussianDistribution
+from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
 from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.torch_layers import (
+    BaseFeaturesExtractor,
+    FlattenExtractor,
+    MlpExtractor,
+)
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
-from stable_baselines3.sac.policies import SACPolicy
+from stable_baselines3.sac.policies import Actor, SACPolicy
 
 from shapechanger.errors import TransplantError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.transplant.actions import (
-    Outputs,
-    gaussian_outputs,
-    judged_actions,
-    squashed_outputs,
-)
-from shapechanger.transfer.transplant.networks import Edges, first_linear, moved_parameters
-from shapechanger.transfer.transplant.normalisation import (
+from shapechanger.transfer.transplant.layers import (
     Affine,
+    Edges,
+    PolicyOutputs,
     Scaling,
+    critic_actions,
+    first_linear,
+    gaussian_outputs,
+    move_parameters,
     observation_affine,
+    squashed_outputs,
     transplant_normalisation,
 )
-from shapechanger.transfer.transplant.settings import new_model
-from shapechanger.transfer.transplant.supported import check_supported
 
-__all__ = ["transplant"]
+__all__ = ["check_supported", "new_model", "transplant"]
+
+Model = TypeVar("Model", PPO, SAC)
+
+_GIVEN_ANEW: Final = frozenset({"self", "policy", "env", "seed", "device", "_init_setup_model"})
+# Arguments that a model keeps under another name.
+_KEPT_AS: Final = {"stats_window_size": "_stats_window_size"}
+
+
+def new_model(
+    source: Model,
+    env: gym.Env[Any, Any] | VecEnv,
+    seed: int,
+    device: torch.device | str,
+    changes: dict[str, Any],
+) -> Model:
+    """An untrained model of the class and the settings of `source`.
+
+    Args:
+        source: The model whose settings are wanted.
+        env: What the new one is to learn on.
+        seed: Its seed.
+        device: Where it lives.
+        changes: Arguments of the class that are to differ.
+
+    Raises:
+        TransplantError: If the source explores by action noise and nobody says what becomes of it.
+    """
+    kept: dict[str, Any] = {}
+    for name in inspect.signature(type(source).__init__).parameters:
+        attribute = _KEPT_AS.get(name, name)
+        if name not in _GIVEN_ANEW and hasattr(source, attribute):
+            kept[name] = getattr(source, attribute)
+    if kept.get("action_noise") is not None and "action_noise" not in changes:
+        raise TransplantError(
+            "The source model adds action noise, which is made for the shape of its actions: say "
+            "what the target is to have, as in transplant(..., action_noise=None)."
+        )
+    kept["policy_kwargs"] = copy.deepcopy(source.policy_kwargs)
+    if isinstance(source, SAC):
+        _undo_set_up(source, kept)
+    kept |= {"policy": source.policy_class, "env": env, "seed": seed, "device": device}
+    return type(source)(**(kept | changes))
+
+
+def _undo_set_up(source: SAC, kept: dict[str, Any]) -> None:
+    """What "auto" has become in a model turns back into "auto", since it depends on the body."""
+    if source.target_entropy == -float(cast("Any", source).action_space.shape[0]):
+        kept["target_entropy"] = "auto"
+    if source.replay_buffer_class is NStepReplayBuffer:
+        kept["replay_buffer_class"] = None
+        own = {"n_steps", "gamma"}
+        buffer = source.replay_buffer_kwargs
+        kept["replay_buffer_kwargs"] = {k: v for k, v in buffer.items() if k not in own}
+
+
+def check_supported(model: object) -> None:
+    """Refuse a model whose weights cannot be moved.
+
+    Raises:
+        TransplantError: If it is not PPO or SAC with an `MlpPolicy` on flat observations and plain
+            Gaussian exploration.
+    """
+    problem = _problem(model)
+    if problem:
+        raise TransplantError(
+            f"{problem} What can be transplanted is PPO or SAC with an MlpPolicy, on flat "
+            "observations and continuous actions, without gSDE."
+        )
+
+
+def _problem(model: object) -> str:
+    """What stands in the way, as a sentence; empty if nothing does."""
+    if not isinstance(model, PPO | SAC):
+        return f"This model is {type(model).__name__}."
+    extractors = [m for m in model.policy.modules() if isinstance(m, BaseFeaturesExtractor)]
+    others = [type(m).__name__ for m in extractors if type(m) is not FlattenExtractor]
+    if others:
+        return f"This policy extracts features with {others[0]}."
+    if model.use_sde:
+        return "This policy explores with gSDE."
+    if isinstance(model, SAC):
+        policy = model.policy
+        parts = (policy.actor, Actor), (policy.critic, ContinuousCritic)
+    else:
+        policy = model.policy
+        parts = (
+            (policy.mlp_extractor, MlpExtractor),
+            (policy.action_dist, DiagGaussianDistribution),
+        )
+    for part, expected in parts:
+        if type(part) is not expected:
+            return f"This policy has a {type(part).__name__} in place of a {expected.__name__}."
+    return ""
+
 
 # What VecNormalize does unless it is told otherwise.
 _EPSILON = 1e-8
 _CLIP = 10.0
-
-Model = TypeVar("Model", PPO, SAC)
 
 
 def transplant(
@@ -102,11 +201,11 @@ def transplant(
         model.get_vec_normalize_env(),
     )
     if isinstance(source_model, SAC):
-        judged = judged_actions(body_map, outputs, source_space)
+        judged = critic_actions(body_map, outputs, source_space)
         edges = _sac_edges(source_model.policy, sensed, outputs, judged)
     else:
         edges = _ppo_edges(source_model.policy, sensed, outputs)
-    parameters = moved_parameters(source_model.policy, model.policy, edges)
+    parameters = move_parameters(source_model.policy, model.policy, edges)
     model.policy.to(dtype=next(source_model.policy.parameters()).dtype)
     model.policy.load_state_dict(parameters)
     if isinstance(source_model, SAC) and isinstance(model, SAC):
@@ -156,7 +255,7 @@ def _statistics(source: RunningMeanStd | VecNormalize | None) -> RunningMeanStd 
     return source
 
 
-def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: Outputs) -> Edges:
+def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs) -> Edges:
     """Where the policy and the value network of PPO meet the body."""
     extractor = policy.mlp_extractor
     edges = Edges(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
@@ -168,7 +267,7 @@ def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: Outputs) -> E
     return edges
 
 
-def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: Outputs, judged: Affine) -> Edges:
+def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine) -> Edges:
     """Where the actor and the critics of SAC meet the body; a critic senses and judges."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
     edges = Edges(outputs=dict(heads))

@@ -9,15 +9,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.embodiments.finger import (
+from shapechanger.bodies.finger import (
     JOINTS,
     TENDONS,
     FingerParameters,
     build_finger,
     drive_of,
 )
-from shapechanger.embodiments.finger.anatomy import JOINT_RANGE, JOINT_REST
-from shapechanger.embodiments.finger.model import FINGERTIP
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST
+from shapechanger.bodies.finger.model import FINGERTIP
 from shapechanger.errors import RobotError
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 

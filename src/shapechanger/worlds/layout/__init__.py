@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from shapechanger.worlds.layout.courses import WORLDS, lay_out
-from shapechanger.worlds.layout.raster import occupancy
-from shapechanger.worlds.layout.start import start_pose
+from shapechanger.worlds.layout.courses import WORLDS, lay_out, occupancy, start_pose
 
 __all__: Final[list[str]] = ["WORLDS", "lay_out", "occupancy", "start_pose"]

@@ -8,22 +8,34 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.course import Surface, Wall
-from shapechanger.worlds.layout.chance import picked
-from shapechanger.worlds.layout.lines import (
+from shapechanger.worlds.course import Course, Surface, Wall
+from shapechanger.worlds.layout.furniture import (
+    Furniture,
+    Lane,
+    Scatter,
+    Size,
+    scattered,
+    sunlit,
+    weighted_choice,
+)
+from shapechanger.worlds.layout.geometry import (
     arcs,
     at,
+    cross_each_other,
+    grow_cells,
     length,
     normals,
     resampled,
+    scale_grid,
+    segments,
     smoothed,
     spaced,
     tangent_radii,
+    trace_outline,
     turns,
 )
-from shapechanger.worlds.layout.loops import grown, outline, spread
 
-__all__ = ["Channel", "Stretch", "banks", "dug"]
+__all__ = ["QUAY_M", "BankKind", "ChannelShape", "banks", "dug", "harbour", "yard"]
 
 _FINE: Final = 1024
 """Points of the line while it is being shaped."""
@@ -36,7 +48,7 @@ _WIND_RAD: Final = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class ChannelShape:
     """Bounds of a lane's shape, m.
 
     Attributes:
@@ -59,7 +71,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class BankKind:
     """What a piece of the bank may be.
 
     Attributes:
@@ -80,7 +92,7 @@ class Stretch:
 
 
 def dug(
-    rng: np.random.Generator, shape: Channel, spacing: float
+    rng: np.random.Generator, shape: ChannelShape, spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """One attempt at a middle line, (n, 2), m, and its distance from the banks, (n,), m.
 
@@ -88,10 +100,10 @@ def dug(
 
     None where chance made one that is too tight, or too near to itself.
     """
-    loop = outline(grown(rng, int(rng.integers(shape.cells[0], shape.cells[1] + 1))))
+    loop = trace_outline(grow_cells(rng, int(rng.integers(shape.cells[0], shape.cells[1] + 1))))
     if loop is None:
         return None
-    points = spread(rng, loop, *shape.pitch)
+    points = scale_grid(rng, loop, *shape.pitch)
     points += rng.normal(0.0, 0.1 * shape.pitch[0], size=points.shape)
     if rng.random() < 0.5:
         points = points[::-1]
@@ -138,7 +150,7 @@ def banks(
     rng: np.random.Generator,
     route: NDArray[np.float64],
     half_width: NDArray[np.float64],
-    kinds: tuple[Stretch, ...],
+    kinds: tuple[BankKind, ...],
 ) -> tuple[tuple[Wall, ...], tuple[Wall, ...]]:
     """Walls at the left hand and at the right hand of a lane, each a closed line."""
     aside = normals(route) * half_width[:, None]
@@ -147,17 +159,17 @@ def banks(
 
 
 def _bank(
-    rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[Stretch, ...]
+    rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[BankKind, ...]
 ) -> tuple[Wall, ...]:
     """Walls along a closed line, with the lane at the left hand."""
     knots = arcs(line)
     shares = [kind.share for kind in kinds]
     ends: list[float] = []
-    chosen: list[Stretch] = []
+    chosen: list[BankKind] = []
     heights: list[float] = []
     s = 0.0
     while s < knots[-1]:
-        kind = kinds[picked(rng, shares)]
+        kind = kinds[weighted_choice(rng, shares)]
         count = max(1, round(float(rng.uniform(*kind.run)) / kind.piece))
         height = float(rng.uniform(*kind.height))
         for _ in range(count):
@@ -183,4 +195,115 @@ def _bank(
             kind.surface,
         )
         for i, kind in enumerate(chosen)
+    )
+
+
+_SHAPE: Final = ChannelShape(
+    pitch=(5.5, 8.0),
+    cells=(3, 5),
+    blur=(2.1, 4.5),
+    length=(40.0, 88.0),
+    radius=1.9,
+    half_width=(1.6, 2.45),
+    wall=0.25,
+)
+_GAP_M = 1.2
+_SPACING_M = 0.1
+
+_BANKS = (
+    BankKind("hedge", 0.4, (3.0, 12.0), 1.0, (0.9, 1.9)),
+    BankKind("fence", 0.25, (3.0, 10.0), 1.3, (0.9, 1.6)),
+    BankKind("brick", 0.2, (2.5, 8.0), 1.2, (1.2, 2.2)),
+    BankKind("shed", 0.15, (2.0, 4.0), 1.6, (2.1, 2.5)),
+)
+
+_THINGS = (
+    Scatter(Size("cone", (0.22, 0.34), (0.22, 0.34), (0.4, 0.7)), 0.3),
+    Scatter(Size("crate", (0.35, 0.6), (0.3, 0.45), (0.25, 0.5)), 0.2),
+    Scatter(Size("bin", (0.4, 0.55), (0.4, 0.55), (0.8, 1.1)), 0.15),
+    Scatter(Size("post", (0.08, 0.16), (0.08, 0.16), (0.7, 1.2)), 0.15),
+    Scatter(Size("tree", (0.2, 0.4), (0.2, 0.4), (2.5, 4.0)), 0.2),
+)
+
+
+def yard(rng: np.random.Generator, seed: int) -> Course | None:
+    """One attempt at a course; None where chance made none that fits."""
+    shape = dug(rng, _SHAPE, _SPACING_M)
+    if shape is None:
+        return None
+    lane = Lane(shape[0], *banks(rng, *shape, _BANKS))
+    if cross_each_other(segments((*lane.left, *lane.right))):
+        return None
+    half_width = lane.half_width()
+    if half_width.min() < 1.5 or half_width.max() > 2.5:
+        return None
+    furniture = Furniture(lane, half_width, _GAP_M)
+    scattered(rng, furniture, _THINGS, per_m=float(rng.uniform(0.12, 0.4)))
+    return Course(
+        world="yard",
+        seed=seed,
+        route=lane.route,
+        half_width=half_width,
+        walls=(*lane.left, *lane.right),
+        things=tuple(furniture.things),
+        lamps=sunlit(rng, lane.route, half_width),
+        ceiling_m=0.0,
+        gap_m=furniture.gap_m,
+    )
+
+
+QUAY_M: Final = 0.6
+"""Height of a quay above the water."""
+
+_HARBOUR_SHAPE: Final = ChannelShape(
+    pitch=(7.0, 10.5),
+    cells=(3, 4),
+    blur=(2.6, 6.0),
+    length=(48.0, 88.0),
+    radius=2.6,
+    half_width=(2.15, 3.4),
+    wall=0.45,
+)
+_HARBOUR_GAP_M = 1.6
+_MOST_CURRENT_MPS = 0.15
+
+_HARBOUR_BANKS = (
+    BankKind("quay", 0.7, (5.0, 16.0), 2.0, (QUAY_M, QUAY_M)),
+    BankKind("rock", 0.3, (2.5, 8.0), 0.8, (0.35, 0.9), rough=0.35),
+)
+
+_HARBOUR_THINGS = (
+    Scatter(Size("buoy", (0.35, 0.6), (0.35, 0.6), (0.5, 0.9)), 0.4),
+    Scatter(Size("crate", (0.4, 0.7), (0.4, 0.6), (0.25, 0.4)), 0.25),
+    # Dinghies lie along the quay.
+    Scatter(Size("dinghy", (1.4, 2.0), (0.7, 0.9), (0.4, 0.5)), 0.35, moored=0.75),
+)
+
+
+def harbour(rng: np.random.Generator, seed: int) -> Course | None:
+    """One attempt at a course; None where chance made none that fits."""
+    shape = dug(rng, _HARBOUR_SHAPE, _SPACING_M)
+    if shape is None:
+        return None
+    lane = Lane(shape[0], *banks(rng, *shape, _HARBOUR_BANKS))
+    if cross_each_other(segments((*lane.left, *lane.right))):
+        return None
+    half_width = lane.half_width()
+    if half_width.min() < 2.0 or half_width.max() > 3.5:
+        return None
+    furniture = Furniture(lane, half_width, _HARBOUR_GAP_M)
+    scattered(rng, furniture, _HARBOUR_THINGS, per_m=float(rng.uniform(0.08, 0.25)))
+    speed = float(rng.uniform(0.0, _MOST_CURRENT_MPS))
+    where = float(rng.uniform(-np.pi, np.pi))
+    return Course(
+        world="harbour",
+        seed=seed,
+        route=lane.route,
+        half_width=half_width,
+        walls=(*lane.left, *lane.right),
+        things=tuple(furniture.things),
+        lamps=sunlit(rng, lane.route, half_width),
+        ceiling_m=0.0,
+        gap_m=furniture.gap_m,
+        current_mps=(speed * float(np.cos(where)), speed * float(np.sin(where))),
     )

@@ -1,0 +1,59 @@
+"""The ant: a sphere on four legs, each with a hip and an ankle.
+
+Model: `ant.xml` of Gymnasium (MIT). Bodies: those of the 2017 Shapechanger release, whose masses,
+inertias, ranges, gears and lengths the edits below give to the last bit. The release's third
+segments had no motors; here they have, and `ExtendedAntPassive` is the body without.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from shapechanger.bodies.families import Family
+from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeight, Stretch
+
+__all__ = ["ANT", "LEGS"]
+
+# The legs in the order of the model's motors, and the quarter of the plane that each points into:
+# signs of x and y. The ankles of legs 2 and 3 turn the other way round.
+LEGS: Final = {4: (1, -1), 1: (1, 1), 2: (-1, 1), 3: (-1, -1)}
+_TURNS_BACK: Final = (2, 3)
+
+# The third segment of the 2017 release (extended_ant.xml).
+_FOOT_REACH_M: Final = 0.6  # along x and along y
+_FOOT_RANGE_DEG: Final = (30.0, 70.0)
+_FOOT_GEAR_NM: Final = 150.0
+_ANKLE_RANGE_DEG: Final = (30.0, 50.0)
+_EXTENDED_START_HEIGHT_M: Final = 1.25
+
+
+def _extended(gear: float | None) -> Body:
+    """The ant with a third segment on each leg, with motors of this gear (N·m) or without."""
+    feet: list[AddSegment] = []
+    ankles: list[JointRange] = []
+    for leg, (x, y) in LEGS.items():
+        foot, ankle = _range(leg, _FOOT_RANGE_DEG), _range(leg, _ANKLE_RANGE_DEG)
+        end = (x * _FOOT_REACH_M, y * _FOOT_REACH_M, 0.0)
+        feet.append(AddSegment(f"shank_{leg}", f"foot_{leg}", end, *foot, gear))
+        ankles.append(JointRange(f"ankle_{leg}", *ankle))
+    return (*feet, *ankles, StartHeight("torso", _EXTENDED_START_HEIGHT_M))
+
+
+def _range(leg: int, degrees: tuple[float, float]) -> tuple[float, float]:
+    """The range of a leg's joint, rad, from that of the legs that turn forwards."""
+    lower, upper = (math.radians(x) for x in degrees)
+    return (-upper, -lower) if leg in _TURNS_BACK else (lower, upper)
+
+
+ANT: Final = Family(
+    name="Ant",
+    bodies={
+        "Ant": (),
+        "AmputatedAnt": (Cut("shank_4", 0.25),),
+        "BigAnt": (Stretch("shank_*", 2.0),),
+        "ExtendedAnt": _extended(_FOOT_GEAR_NM),
+        "ExtendedAntPassive": _extended(None),
+    },
+    bodies_by_joint={f"ankle_{leg}": f"shank_{leg}" for leg in LEGS},
+)

@@ -1,0 +1,273 @@
+"""The finger as a MuJoCo model: four hinges, and tendons that carry the physics."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.bodies.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    JOINTS,
+    PHALANGES,
+    PHALANX_LENGTH_M,
+    PHALANX_RADIUS_M,
+    TENDONS,
+    TISSUE_DENSITY,
+)
+from shapechanger.bodies.finger.looks import (
+    METACARPAL,
+    THICKEST_M,
+    THINNEST_M,
+    add_anatomy,
+    courses_of,
+)
+from shapechanger.bodies.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.bodies.finger.tensions import TendonDrive, drive_of
+
+__all__ = ["FINGERTIP", "SIM_DT", "SIM_DT_STRETCHED", "TARGET", "FingerFigure", "build_finger"]
+
+SIM_DT: Final = 0.002
+"""Step of the simulation, s, at which nothing diverges under any command."""
+SIM_DT_STRETCHED: Final = 0.0005
+"""The same with tendons that stretch: a light spool on a stiff spring rings a hundred times a
+second and more."""
+
+FINGERTIP: Final = "fingertip"
+"""Name of the site at the end of the distal phalanx."""
+TARGET: Final = "target"
+"""Name of the body that marks where the fingertip should be, for pictures."""
+
+# Of critical damping, what a stretched tendon has: cords and tissue ring, but not for long.
+_CABLE_DAMPING_RATIO: Final = 0.3
+_SKIN: Final = (0.87, 0.68, 0.58, 1.0)
+_HAND: Final = (0.75, 0.57, 0.48, 1.0)
+# As large as what counts as reached: a fingertip within it is where it should be.
+_MARK: Final = (0.10, 0.55, 0.25, 0.45)
+_MARK_RADIUS_M: Final = 0.005
+# A metacarpal of two thirds of a palm, for pictures only.
+_METACARPAL_M: Final = 0.060
+_FLEX: Final = (0.0, 1.0, 0.0)
+_ABDUCT: Final = (0.0, 0.0, 1.0)
+# The axis of each joint, and the phalanx that it moves.
+_HINGES: Final = ((0, _FLEX), (0, _ABDUCT), (1, _FLEX), (2, _FLEX))
+# What a joint is held in its range with: a time constant, s, the smallest that is stable, and a
+# ratio of critical damping; and a constraint that hardly gives under full tension.
+_LIMIT: Final = (2.0 * SIM_DT, 1.0)
+_LIMIT_IMPEDANCE: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
+
+
+def build_finger(
+    parameters: FingerParameters, drive: TendonDrive, *, anatomy: bool = False
+) -> mujoco.MjSpec:
+    """A finger that `drive` moves.
+
+    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`. Tendons have the
+    names of `TENDONS`; their length is that beyond the straight finger's, m. Where tendons stretch,
+    each has a motor, a slide joint called `FDP/motor` and so on, whose travel winds it up.
+
+    Args:
+        parameters: Of the finger.
+        drive: What its motors do.
+        anatomy: Whether to show bones and the tendons' courses, for pictures; it moves alike.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = "finger"
+    spec.option.timestep = SIM_DT_STRETCHED if parameters.gives else SIM_DT
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    spec.visual.headlight.ambient[:] = (0.4, 0.4, 0.4)
+    spec.visual.headlight.diffuse[:] = (0.5, 0.5, 0.5)
+    spec.stat.center[:] = (0.02, 0.0, -0.02)
+    spec.stat.extent = 0.15
+    _add_bones(spec, parameters)
+    for i, name in enumerate(TENDONS):
+        path = _add_path(spec, name, parameters.moment_arms[i])
+        if parameters.tendon_stiffness is None:
+            path.armature = parameters.motor_kg
+            path.damping = [parameters.tendon_damping, 0.0, 0.0]
+            path.frictionloss = parameters.tendon_friction
+            _add_motor(spec, name, parameters, drive, i, mujoco.mjtTrn.mjTRN_TENDON, name, -1.0)
+        else:
+            joint = _add_spool(spec, name, parameters)
+            _add_cable(spec, name, parameters.moment_arms[i], joint, parameters)
+            _add_motor(spec, name, parameters, drive, i, mujoco.mjtTrn.mjTRN_JOINT, joint, 1.0)
+    mark = spec.worldbody.add_body(name=TARGET, mocap=True)
+    mark.add_geom(
+        name=TARGET, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_MARK_RADIUS_M, 0, 0], rgba=_MARK
+    )
+    if anatomy:
+        add_anatomy(spec)
+    return spec
+
+
+def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    spec.worldbody.add_geom(
+        name=METACARPAL,
+        type=capsule,
+        size=[1.1 * PHALANX_RADIUS_M[0], 0, 0],
+        fromto=[-_METACARPAL_M, 0, 0, 0, 0, 0],
+        rgba=_HAND,
+    )
+    parent, at = spec.worldbody, 0.0
+    for k, name in enumerate(PHALANGES):
+        length, radius = PHALANX_LENGTH_M[k], PHALANX_RADIUS_M[k]
+        body = parent.add_body(name=name, pos=[at, 0, 0])
+        # As long as the bone with its caps; they overlap in pictures only where joints are.
+        body.add_geom(
+            name=name,
+            type=capsule,
+            size=[radius, 0, 0],
+            fromto=[0, 0, 0, length - (radius if k == len(PHALANGES) - 1 else 0.0), 0, 0],
+            density=TISSUE_DENSITY,
+            rgba=_SKIN,
+        )
+        for j, (moved, axis) in enumerate(_HINGES):
+            if moved == k:
+                _add_hinge(body, j, axis, parameters)
+        parent, at = body, length
+    parent.add_site(name=FINGERTIP, pos=[at, 0, 0], size=[0.001, 0, 0])
+
+
+def _add_hinge(
+    body: mujoco.MjsBody, j: int, axis: tuple[float, float, float], parameters: FingerParameters
+) -> None:
+    body.add_joint(
+        name=JOINTS[j],
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=axis,
+        range=np.degrees(JOINT_RANGE[j]),
+        stiffness=[parameters.joint_stiffness[j], 0.0, 0.0],
+        springref=math.degrees(JOINT_REST[j]),
+        damping=[parameters.joint_damping[j], 0.0, 0.0],
+        frictionloss=parameters.joint_friction[j],
+        solref_limit=_LIMIT,
+        solimp_limit=_LIMIT_IMPEDANCE,
+    )
+
+
+def _add_path(
+    spec: mujoco.MjSpec, name: str, arms: tuple[float, float, float, float]
+) -> mujoco.MjsTendon:
+    """A tendon as a sum of angles: flexion shortens a flexor by its moment arm."""
+    path = spec.add_tendon(name=name)
+    for joint, arm in zip(JOINTS, arms, strict=True):
+        path.wrap_joint(joint, -arm)
+    return path
+
+
+def _add_spool(spec: mujoco.MjSpec, name: str, parameters: FingerParameters) -> str:
+    """What winds a tendon up, as a mass that slides; its joint's name."""
+    spool = spec.worldbody.add_body(
+        name=f"{name}/motor",
+        mass=parameters.motor_kg,
+        inertia=[1e-9] * 3,
+        gravcomp=1.0,
+        explicitinertial=True,
+    )
+    spool.add_joint(
+        name=f"{name}/motor",
+        type=mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=[1, 0, 0],
+        damping=[parameters.tendon_damping, 0.0, 0.0],
+        frictionloss=parameters.tendon_friction,
+    )
+    return f"{name}/motor"
+
+
+def _add_cable(
+    spec: mujoco.MjSpec,
+    name: str,
+    arms: tuple[float, float, float, float],
+    joint: str,
+    parameters: FingerParameters,
+) -> None:
+    """The spring between spool and finger; its length is the stretch."""
+    stiffness = parameters.tendon_stiffness or 0.0
+    cable = _add_path(spec, f"{name}/stretch", arms)
+    cable.wrap_joint(joint, 1.0)
+    cable.stiffness = [stiffness, 0.0, 0.0]
+    # It only pulls: below the backlash it is slack.
+    cable.springlength = [-1e3, parameters.backlash]
+    critical = 2.0 * math.sqrt(stiffness * parameters.motor_kg)
+    cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
+
+
+def _add_motor(
+    spec: mujoco.MjSpec,
+    name: str,
+    parameters: FingerParameters,
+    drive: TendonDrive,
+    i: int,
+    transmission: mujoco.mjtTrn,
+    target: str,
+    sign: float,
+) -> None:
+    """What gives a tendon its tension; `sign` is the force's where it pulls."""
+    motor = spec.add_actuator(
+        name=name,
+        trntype=transmission,
+        target=target,
+        ctrllimited=True,
+        ctrlrange=[-1.0, 1.0],
+        forcelimited=True,
+        forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
+        dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    motor.dynprm[0] = parameters.motor_lag
+    motor.gainprm[0] = sign * drive.gain[i]
+    # Winding up by a metre shortens the tendon by one, so its length has the sign of minus travel.
+    motor.biasprm[:3] = (sign * drive.offset[i], -drive.stiffness, -drive.damping)
+    if parameters.command_delay > 0.0:
+        motor.delay = parameters.command_delay
+        motor.nsample = 1 + math.ceil(parameters.command_delay / spec.option.timestep)
+
+
+class FingerFigure:
+    """A finger with its anatomy that takes whatever posture it is shown in, and never moves itself.
+
+    One figure shows every finger: they differ in what is not seen.
+
+    Attributes:
+        model: What is drawn.
+        data: How.
+    """
+
+    def __init__(self) -> None:
+        spec = build_finger(NOMINAL, drive_of("tension", NOMINAL), anatomy=True)
+        self.model: mujoco.MjModel = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self._mark = self.model.body(TARGET).mocapid[0]
+        self._courses = [
+            [self.model.tendon(course).id for course in courses_of(name)] for name in TENDONS
+        ]
+
+    def show(
+        self, angles: NDArray[np.float64], pulled: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> None:
+        """Take a posture.
+
+        Args:
+            angles: rad, (4,).
+            pulled: Tension of each tendon over its largest, 0 to 1, (7,): how thick it is drawn.
+            target: Where the fingertip should be, m, (3,).
+        """
+        widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
+        for courses, width in zip(self._courses, widths, strict=True):
+            self.model.tendon_width[courses] = width
+        self.data.qpos[:] = angles
+        self.data.mocap_pos[self._mark] = target
+        mujoco.mj_forward(self.model, self.data)
+
+    def without_target(self) -> mujoco.MjModel:
+        """A copy of the model in which no target is seen."""
+        model = self.model.__copy__()
+        model.geom_rgba[model.geom(TARGET).id, 3] = 0.0
+        return model

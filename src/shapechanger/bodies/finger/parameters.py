@@ -1,0 +1,154 @@
+"""What differs from one finger to the next: tendons, joints, motors, and what its sensors say."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.bodies.finger.anatomy import (
+    JOINT_DAMPING,
+    JOINT_FRICTION,
+    JOINT_STIFFNESS,
+    JOINTS,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+    TENDONS,
+)
+from shapechanger.errors import FingerError
+
+__all__ = ["NOMINAL", "FingerParameters"]
+
+# Between a command and its force. Chosen.
+_MOTOR_LAG_S: Final = 0.020
+# What a motor without gears and its spool weigh at the tendon. Chosen. Geared servos weigh a
+# hundred times as much and more.
+_MOTOR_KG: Final = 0.010
+# N·s/m. Chosen.
+_TENDON_DAMPING: Final = 2.0
+
+Arms = tuple[tuple[float, float, float, float], ...]
+
+
+def _plain(numbers: NDArray[np.float64]) -> tuple[Any, ...]:
+    """An array as tuples."""
+    if numbers.ndim > 1:
+        return tuple(_plain(row) for row in numbers)
+    return tuple(float(number) for number in numbers)
+
+
+class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A finger's mechanics and the faults of its drive and senses; without arguments the nominal.
+
+    Attributes:
+        moment_arms: Torque about each joint for a newton of each tendon, m, 7 x 4.
+        most_tension: What each tendon is pulled with at most, N.
+        least_tension: What each is pulled with at least, so that none hangs slack, N.
+        joint_stiffness: Passive, N·m/rad.
+        joint_damping: Passive, N·m·s/rad.
+        joint_friction: Coulomb friction of the joints, N·m.
+        tendon_damping: What a tendon resists its own speed with, N·s/m.
+        tendon_friction: Coulomb friction between motor and finger, N.
+        tendon_stiffness: What a newton stretches: N/m between motor and finger; None for a tendon
+            that does not give.
+        backlash: What a motor winds up before its tendon pulls, m; only with a stiffness.
+        motor_kg: Motor and spool, as mass at the tendon, kg.
+        motor_lag: Time constant between a command and its force, s.
+        command_delay: How much later a command acts, s.
+        joint_noise: Standard deviation of a measured angle, rad.
+        tension_noise: Standard deviation of a measured tension, N.
+
+    Raises:
+        FingerError: If a number is not finite or has the wrong sign, there are too many or too
+            few, or a backlash comes without a stiffness.
+    """
+
+    moment_arms: Arms = tuple(map(tuple, MOMENT_ARMS.tolist()))  # pyright: ignore[reportAssignmentType]
+    most_tension: tuple[float, ...] = tuple(MOST_TENSION_N.tolist())
+    least_tension: float = LEAST_TENSION_N
+    joint_stiffness: tuple[float, ...] = tuple(JOINT_STIFFNESS.tolist())
+    joint_damping: tuple[float, ...] = tuple(JOINT_DAMPING.tolist())
+    joint_friction: tuple[float, ...] = tuple(JOINT_FRICTION.tolist())
+    tendon_damping: float = _TENDON_DAMPING
+    tendon_friction: float = 0.0
+    tendon_stiffness: float | None = None
+    backlash: float = 0.0
+    motor_kg: float = _MOTOR_KG
+    motor_lag: float = _MOTOR_LAG_S
+    command_delay: float = 0.0
+    joint_noise: float = 0.0
+    tension_noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        numbers = msgspec.structs.asdict(self)
+        if self.tendon_stiffness is None:
+            if self.backlash:
+                raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")
+            numbers["tendon_stiffness"] = 1.0
+        sizes = {"moment_arms": (len(TENDONS), len(JOINTS)), "most_tension": (len(TENDONS),)}
+        for name, value in numbers.items():
+            try:
+                given = np.asarray(value, np.float64)
+            except (TypeError, ValueError) as error:
+                raise FingerError(f"{name}: these are no numbers: {value!r}.") from error
+            shape = sizes.get(name, (len(JOINTS),) if name.startswith("joint_") else ())
+            if name == "joint_noise":
+                shape = ()
+            if given.shape != shape:
+                raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
+            if not np.isfinite(given).all():
+                raise FingerError(f"{name}: the numbers must be finite, got {value}.")
+            if name != "moment_arms" and given.min() < 0.0:
+                raise FingerError(f"{name}: the numbers must not be below zero, got {value}.")
+            if shape:  # Arrays become what compares and is written as JSON.
+                msgspec.structs.force_setattr(self, name, _plain(given))
+        for name in ("motor_kg", "motor_lag"):
+            if not numbers[name] > 0.0:
+                raise FingerError(f"{name} must be above zero, got {numbers[name]}.")
+        if not (min(self.most_tension) > self.least_tension and numbers["tendon_stiffness"] > 0.0):
+            raise FingerError(
+                f"most_tension must be above least_tension, {self.least_tension} N, which keeps a "
+                "tendon from hanging slack, and tendon_stiffness above zero."
+            )
+
+    @property
+    def arms(self) -> NDArray[np.float64]:
+        """The moment arms, m, (7, 4)."""
+        return np.array(self.moment_arms)
+
+    @property
+    def gives(self) -> bool:
+        """Whether the tendons stretch, so that motors move otherwise than the finger."""
+        return self.tendon_stiffness is not None
+
+    def replace(self, **changes: Any) -> FingerParameters:
+        """The same but for these.
+
+        Raises:
+            FingerError: See the class.
+        """
+        return msgspec.structs.replace(self, **changes)
+
+    def to_json(self) -> str:
+        """As JSON."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> FingerParameters:
+        """Read what `to_json` wrote.
+
+        Raises:
+            FingerError: If the text is none.
+        """
+        try:
+            return msgspec.json.decode(text, type=cls)
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            said = str(error).rstrip(".")
+            raise FingerError(f"These are no parameters of a finger: {said}.") from error
+
+
+NOMINAL: Final = FingerParameters()
+"""The finger of the anatomy: stiff tendons, no friction in them, no delay, no noise."""

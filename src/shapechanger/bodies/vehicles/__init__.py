@@ -1,0 +1,24 @@
+"""Vehicles: bodies, motors and servos of a car, a tank, a truck and a boat."""
+
+from __future__ import annotations
+
+from shapechanger.bodies.vehicles.fleet import (
+    SIM_DT,
+    VEHICLES,
+    add_vehicle,
+    require_fit,
+    vehicle_model,
+)
+from shapechanger.bodies.vehicles.model import BoundVehicle, CameraMount, Outputs, VehicleModel
+
+__all__ = [
+    "SIM_DT",
+    "VEHICLES",
+    "BoundVehicle",
+    "CameraMount",
+    "Outputs",
+    "VehicleModel",
+    "add_vehicle",
+    "require_fit",
+    "vehicle_model",
+]

@@ -1,0 +1,86 @@
+"""The car: two driven wheels at the rear, two that steer at the front, a red bonnet."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+
+from shapechanger.bodies.vehicles.model import CameraMount, VehicleModel
+from shapechanger.bodies.vehicles.parts import (
+    BATTERY_V,
+    HOBBY_MOTOR,
+    PI_CAMERA_FOVY_DEG,
+    Paint,
+    add_camera,
+    add_hull,
+    add_look,
+)
+from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
+
+__all__ = ["CAR"]
+
+# Sizes of a touring car of scale 1:10, rounded; its mass with battery and computer. Estimates.
+_LENGTH: Final = 0.40  # m
+_WIDTH: Final = 0.20  # m
+_BODY_KG: Final = 1.3
+_AXLES: Final = Axles(
+    front_x=0.13,
+    rear_x=-0.13,
+    gauge=0.140,  # So that at full lock no wheel sticks out of the body.
+    radius=0.0325,  # Tyres of 65 mm, the usual ones at 1:10.
+    width=0.026,
+    wheel_kg=0.05,
+    full_lock=math.radians(28.0),
+)
+
+# Spur gear from the motor's shaft to the axle, chosen for 2 m/s; what it loses is an estimate.
+_MOTOR: Final = HOBBY_MOTOR.geared(4.3, efficiency=0.9)
+
+_CAMERA: Final = CameraMount(x=0.055, y=0.0, z=0.118, pitch_rad=0.0, fovy_deg=PI_CAMERA_FOVY_DEG)
+
+
+def _build(spec: mujoco.MjSpec) -> None:
+    box, ellipsoid = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID
+    paint = Paint(spec)
+    chassis = spec.worldbody.add_body(name="vehicle/chassis")
+    chassis.add_freejoint(name="vehicle/chassis")
+    # Battery and motor lie low. The hull is as wide as the wheels, so that it meets walls first.
+    size = (_LENGTH / 2, _WIDTH / 2, 0.025)
+    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.045), size, _BODY_KG)
+    red, dark = paint("red", (0.62, 0.06, 0.05)), paint("dark", (0.07, 0.07, 0.08))
+    glass = paint("glass", (0.16, 0.20, 0.24))
+    add_look(chassis, box, (0.0, 0.0, 0.036), (0.195, 0.062, 0.014), dark)
+    add_look(chassis, box, (0.19, 0.0, 0.038), (0.01, 0.095, 0.014), dark)
+    add_look(chassis, box, (-0.188, 0.0, 0.045), (0.012, 0.095, 0.018), red)
+    add_look(chassis, box, (-0.01, 0.0, 0.058), (0.075, 0.098, 0.010), red)
+    add_look(chassis, ellipsoid, (0.115, 0.0, 0.050), (0.088, 0.094, 0.027), red)  # Bonnet.
+    add_look(chassis, box, (-0.14, 0.0, 0.062), (0.05, 0.068, 0.012), red)
+    add_look(chassis, box, (-0.05, 0.0, 0.080), (0.065, 0.065, 0.020), glass)
+    add_look(chassis, box, (-0.05, 0.0, 0.102), (0.055, 0.062, 0.003), red)
+    # The camera's post and case, behind the lens.
+    add_look(chassis, box, (0.035, 0.0, 0.095), (0.006, 0.012, 0.030), dark)
+    add_axles(spec, chassis, _AXLES, _MOTOR, paint)
+    add_camera(chassis, _CAMERA)
+
+
+def _bind(model: mujoco.MjModel, data: mujoco.MjData) -> Steered:
+    return Steered(model, data, {"wheels": _MOTOR}, _AXLES)
+
+
+CAR: Final = VehicleModel(
+    name="car",
+    drives=(frozenset({"wheels", "steering"}),),
+    optional_parts=frozenset(),
+    length_m=_LENGTH,
+    width_m=_WIDTH,
+    nose_m=_LENGTH / 2,
+    floats=False,
+    camera=_CAMERA,
+    battery_v=BATTERY_V,
+    top_speed_mps=2.0,
+    turning_radius_m=_AXLES.turning_radius,
+    build=_build,
+    bind=_bind,
+)

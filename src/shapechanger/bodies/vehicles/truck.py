@@ -1,0 +1,122 @@
+"""The truck: a tractor that steers like a car, and a semi-trailer behind it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+
+from shapechanger.bodies.vehicles.model import CameraMount, VehicleModel
+from shapechanger.bodies.vehicles.parts import (
+    BATTERY_V,
+    HOBBY_MOTOR,
+    PI_CAMERA_FOVY_DEG,
+    Paint,
+    add_camera,
+    add_hull,
+    add_look,
+    add_wheel,
+)
+from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
+
+__all__ = ["TRUCK"]
+
+# Sizes of a tractor and a semi-trailer of scale 1:14, shortened; masses are estimates.
+_TRACTOR_LENGTH: Final = 0.50  # m
+_TRAILER_LENGTH: Final = 0.50  # m
+_WIDTH: Final = 0.20  # m
+_TRACTOR_KG: Final = 2.4
+_TRAILER_KG: Final = 1.2
+_AXLES: Final = Axles(
+    front_x=0.17,
+    rear_x=-0.15,
+    gauge=0.132,  # So that at full lock no wheel sticks out of the body.
+    radius=0.0375,
+    width=0.028,
+    wheel_kg=0.07,
+    full_lock=math.radians(30.0),
+)
+_HITCH_X: Final = -0.14  # m: a little ahead of the rear axle, as on real tractors.
+_HITCH_Z: Final = 0.085  # m
+_TRAILER_FRONT: Final = 0.05  # m of the trailer ahead of the hitch
+_TRAILER_GAUGE: Final = 0.165  # m
+_TRAILER_AXLE_X: Final = -0.36  # m behind the hitch
+_MOST_YAW: Final = math.radians(85.0)  # Then the trailer meets the cab.
+_MOST_PITCH: Final = math.radians(12.0)
+
+# Chosen for 1.5 m/s.
+_MOTOR: Final = HOBBY_MOTOR.geared(6.75, efficiency=0.9)
+
+_CAMERA: Final = CameraMount(
+    x=0.235, y=0.0, z=0.125, pitch_rad=math.radians(4.0), fovy_deg=PI_CAMERA_FOVY_DEG
+)
+
+
+def _build(spec: mujoco.MjSpec) -> None:
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    paint = Paint(spec)
+    chassis = spec.worldbody.add_body(name="vehicle/chassis")
+    chassis.add_freejoint(name="vehicle/chassis")
+    size = (_TRACTOR_LENGTH / 2, _WIDTH / 2, 0.025)
+    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _TRACTOR_KG)
+    blue, dark = paint("blue", (0.08, 0.20, 0.45)), paint("dark", (0.07, 0.07, 0.08))
+    glass = paint("glass", (0.16, 0.20, 0.24))
+    add_look(chassis, box, (0.0, 0.0, 0.055), (0.245, 0.055, 0.014), dark)
+    add_look(chassis, box, (0.14, 0.0, 0.125), (0.075, 0.095, 0.050), blue)
+    add_look(chassis, box, (0.14, 0.0, 0.200), (0.070, 0.092, 0.030), glass)
+    add_look(chassis, box, (0.14, 0.0, 0.232), (0.072, 0.093, 0.003), blue)
+    add_look(chassis, box, (0.232, 0.0, 0.055), (0.018, 0.098, 0.025), blue)  # Bumper.
+    add_axles(spec, chassis, _AXLES, _MOTOR, paint)
+    add_camera(chassis, _CAMERA)
+    _add_trailer(spec, chassis, paint)
+
+
+def _add_trailer(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> None:
+    """Add the trailer on its kingpin, which lets it turn and nod but not roll."""
+    box, hinge = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_HINGE
+    trailer = chassis.add_body(name="vehicle/trailer", pos=[_HITCH_X, 0.0, _HITCH_Z])
+    unit = 1.0 if not spec.compiler.degree else math.degrees(1.0)  # Of the angles in the model.
+    # The damping stands for the grease of the plate: estimates.
+    trailer.add_joint(
+        name="vehicle/trailer yaw", type=hinge, axis=[0.0, 0.0, 1.0], damping=0.01, limited=True,
+        range=[-unit * _MOST_YAW, unit * _MOST_YAW],
+    )  # fmt: skip
+    trailer.add_joint(
+        name="vehicle/trailer pitch", type=hinge, axis=[0.0, 1.0, 0.0], damping=0.02, limited=True,
+        range=[-unit * _MOST_PITCH, unit * _MOST_PITCH],
+    )  # fmt: skip
+    half = _TRAILER_LENGTH / 2
+    x = _TRAILER_FRONT - half
+    add_hull(
+        trailer, "vehicle/trailer", box, (x, 0.0, 0.025), (half, _WIDTH / 2, 0.02), _TRAILER_KG
+    )
+    white, dark = paint("white", (0.62, 0.62, 0.58)), paint("dark", (0.07, 0.07, 0.08))
+    add_look(trailer, box, (x, 0.0, 0.090), (half, 0.098, 0.075), white)
+    add_look(trailer, box, (x, 0.0, 0.008), (half - 0.02, 0.05, 0.007), dark)
+    add_look(trailer, box, (_TRAILER_AXLE_X, 0.0, -0.02), (0.03, 0.05, 0.025), dark)
+    for side, sign in (("left", 1), ("right", -1)):
+        place = (_TRAILER_AXLE_X, sign * _TRAILER_GAUGE / 2, _AXLES.radius - _HITCH_Z)
+        size = (_AXLES.radius, _AXLES.width, _AXLES.wheel_kg)
+        add_wheel(trailer, f"vehicle/trailer {side} wheel", place, *size, paint)
+
+
+def _bind(model: mujoco.MjModel, data: mujoco.MjData) -> Steered:
+    return Steered(model, data, {"wheels": _MOTOR}, _AXLES)
+
+
+TRUCK: Final = VehicleModel(
+    name="truck",
+    drives=(frozenset({"wheels", "steering"}),),
+    optional_parts=frozenset({"gear", "bed"}),
+    length_m=_TRACTOR_LENGTH / 2 - _HITCH_X + _TRAILER_LENGTH - _TRAILER_FRONT,
+    width_m=_WIDTH,
+    nose_m=_TRACTOR_LENGTH / 2,
+    floats=False,
+    camera=_CAMERA,
+    battery_v=BATTERY_V,
+    top_speed_mps=1.5,
+    turning_radius_m=_AXLES.turning_radius,
+    build=_build,
+    bind=_bind,
+)

@@ -1,0 +1,225 @@
+"""What all vehicles on land share: a body that is free, and wheels that roll."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+
+from shapechanger.bodies.vehicles.model import Outputs
+from shapechanger.bodies.vehicles.parts import (
+    HOBBY_SERVO,
+    DcMotor,
+    MotorDrive,
+    Paint,
+    add_wheel,
+    joints_below_chassis,
+    settle,
+)
+from shapechanger.worlds.world import Pose
+
+__all__ = ["Axles", "Rolling", "Steered", "add_axles"]
+
+
+class Rolling:
+    """A vehicle on land, bound to a simulation: a `Vehicle` but for its steering.
+
+    Args:
+        model: Model of everything.
+        data: State of everything.
+        motors: For each part that drives its motor; the actuator is "vehicle/" and the part.
+        radius: Of the wheels that the motors drive, m.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        motors: Mapping[str, DcMotor],
+        radius: float,
+    ) -> None:
+        self._model = model
+        self._data = data
+        self._radius = radius
+        self._drives = tuple(
+            (part, MotorDrive(model, data, f"vehicle/{part}", motor))
+            for part, motor in motors.items()
+        )
+        root = model.joint("vehicle/chassis")
+        self._qpos0 = int(root.qposadr[0])
+        self._qvel0 = int(root.dofadr[0])
+        self._qpos = data.qpos
+        self._qvel = data.qvel
+        self._joints = joints_below_chassis(model)
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Put it there at rest, its wheels straight."""
+        p, v = self._qpos0, self._qvel0
+        half = heading / 2
+        self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
+        self._qvel[v : v + 6] = 0.0
+        settle(self._model, self._data, self._joints)
+
+    def drive(self, outputs: Outputs, battery_v: float) -> None:
+        """Set the voltages of the motors."""
+        for part, drive in self._drives:
+            drive.set(outputs.get(part, 0.0), battery_v)
+
+    def pose(self) -> Pose:
+        """Where it is."""
+        p = self._qpos0
+        x, y = self._qpos[p : p + 2].tolist()
+        return Pose(x, y, self._heading())
+
+    def speed(self) -> float:
+        """Along its heading, m/s."""
+        heading = self._heading()
+        vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
+        return vx * math.cos(heading) + vy * math.sin(heading)
+
+    def lateral_speed(self) -> float:
+        """To its left, m/s."""
+        heading = self._heading()
+        vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
+        return vy * math.cos(heading) - vx * math.sin(heading)
+
+    def yaw_rate(self) -> float:
+        """Counter-clockwise seen from above, rad/s."""
+        return float(self._qvel[self._qvel0 + 5])
+
+    def travelled_m(self) -> float:
+        """What its driven wheels rolled since it was placed, on average."""
+        turned = sum(drive.turned() for _, drive in self._drives)
+        return self._radius * turned / len(self._drives)
+
+    def current_a(self) -> float:
+        """What its motors draw together."""
+        return sum(drive.current_a() for _, drive in self._drives)
+
+    def set_current(self, vx: float, vy: float) -> None:
+        """Nothing: there is no water."""
+
+    def _heading(self) -> float:
+        p = self._qpos0 + 3
+        w, x, y, z = self._qpos[p : p + 4].tolist()
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+_SIDES = (("left", 1), ("right", -1))
+
+
+@dataclass(frozen=True, slots=True)
+class Axles:
+    """Where the wheels are, and how far the front ones turn.
+
+    Attributes:
+        front_x: Of the front axle, m ahead of the origin.
+        rear_x: Of the rear axle, m; negative.
+        gauge: Between the middles of the wheels of an axle, m.
+        radius: Of a wheel, m.
+        width: Of a wheel, m.
+        wheel_kg: Mass of a wheel.
+        full_lock: Angle at a steering of 1, of a wheel in the middle of the axle, rad.
+    """
+
+    front_x: float
+    rear_x: float
+    gauge: float
+    radius: float
+    width: float
+    wheel_kg: float
+    full_lock: float
+
+    @property
+    def wheelbase(self) -> float:
+        """Between the axles, m."""
+        return self.front_x - self.rear_x
+
+    @property
+    def turning_radius(self) -> float:
+        """Of the path of the origin at full lock, m."""
+        return math.hypot(self.wheelbase / math.tan(self.full_lock), self.rear_x)
+
+    def angles(self, steering: float) -> tuple[float, float]:
+        """Angles of the left and of the right wheel, rad, positive to the left.
+
+        All wheels roll round one point on the line of the rear axle: Ackermann's condition.
+
+        Args:
+            steering: From -1, left, to 1, right.
+        """
+        curvature = math.tan(-steering * self.full_lock) / self.wheelbase
+        along, half = self.wheelbase * curvature, curvature * self.gauge / 2
+        return math.atan(along / (1.0 - half)), math.atan(along / (1.0 + half))
+
+
+def add_axles(
+    spec: mujoco.MjSpec, chassis: mujoco.MjsBody, axles: Axles, motor: DcMotor, paint: Paint
+) -> None:
+    """Add four wheels, the servo of the front ones and the motor of the rear ones.
+
+    The rear axle has a differential: its wheels share the torque, and the mean of their speeds is
+    that of the motor. A fixed tendon is just that.
+    """
+    size = (axles.radius, axles.width, axles.wheel_kg)
+    axle = motor.add(spec, "vehicle/wheels")
+    for side, sign in _SIDES:
+        y = sign * axles.gauge / 2
+        knuckle = chassis.add_body(
+            name=f"vehicle/{side} knuckle", pos=[axles.front_x, y, axles.radius]
+        )
+        name = f"vehicle/{side} steering"
+        knuckle.add_joint(
+            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0],
+            damping=HOBBY_SERVO.damping / 2, armature=2e-4,
+        )  # fmt: skip
+        knuckle.explicitinertial = True
+        knuckle.mass = 0.01
+        knuckle.inertia = [1e-6, 1e-6, 1e-6]
+        HOBBY_SERVO.add(spec, name, name, share=0.5)
+        add_wheel(knuckle, f"vehicle/front {side} wheel", (0.0, 0.0, 0.0), *size, paint)
+        rear = f"vehicle/rear {side} wheel"
+        place = (axles.rear_x, y, axles.radius)
+        add_wheel(chassis, rear, place, *size, paint, armature=motor.rotor_inertia / 2)
+        axle.wrap_joint(rear, 0.5)
+
+
+class Steered(Rolling):
+    """A vehicle that steers by its front wheels.
+
+    Args:
+        model: Model of everything.
+        data: State of everything.
+        motors: See `Rolling`.
+        axles: Where its wheels are.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        motors: Mapping[str, DcMotor],
+        axles: Axles,
+    ) -> None:
+        super().__init__(model, data, motors, axles.radius)
+        self._axles = axles
+        self._ctrl = data.ctrl
+        self._servos = tuple(model.actuator(f"vehicle/{side} steering").id for side, _ in _SIDES)
+        self._steering = 0.0
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Put it there at rest, its wheels straight."""
+        self._steering = 0.0
+        super().place(x, y, heading)
+
+    def drive(self, outputs: Outputs, battery_v: float) -> None:
+        """Set the voltage of the motor and the angles of the front wheels."""
+        super().drive(outputs, battery_v)
+        steering = outputs.get("steering", 0.0)
+        if steering is not None and steering != self._steering:
+            self._steering = steering
+            angles = self._axles.angles(min(1.0, max(-1.0, steering)))
+            for servo, angle in zip(self._servos, angles, strict=True):
+                self._ctrl[servo] = angle

@@ -1,7 +1,0 @@
-"""The robots: where each model comes from, its constants with their sources, its named bodies."""
-
-from __future__ import annotations
-
-from shapechanger.embodiments.family import Family
-
-__all__ = ["Family"]

@@ -1,0 +1,408 @@
+"""A twin of a rig that an env serves for itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import gymnasium as gym
+import msgspec
+import mujoco
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
+from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
+from shapechanger.envs.actions import check_action
+from shapechanger.envs.finger.env import posture_of
+from shapechanger.envs.finger.gap import GAPS, geared_around, with_gears
+from shapechanger.envs.finger.identification import identified
+from shapechanger.envs.finger.plant import CONTROL_DT
+from shapechanger.envs.finger.postures import draw_start
+from shapechanger.envs.finger.reach import FingerReachEnv
+from shapechanger.envs.remote.finger_rig import RigSenses, StartApproach
+from shapechanger.errors import FingerError, RobotRefused, UnknownName
+from shapechanger.link.messages import Pace
+from shapechanger.remote.vehicle import OnReset, RemoteVehicleEnv
+from shapechanger.tasks.finger import FingerSenses
+from shapechanger.twin.operator import Operator
+from shapechanger.twin.running import RunningRobot
+
+if TYPE_CHECKING:
+    from shapechanger.twin.running import RunningRobot
+
+__all__ = ["NOMINAL_TWIN", "RemoteFingerEnv", "serve_twin"]
+
+NOMINAL_TWIN: Final = "nominal"
+"""The twin whose bones, joints and tendons are those of the nominal finger."""
+
+_PROFILE: Final = "finger"
+
+
+def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
+    """Serve the shipped profile of a rig on a twin's own clock, as `shapechanger robot serve` does.
+
+    Args:
+        twin: "nominal", or the name of the gap that its finger is drawn from.
+        finger_seed: Which finger of the gap; the first one if not given.
+
+    Raises:
+        UnknownName: If there is no such gap.
+        FingerError: If a finger is asked for of what is no gap.
+        RobotError: If it does not start.
+    """
+    from shapechanger.robot.profile.load import find_profile
+    from shapechanger.twin.running import run_robot
+
+    if twin not in ("", NOMINAL_TWIN, *GAPS):
+        raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
+    if twin not in GAPS and finger_seed is not None:
+        raise FingerError("finger_seed says which finger of a gap it is: give a gap as twin, too.")
+    drawn = ("--gap", twin, "--finger-seed", str(finger_seed or 0))
+    return run_robot(
+        find_profile(_PROFILE), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+    )
+
+
+# How near to the start is near enough, rad, and how long it may take, s. Gears that stick may hold
+# a finger off; from there an episode begins all the same.
+_START_OFF_RAD: Final = 0.03
+_START_S: Final = 1.0
+# How long the pretension may take to wind in what hung slack while nothing pulled, s.
+_SLACK_S: Final = 0.6
+# What of the rig's info is about driving.
+_NOT_OURS: Final = ("reward", "frame", "captured_ns")
+
+
+class RemoteFingerEnv(FingerReachEnv):
+    """Bring the fingertip of a finger that is somewhere else to a point that it can reach.
+
+    ## Action and observation space, reward
+    Those of `Finger-v1`, whose layouts these are: a script runs on both by changing the id. What
+    an action commands is turned into tensions here, by the newest lengths and speeds of the tendons
+    at the servos. Where the rig has encoders at its joints, as the shipped one, the angles are
+    theirs, as noisy as they are, and velocities are differences of them over 20 ms, smoothed over
+    40 ms. Otherwise angles and velocities follow from lengths and speeds with the nominal moment
+    arms, and are as true as these. The fingertip follows from the angles; so do the distance, the
+    reward and `info["is_success"]`. With a twin of its own (`twin`) these three are what the twin
+    knows, as in `Finger-v1`, and what is observed stays what is sensed.
+
+    ## Start
+    The rig is armed by its operator, on a twin by the env. The finger is then brought near to the
+    start of `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of
+    a radian as it is sensed, or farther off where gears stick; the target is the same. The servos
+    of a twin of its own are cool then; those of a rig need pauses, or switch off by themselves.
+
+    ## End
+    Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
+    link. `info["truncated_because"]` says why.
+
+    ## Info
+    As `Finger-v1`, and what `RemoteVehicleEnv` says of the robot: `action_applied`, `stop_reason`,
+    `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
+    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), which the twin
+    tells.
+
+    Args:
+        robot: Name of a rig that is remembered, or its address as HOST or HOST:PORT. A twin of the
+            profile "finger" that is served here is remembered under that name.
+        key: The rig's key, for an address.
+        fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
+        pace: As for `RemoteVehicleEnv`; None for "lockstep" where time is the twin's, else
+            "realtime".
+        twin: A twin that this env serves for itself, in place of a robot: "nominal", or the name of
+            the gap that its finger is drawn from; "" for none.
+        finger_seed: Which finger of that gap; the first one if not given.
+        tendon_stiffness: Of the rig's tendons, N/m: what they stretch is no angle. Chosen, as the
+            twin's.
+        twin_folder: Folder of a twin on this machine, for the truth; "" for none.
+        on_reset: As for `RemoteVehicleEnv`.
+        on_waiting: As for `RemoteVehicleEnv`.
+        reset_timeout_s: How long a reset may wait, s.
+        timeout_s: How long the rig may be silent until the link is lost, s.
+        actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
+        goal: Whether observations are Dicts with goals.
+        reward: Weights that replace the default ones, by name.
+        render_mode: "human", "rgb_array" or "depth_array": the finger as it is sensed.
+        width: Of frames, pixels.
+        height: Of frames, pixels.
+
+    Raises:
+        UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
+        LinkError: If the rig cannot be reached, or is not trusted.
+        RobotRefused: If it does not want us, or is no rig with the tendons of a finger.
+    """
+
+    side_by_side: ClassVar[bool] = False
+    """Of a rig there is but one, and a twin is many processes."""
+
+    def __init__(
+        self,
+        robot: str = "finger",
+        *,
+        key: str = "",
+        fingerprint: str = "",
+        pace: Pace | None = None,
+        twin: str = "",
+        finger_seed: int | None = None,
+        tendon_stiffness: float = 20e3,
+        twin_folder: str = "",
+        on_reset: OnReset = "operator",
+        on_waiting: Callable[[str], object] | None = None,
+        reset_timeout_s: float = 60.0,
+        timeout_s: float = 2.0,
+        actions: str = "impedance",
+        goal: bool = False,
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        width: int = 480,
+        height: int = 480,
+    ) -> None:
+        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
+        # What is simulated never moves by itself here: it mirrors the rig, and is what is drawn.
+        super().__init__(
+            goal=goal,
+            actions=actions,
+            reward=reward,
+            render_mode=render_mode,
+            width=width,
+            height=height,
+        )
+        EzPickle.__init__(self, **arguments)
+        self._twin, self._finger_seed = twin, finger_seed
+        self._true_tip: NDArray[np.float64] | None = None
+        self._true_angles: NDArray[np.float64] | None = None
+        self._own: RunningRobot | None = None
+        if twin or finger_seed is not None:
+            self._own = serve_twin(twin, finger_seed)
+            known = self._own.known
+            robot, key, fingerprint = known.address, known.key, known.fingerprint
+            twin_folder = str(self._own.folder)
+        access: dict[str, Any] = {
+            "robot": robot,
+            "key": key,
+            "fingerprint": fingerprint,
+            "state": True,
+            "image": False,
+            "on_reset": on_reset,
+            "on_waiting": on_waiting,
+            "reset_timeout_s": reset_timeout_s,
+            "timeout_s": timeout_s,
+        }
+        self._operator: Operator | None = None
+        try:
+            self._rig = _connected(access, pace)
+        except BaseException:
+            self._end_twin()
+            raise
+        try:
+            welcome = self._rig.welcome
+            self._rig_senses = RigSenses(
+                welcome.robot,
+                self._rig.action_layout,
+                self._rig.observation_layout,
+                tendon_stiffness,
+                CONTROL_DT,
+            )
+            if twin_folder:
+                self._operator = Operator(str(Path(twin_folder) / "board.socket"))
+        except BaseException:
+            self.close()
+            raise
+        self._rig_info: dict[str, Any] = {}
+        self._command = np.zeros(len(MOMENT_ARMS))
+        self._seed: int | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; see `Finger-v1`.
+
+        Raises:
+            UnknownName: If there is no such option.
+            FingerError: If a posture or a target is none.
+            RobotRefused: If the rig was not armed in time, does not want us, stops on the way to
+                the start, or its lengths are those of no finger.
+            LinkError: If it cannot be reached in time.
+        """
+        self._seed = seed
+        self._rest()
+        observation, info = super().reset(seed=seed, options=options)
+        return observation, self._ours() | info | self._truth()
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Act for one step.
+
+        Raises:
+            BadAction: If the action is none; nothing has been sent then.
+            ResetNeeded: If `reset` was never called, or the link was lost.
+        """
+        observation, reward, terminated, _, info = super().step(action)
+        info = self._ours() | info | self._truth()
+        return observation, reward, terminated, bool(info["truncated_because"]), info
+
+    def _rest(self) -> None:
+        """Let the servos of a twin of its own cool, as a person lets those of a rig."""
+        if self._own is not None and self._operator is not None:
+            for name in TENDONS:
+                self._operator.break_servo(name, "")
+
+    def close(self) -> None:
+        """Stop the rig, give it back, and free what draws."""
+        super().close()
+        self._rig.close()
+        if self._operator is not None:
+            self._operator.close()
+            self._operator = None
+        self._end_twin()
+
+    def _end_twin(self) -> None:
+        if self._own is not None:
+            self._own.close()
+            self._own = None
+
+    @property
+    def exclusive(self) -> bool:
+        """Whether whoever has it keeps others from having it: not so a twin of its own."""
+        return self._own is None
+
+    @property
+    def individual(self) -> str:
+        """The argument that says which finger this is, where the gap has many; else empty."""
+        many = bool(self._twin) and self._twin != NOMINAL_TWIN
+        return "finger_seed" if many and self._finger_seed is None else ""
+
+    def randomised_source(self) -> dict[str, Any]:
+        """Arguments with which `Finger-v1` has other fingers whose servos have gears, as here."""
+        return {"gap": "geared"}
+
+    def identified_source(self, seed: int) -> dict[str, Any]:
+        """Arguments with which `Finger-v1` is like this one, as ten seconds of motion show it.
+
+        What a log hardly tells of servos with gears is drawn at each episode, as in the gap
+        "geared"; what they pull at least and at most is the rig's.
+
+        Args:
+            seed: Of the motions.
+
+        Raises:
+            FingerError: If the motions are not enough, or observations are no list of numbers.
+            MissingExtra: If `mujoco.sysid` is not there.
+        """
+        rig = self._rig_senses
+        pulls = {
+            "most_tension": tuple(rig.most.tolist()),
+            "least_tension": float(rig.least.max()),
+        }
+        known = with_gears(NOMINAL.replace(**pulls))
+        found = identified(self, self._actions, seed, known)
+        return {"gap": msgspec.to_builtins(geared_around(found))}
+
+    def _place(self, options: dict[str, Any] | None) -> FingerSenses:
+        """Arm the rig, and bring the finger to a start."""
+        for name in options or {}:
+            if name not in self._options:
+                raise UnknownName("option of reset", name, self._options)
+        given = (options or {}).get("posture")
+        start = draw_start(self.np_random) if given is None else posture_of(given)
+        state, self._rig_info = self._rig.reset(seed=self._seed)
+        self._command = np.zeros(len(MOMENT_ARMS))
+        self._rig_senses.forget()
+        senses = self._sense(state)
+        for _ in range(round(_SLACK_S / CONTROL_DT)):
+            if self._rig_senses.fits(senses):
+                break
+            senses = self._pull_on_the_way(self._rig_senses.least)
+        self._rig_senses.require_fit(senses)
+        way = StartApproach(start, self._rig_senses.least, self._rig_senses.most)
+        for _ in range(round(_START_S / CONTROL_DT)):
+            if way.off(senses) < _START_OFF_RAD:
+                break
+            senses = self._pull_on_the_way(way.tensions(senses))
+        # The command that asks for what is pulled now, as in simulation.
+        least = np.clip(senses.tensions, self._rig_senses.least, self._rig_senses.most)
+        command = self.drive.command(least, senses.lengths, self._rig_senses.speeds)
+        self._command = np.clip(command, -1.0, 1.0)
+        self._senses = self._sense_again(senses)
+        return self._senses
+
+    def _act(self, action: Any) -> FingerSenses:
+        if self._senses is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        checked = np.asarray(check_action(self, action), np.float64)
+        self._command = np.clip(checked, -1.0, 1.0)
+        asked = self.drive.tension(self._command, self._senses.lengths, self._rig_senses.speeds)
+        self._senses = self._pull(asked)
+        return self._senses
+
+    def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
+        """Ask for tensions, N, (7,), for one period of control."""
+        state, _, _, _, self._rig_info = self._rig.step(self._rig_senses.values(tensions))
+        return self._sense(state)
+
+    def _pull_on_the_way(self, tensions: NDArray[np.float64]) -> FingerSenses:
+        """The same before an episode.
+
+        Raises:
+            RobotRefused: If the rig stops.
+        """
+        senses = self._pull(tensions)
+        if because := self._rig_info["truncated_because"]:
+            raise RobotRefused(f"The finger did not come to its start: {because}")
+        return senses
+
+    def _sense(self, state: NDArray[Any]) -> FingerSenses:
+        absent: tuple[str, ...] = self._rig_info["absent"]
+        senses = self._rig_senses.read(state, absent, self._command)
+        data = self.plant.data
+        self._look()
+        judged = self._own is not None and self._true_angles is not None
+        data.qpos[:] = self._true_angles if judged else senses.angles
+        data.qvel[:] = senses.velocities
+        mujoco.mj_kinematics(self.plant.model, data)
+        data.actuator_force[:] = -senses.tensions
+        return senses
+
+    def _sense_again(self, senses: FingerSenses) -> FingerSenses:
+        """The same moment with the newest command."""
+        return FingerSenses(
+            angles=senses.angles,
+            velocities=senses.velocities,
+            tensions=senses.tensions,
+            lengths=senses.lengths,
+            commands=self._command,
+            fingertip=senses.fingertip,
+        )
+
+    def _ours(self) -> dict[str, Any]:
+        """What of the rig's info is about a finger."""
+        info = {n: v for n, v in self._rig_info.items() if not n.startswith(_NOT_OURS)}
+        return {"truncated_because": ""} | info
+
+    def _look(self) -> None:
+        """Ask the twin how the finger really stands."""
+        if self._operator is None:
+            return
+        truth = self._operator.where().truth
+        self._true_tip = np.array([truth[f"fingertip/{axis}"] for axis in "xyz"])
+        self._true_angles = np.array([truth[f"{name}/angle"] for name in JOINTS])
+
+    def _truth(self) -> dict[str, Any]:
+        """What the twin has told of the finger itself."""
+        if self._true_tip is None or self._true_angles is None:
+            return {}
+        return {
+            "true_distance": float(np.linalg.norm(self._true_tip - self._target)),
+            "true_angles": self._true_angles.copy(),
+        }
+
+
+def _connected(access: dict[str, Any], pace: Pace | None) -> RemoteVehicleEnv:
+    """The rig, at the pace of its clock where none is given."""
+    rig = RemoteVehicleEnv(**access, pace=pace or "lockstep")
+    if pace is None and rig.welcome.clock == "real":
+        rig.close()
+        rig = RemoteVehicleEnv(**access, pace="realtime")
+    return rig

@@ -1,0 +1,127 @@
+"""Whether envs fit into one vector env."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, cast
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import SpaceMismatch, VectorEnvError
+
+__all__ = ["masked_options", "one_seed_each", "require_boxes", "require_same_spaces"]
+
+_LONGEST_BODY: Final = 60
+
+
+def require_boxes(env: gym.Env[Any, Any]) -> None:
+    """Refuse spaces that are not arrays of numbers.
+
+    Raises:
+        VectorEnvError: If one of the two is not.
+    """
+    for side, space in (("observation", env.observation_space), ("action", env.action_space)):
+        if not isinstance(space, gym.spaces.Box):
+            raise VectorEnvError(
+                f"The {side} space of a vector env must be a Box, and this is {space}: use "
+                "`gymnasium.make_vec` with vectorization_mode='sync'."
+            )
+
+
+def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
+    """Refuse envs whose numbers differ in how many they are or in what they mean.
+
+    Raises:
+        SpaceMismatch: If the spaces, or the names of what is in them, are not those of the first.
+    """
+    first = envs[0]
+    for number, env in enumerate(envs[1:], 1):
+        for side in ("observation", "action"):
+            ours, theirs = getattr(first, f"{side}_space"), getattr(env, f"{side}_space")
+            names, others = _names(first, side), _names(env, side)
+            if ours == theirs and names == others:
+                continue
+            if ours.shape != theirs.shape:
+                how = (
+                    f"{_size(theirs)} numbers, and that of env 0 ({_body(first)}) has {_size(ours)}"
+                )
+            elif names != others:
+                apart = next((a, b) for a, b in zip(names, others, strict=True) if a != b)
+                how = f"{apart[1]!r} where that of env 0 ({_body(first)}) has {apart[0]!r}"
+            else:
+                how = f"other bounds than that of env 0 ({_body(first)})"
+            raise SpaceMismatch(
+                f"The {side} space of env {number} ({_body(env)}) has {how}: the envs of a vector "
+                "env share their spaces, so make one vector env for each kind of body."
+            )
+
+
+def _names(env: gym.Env[Any, Any], side: str) -> tuple[str, ...]:
+    """What the numbers of a space are called; nothing if the env does not say."""
+    layout = getattr(env.unwrapped, f"{side}_layout", None)
+    return () if layout is None else tuple(layout.names)
+
+
+def _size(space: gym.spaces.Box) -> int:
+    size = 1
+    for length in space.shape:
+        size *= length
+    return size
+
+
+def _body(env: gym.Env[Any, Any]) -> str:
+    """The body of an env: its name if it has one, else its edits, not longer than a line."""
+    inner: Any = env.unwrapped
+    name = type(inner).__name__ if env.spec is None else env.spec.id
+    body = getattr(inner, "body", None)
+    if body is None:
+        return name
+    family = getattr(inner, "family", None)
+    known: dict[str, Any] = {} if family is None else family.bodies
+    for called, edits in known.items():
+        if edits == body:
+            return f"{name}, body {called}"
+    text = str(body)
+    shortened = f"{text[:_LONGEST_BODY]}..." if len(text) > _LONGEST_BODY else text
+    return f"{name}, body {shortened}"
+
+
+def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """A seed for each env: a number counts up from the first env.
+
+    Raises:
+        VectorEnvError: If there are not as many seeds as envs.
+    """
+    if seed is None:
+        return [None] * num_envs
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + i for i in range(num_envs)]
+    if len(seed) != num_envs:
+        raise VectorEnvError(f"There are {num_envs} envs and {len(seed)} seeds.")
+    return list(seed)
+
+
+def masked_options(
+    options: dict[str, Any] | None, num_envs: int
+) -> tuple[NDArray[np.bool_] | None, dict[str, Any] | None]:
+    """Which envs are to be reset, or None for all, and the options for each of them.
+
+    Raises:
+        TypeError: If the mask is not an array of booleans.
+        ValueError: If the mask has another shape, or is true nowhere.
+    """
+    if options is None or "reset_mask" not in options:
+        return None, options
+    mask = options["reset_mask"]
+    if not isinstance(mask, np.ndarray):
+        raise TypeError(f"`reset_mask` is an array of booleans, not a {type(mask).__name__}.")
+    given = cast("NDArray[Any]", mask)
+    if given.dtype != np.bool_:
+        raise TypeError(f"`reset_mask` is an array of booleans, not of {given.dtype}.")
+    if given.shape != (num_envs,):
+        raise ValueError(f"`reset_mask` has the shape ({num_envs},), not {given.shape}.")
+    if not given.any():
+        raise ValueError("`reset_mask` is true for no env, so nothing would be reset.")
+    return given.copy(), {key: value for key, value in options.items() if key != "reset_mask"}

@@ -1,0 +1,403 @@
+"""One difference between two models, in numbers and in a sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+import mujoco
+
+from shapechanger.morphology.effective.elements import names_of
+from shapechanger.morphology.effective.model import EffectiveModel, effective_model
+
+if TYPE_CHECKING:
+    from shapechanger.morphology.effective.elements import Value
+
+__all__ = ["Amount", "Change", "change", "compare", "grouped"]
+
+Amount = float | str | tuple[float | str, ...] | None
+"""A number, a word, some of them, or None for what is not there."""
+
+# A change of one of these is of the element as a whole: it is there on one side only.
+_WHOLE: Final = frozenset(
+    (
+        "body",
+        "joint",
+        "geom",
+        "site",
+        "contact",
+        "actuator",
+        "tendon",
+        "equality constraint",
+        "flex",
+        "plugin",
+    )
+)
+# Ratios of these mean nothing.
+_WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
+_DIGITS: Final = (4, 8, 17)
+
+
+class Change(msgspec.Struct, frozen=True):
+    """What is different in the target.
+
+    Attributes:
+        quantity: What changed, such as "mass", "length", "contact friction" or "gear"; the kind of
+            element, such as "body", where the element is there on one side only.
+        element: Name of the element that it belongs to; names, with commas, in a group.
+        before: Value in the source; None if it has none.
+        after: Value in the target; None if it has none.
+        unit: Unit of both; "1" for a pure number, empty for words and for mixed units.
+        sentence: The change for a reader.
+    """
+
+    quantity: str
+    element: str
+    before: Amount
+    after: Amount
+    unit: str
+    sentence: str
+
+
+def change(
+    quantity: str,
+    element: str,
+    before: Sequence[float | str] | None,
+    after: Sequence[float | str] | None,
+    unit: str = "",
+) -> Change:
+    """A change with its sentence; a value of one number stands for the number."""
+    old, new = _plain(before), _plain(after)
+    return Change(
+        quantity, element, old, new, unit, f"{element}: {_words(quantity, old, new, unit)}"
+    )
+
+
+def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
+    """The changes for reading: those that say the same of several elements become one."""
+    groups: dict[tuple[str, str], list[Change]] = {}
+    for item in changes:
+        said = item.sentence.removeprefix(f"{item.element}: ")
+        groups.setdefault((item.quantity, said), []).append(item)
+    merged: list[Change] = []
+    for (_, said), members in groups.items():
+        names = ", ".join(member.element for member in members)
+        merged.append(
+            msgspec.structs.replace(members[0], element=names, sentence=f"{names}: {said}")
+        )
+    return tuple(merged)
+
+
+def _plain(values: Sequence[float | str] | None) -> Amount:
+    """What JSON can hold: one value for itself, and no infinite number."""
+    if values is None:
+        return None
+    finite = tuple(
+        value if isinstance(value, str) or math.isfinite(value) else str(value) for value in values
+    )
+    return finite[0] if len(finite) == 1 else finite
+
+
+def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
+    """What a sentence says after the name of the element."""
+    suffix = f" {unit}" if unit not in ("", "1") else ""
+    if quantity in _WHOLE:
+        there = before if after is None else after
+        return (
+            f"{quantity} {'removed' if after is None else 'added'} "
+            f"({_shown(there, _DIGITS[0])}{suffix})"
+        )
+    old, new = "", ""
+    for digits in _DIGITS:  # As many digits as it takes to tell the two apart.
+        old, new = _shown(before, digits), _shown(after, digits)
+        if old != new:
+            break
+    old, new = (text if text == "none" else f"{text}{suffix}" for text in (old, new))
+    ratio = None if quantity in _WITHOUT_RATIO else _ratio(before, after)
+    times = "" if ratio is None else f" (x{ratio:.3g})"
+    return f"{quantity} {old} -> {new}{'' if times == ' (x1)' else times}"
+
+
+def _shown(amount: Amount, digits: int) -> str:
+    """An amount with so many significant digits; equal numbers of a list are shown once."""
+    if amount is None:
+        return "none"
+    if not isinstance(amount, tuple):
+        return amount if isinstance(amount, str) else f"{amount:.{digits}g}"
+    texts = [_shown(value, digits) for value in amount]
+    if not texts:
+        return "none"
+    return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
+
+
+def _ratio(before: Amount, after: Amount) -> float | None:
+    """New over old, if it is the same for all numbers that are not zero in both."""
+    old = before if isinstance(before, tuple) else (before,)
+    new = after if isinstance(after, tuple) else (after,)
+    if len(old) != len(new):
+        return None
+    ratios: list[float] = []
+    for a, b in zip(old, new, strict=True):
+        if not isinstance(a, float) or not isinstance(b, float) or (a == 0.0) != (b == 0.0):
+            return None
+        if a != 0.0:
+            ratios.append(b / a)
+    # Three digits are shown, so ratios that agree to four are one ratio.
+    same = all(math.isclose(ratio, ratios[0], rel_tol=1e-4) for ratio in ratios)
+    return ratios[0] if ratios and same else None
+
+
+_Elements = dict[str, dict[str, tuple["Value", ...]]]
+
+_ONE_OF: Final = {
+    "bodies": "body",
+    "joints": "joint",
+    "geoms": "geom",
+    "sites": "site",
+    "contacts": "contact",
+    "actuators": "actuator",
+    "tendons": "tendon",
+    "equalities": "equality constraint",
+    "flexes": "flex",
+    "plugins": "plugin",
+}
+# What an element that is there on one side only is told by; its type otherwise.
+_TOLD_BY: Final = {"bodies": "mass", "contacts": "contact dimension", "actuators": "target"}
+_UNITS: Final = {
+    "mass": "kg",
+    "inertia": "kg·m²",
+    "position": "m",
+    "centre of mass": "m",
+    "anchor": "m",
+    "size": "m",
+    "gravity": "m/s²",
+    "timestep": "s",
+    "density": "kg/m³",
+    "viscosity": "Pa·s",
+    "wind": "m/s",
+    "contact friction": "1",
+    "contact margin": "m",
+    "contact gap": "m",
+    "contact adhesion": "N",
+    "gear": "1",
+    "crank length": "m",
+    "delay": "s",
+    "dimensions": "1",
+}
+# Units of a joint that slides and of one that turns.
+_JOINT_UNITS: Final = {
+    "joint range": ("m", "deg"),
+    "limit margin": ("m", "rad"),
+    "rest position": ("m", "rad"),
+    "spring reference": ("m", "rad"),
+    "stiffness": ("N/m", "N·m/rad"),
+    "damping": ("N·s/m", "N·m·s/rad"),
+    "armature": ("kg", "kg·m²"),
+    "friction loss": ("N", "N·m"),
+    "actuator force range": ("N", "N·m"),
+}
+_ROUND: Final = ("capsule", "cylinder")
+
+# Numbers that agree to this part of the largest of their field are equal: writing out a total mass,
+# or summing in another order, changes the last bits. Constants that MuJoCo derives lose more.
+_ROUNDING: Final = 1e-12
+_DERIVED_ROUNDING: Final = 1e-9
+
+
+def compare(
+    source: mujoco.MjModel,
+    target: mujoco.MjModel,
+    *,
+    standing_height: tuple[float | None, float | None] = (None, None),
+) -> tuple[Change, ...]:
+    """The differences between what two models do.
+
+    Args:
+        source: The model that a skill was learned on.
+        target: The model that it moves to.
+        standing_height: Height in m at which the source and the target stand, where known.
+
+    Returns:
+        The changes, empty for models that do the same: standing height, dimensions and total mass
+        first, then element by element.
+    """
+    one, two = effective_model(source), effective_model(target)
+    changes: list[Change] = []
+    before, after = standing_height
+    if before is not None and after is not None and not _equal((before,), (after,)):
+        changes.append(change("standing height", "robot", (before,), (after,), "m"))
+    if one == two:
+        return tuple(changes)
+    changes += _totals(source, target)
+    changes += _lengths(source, target, one, two)
+    first, second = dict(one.sections), dict(two.sections)
+    for section in first:
+        if section != "derived" and first[section] != second[section]:
+            changes += _section(section, one[section], two[section])
+    if not changes:
+        old, new = one["derived"], two["derived"]
+        changes = [
+            change("derived constant", name, old[name]["values"], new[name]["values"])
+            for name in old
+            if not _equal(old[name]["values"], new[name]["values"], _DERIVED_ROUNDING)
+        ]
+    return tuple(changes)
+
+
+def _equal(
+    before: tuple[Value, ...] | None, after: tuple[Value, ...] | None, tolerance: float = _ROUNDING
+) -> bool:
+    """Return whether the values of a field agree up to rounding."""
+    if before is None or after is None or len(before) != len(after):
+        return before == after
+    numbers = [abs(v) for v in (*before, *after) if not isinstance(v, str) and math.isfinite(v)]
+    margin = tolerance * max(numbers, default=0.0)
+    return all(
+        old == new
+        or (
+            not isinstance(old, str)
+            and not isinstance(new, str)
+            and (abs(old - new) <= margin or (math.isnan(old) and math.isnan(new)))
+        )
+        for old, new in zip(before, after, strict=True)
+    )
+
+
+def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
+    """Differences of the bodies as a whole."""
+    found: list[Change] = []
+    if source.nbody != target.nbody:
+        sizes = (float(source.nbody),), (float(target.nbody),)
+        found.append(change("dimensions", "nbody", *sizes, "1"))
+    before, after = (
+        math.fsum(model.body_mass[model.body_treeid >= 0].tolist()) for model in (source, target)
+    )
+    # The order of the bodies may change the last digit of the sum.
+    if not math.isclose(before, after, rel_tol=1e-12):
+        found.append(change("total mass", "robot", (before,), (after,), "kg"))
+    return found
+
+
+def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
+    """Differences within one section."""
+    found: list[Change] = []
+    for element in [*before, *(name for name in after if name not in before)]:
+        old, new = before.get(element), after.get(element)
+        if old is None or new is None:
+            found.append(_one_sided(section, element, old, new))
+            continue
+        for field in [*old, *(name for name in new if name not in old)]:
+            if not _equal(old.get(field), new.get(field)) and not _is_segment(
+                section, field, old, new
+            ):
+                found.append(_difference(section, element, field, old, new))
+    shared_before = [name for name in before if name in after]
+    shared_after = [name for name in after if name in before]
+    if shared_before != shared_after:
+        found.append(change("order", section, shared_before, shared_after))
+    return found
+
+
+def _one_sided(
+    section: str,
+    element: str,
+    before: dict[str, tuple[Value, ...]] | None,
+    after: dict[str, tuple[Value, ...]] | None,
+) -> Change:
+    """An element that only the source, or only the target, has."""
+    field = _TOLD_BY.get(section, "type")
+
+    def told(fields: dict[str, tuple[Value, ...]] | None) -> tuple[Value, ...] | None:
+        return None if fields is None else fields.get(field, ("there",))
+
+    unit = _UNITS.get(field, "") if section == "bodies" else ""
+    return change(_ONE_OF[section], element, told(before), told(after), unit)
+
+
+def _is_segment(
+    section: str,
+    field: str,
+    before: dict[str, tuple[Value, ...]],
+    after: dict[str, tuple[Value, ...]],
+) -> bool:
+    """Whether `_lengths` tells of this difference."""
+    types = {*before.get("type", ()), *after.get("type", ())}
+    return section == "geoms" and field == "size" and len(types) == 1 and types <= set(_ROUND)
+
+
+def _difference(
+    section: str,
+    element: str,
+    field: str,
+    before: dict[str, tuple[Value, ...]],
+    after: dict[str, tuple[Value, ...]],
+) -> Change:
+    """One field that differs, in the unit in which people think of it."""
+    old, new = before.get(field), after.get(field)
+    unit = _UNITS.get(field, "")
+    if section == "joints" and field in _JOINT_UNITS:
+        (kind,) = before["type"]
+        sliding, turning = _JOINT_UNITS[field]
+        unit = {"slide": sliding, "hinge": turning, "ball": turning}.get(str(kind), "")
+        if unit == "deg":
+            old, new = _in_degrees(old), _in_degrees(new)
+    elif section == "tendons":
+        unit = ""  # A fixed tendon adds lengths and angles as the model pleases.
+    return change(field, element, old, new, unit)
+
+
+def _in_degrees(angles: tuple[Value, ...] | None) -> tuple[float, ...] | None:
+    """Angles in degrees; None stays None."""
+    return None if angles is None else tuple(math.degrees(float(angle)) for angle in angles)
+
+
+def _lengths(
+    source: mujoco.MjModel, target: mujoco.MjModel, one: EffectiveModel, two: EffectiveModel
+) -> list[Change]:
+    """Lengths and radii of segments, in m.
+
+    A geom that touches nothing still tells what was done to its body: its length is told if the
+    body itself differs.
+    """
+    old_bodies, new_bodies = one["bodies"], two["bodies"]
+    old_geoms, new_geoms = one["geoms"], two["geoms"]
+    before, after = _segments(source), _segments(target)
+    found: list[Change] = []
+    for geom, (body, label, kind, radius, length) in before.items():
+        other = after.get(geom)
+        if other is None or other[2] != kind:
+            continue
+        touches = geom in old_geoms and geom in new_geoms
+        if not touches and old_bodies.get(body) == new_bodies.get(body):
+            continue
+        if length != other[4]:
+            found.append(change("length", label, (length,), (other[4],), "m"))
+        if radius != other[3]:
+            found.append(change("radius", label, (radius,), (other[3],), "m"))
+    return found
+
+
+def _segments(model: mujoco.MjModel) -> dict[str, tuple[str, str, str, float, float]]:
+    """For each capsule and cylinder its body, label, type, radius and length without the caps.
+
+    The label is the body's name where the geom is the body's only one.
+    """
+    names = names_of(model)
+    kinds = {mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule", mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder"}
+    counts = model.body_geomnum.tolist()
+    found: dict[str, tuple[str, str, str, float, float]] = {}
+    for geom, number, owner, size in zip(
+        names.geoms,
+        model.geom_type.tolist(),
+        model.geom_bodyid.tolist(),
+        model.geom_size.tolist(),
+        strict=True,
+    ):
+        kind = kinds.get(mujoco.mjtGeom(number))
+        if kind is not None:
+            body = names.bodies[int(owner)]
+            label = body if counts[owner] == 1 else geom
+            found[geom] = (body, label, kind, size[0], 2.0 * size[1])
+    return found

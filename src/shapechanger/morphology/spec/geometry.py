@@ -1,0 +1,340 @@
+"""One geom: where it lies, how large it is, how it grows."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology.spec.elements import subtree
+
+__all__ = [
+    "Array",
+    "anchor",
+    "axis_ends",
+    "far_end",
+    "has_ends",
+    "held_at",
+    "inertia_is_written_out",
+    "move_by",
+    "move_outwards",
+    "orientation",
+    "place_of",
+    "require_geometry",
+    "resize_geom",
+    "resize_limb",
+    "rotation",
+    "scale_geom_mass",
+    "scale_mass",
+    "stretch_geom",
+    "stretch_segment",
+    "stretched",
+    "thicken_geom",
+    "thicken_segment",
+    "volume",
+]
+
+Array = NDArray[np.float64]
+_Oriented = mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsFrame
+_G = mujoco.mjtGeom
+_LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
+_AXES: Final = {"x": 0, "y": 1, "z": 2}
+# How far a geom may lean from an axis and still count as lying along it: the pole of the inverted
+# pendulum leans by 1 mm on 600.
+_ALONG: Final = 0.999
+
+
+def rotation(quaternion: Array) -> Array:
+    """The rotation matrix, shape (3, 3), of a quaternion (w, x, y, z)."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+def orientation(spec: mujoco.MjSpec, element: _Oriented) -> Array:
+    """The element's quaternion (w, x, y, z), whichever way its orientation was written."""
+    if element.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        quaternion = np.array(element.quat, dtype=np.float64)
+        return quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        spec.resolve_orientation(
+            degree=bool(element.compiler.degree),
+            sequence=element.compiler.eulerseq,
+            orientation=element.alt,
+        )
+    )
+
+
+def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
+    """Whether an element, which may be a box or an ellipsoid too, is given by its axis' ends."""
+    return not math.isnan(element.fromto[0])
+
+
+def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
+    """Both ends of a capsule's or cylinder's axis in the body's frame, m; None for other shapes."""
+    if geom.type not in _LONG:
+        return None
+    if has_ends(geom):
+        return np.array(geom.fromto[:3]), np.array(geom.fromto[3:])
+    half = rotation(orientation(spec, geom))[:, 2] * geom.size[1]
+    return geom.pos - half, geom.pos + half
+
+
+def place_of(element: mujoco.MjsGeom | mujoco.MjsSite) -> Array:
+    """The middle of an element in the body's frame, m."""
+    return np.array(element.fromto.reshape(2, 3).mean(axis=0) if has_ends(element) else element.pos)
+
+
+def move_by(element: mujoco.MjsGeom | mujoco.MjsSite, shift: Array) -> None:
+    """Move an element within its body by `shift`, m."""
+    if has_ends(element):
+        element.fromto = element.fromto + np.tile(shift, 2)
+    else:
+        element.pos = element.pos + shift
+
+
+def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
+    """The volume of a primitive geom, m³."""
+    a, b, c = (float(x) for x in geom.size)
+    if has_ends(geom):
+        b, c = a, 0.5 * float(np.linalg.norm(geom.fromto[3:] - geom.fromto[:3]))
+    match geom.type:
+        case _G.mjGEOM_SPHERE:
+            return 4.0 / 3.0 * math.pi * a**3
+        case _G.mjGEOM_ELLIPSOID:
+            return 4.0 / 3.0 * math.pi * a * b * c
+        case _G.mjGEOM_BOX:
+            return 8.0 * a * b * c
+        case _:
+            ends = axis_ends(spec, geom)
+            length = float(np.linalg.norm(ends[1] - ends[0])) if ends else 0.0
+            caps = 4.0 / 3.0 * math.pi * a**3 if geom.type == _G.mjGEOM_CAPSULE else 0.0
+            return math.pi * a**2 * length + caps
+
+
+def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
+    """Where a point of a segment comes to lie when what holds it at `held` stays, m."""
+    scale = np.full(3, factor)
+    if axis is not None:
+        scale = np.ones(3)
+        scale[_AXES[axis]] = factor
+    return held + scale * (point - held)
+
+
+def move_outwards(
+    element: mujoco.MjsGeom | mujoco.MjsSite, held: Array, factor: float, axis: str | None = None
+) -> None:
+    """Move an element, or the ends that it has, to where stretching carries it."""
+    if has_ends(element):
+        ends = [stretched(end, held, factor, axis) for end in element.fromto.reshape(2, 3)]
+        element.fromto = np.concatenate(ends)
+    else:
+        element.pos = stretched(element.pos, held, factor, axis)
+
+
+def stretch_geom(
+    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float, axis: str | None = None
+) -> None:
+    """Make a geom `factor` times as long, at the same thickness, and move it outwards likewise.
+
+    Args:
+        spec: The model that `geom` is in.
+        geom: The geom.
+        held: The point of its body that stays.
+        factor: New length over old length.
+        axis: "x", "y" or "z" to stretch along that axis of the body only; None for all three.
+
+    Raises:
+        MorphologyError: If the geom lies askew to the axis.
+    """
+    before = volume(spec, geom)
+    if not has_ends(geom):
+        _lengthen(spec, geom, factor, axis)
+    move_outwards(geom, held, factor, axis)
+    _keep_density(spec, geom, before)
+
+
+def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
+    """Make a geom `factor` times as large in every direction, as seen from `held`."""
+    before = volume(spec, geom)
+    geom.size = geom.size * factor
+    move_outwards(geom, held, factor)
+    _keep_density(spec, geom, before)
+
+
+def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
+    """Scale what stretching leaves alone: a radius, or the two smaller half-sizes."""
+    before = volume(spec, geom)
+    size = np.array(geom.size)
+    if geom.type in (*_LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
+        size[0] *= factor
+    else:
+        size[np.arange(3) != np.argmax(size)] *= factor
+    geom.size = size
+    _keep_density(spec, geom, before)
+
+
+def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
+    """Scale the long half-size of a geom that is given by position and size."""
+    if geom.type == _G.mjGEOM_SPHERE:
+        return  # A sphere has a place along the segment, and a thickness, but no length.
+    size = np.array(geom.size)
+    place, direction = (1, 2) if geom.type in _LONG else (int(np.argmax(size)),) * 2
+    if axis is not None:
+        # How much each axis of the geom lies along that of the body.
+        along = np.abs(rotation(orientation(spec, geom))[_AXES[axis]])
+        if geom.type not in _LONG:
+            place = direction = int(np.argmax(along))
+        if along[direction] < 1.0 - _ALONG:
+            return  # It lies across: what would grow is its thickness.
+        if along[direction] < _ALONG:
+            raise MorphologyError(
+                f"{geom.name!r} lies askew to the axis {axis!r}: stretch it along all axes instead."
+            )
+    size[place] *= factor
+    geom.size = size
+
+
+def _keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float) -> None:
+    """Let a mass that was written out follow the geom's volume, as a density does by itself."""
+    if not math.isnan(geom.mass):
+        geom.mass *= volume(spec, geom) / volume_before
+
+
+def scale_geom_mass(geom: mujoco.MjsGeom, factor: float) -> None:
+    """Scale a geom's mass, whether it is given as a mass or as a density."""
+    if math.isnan(geom.mass):
+        geom.density *= factor
+    else:
+        geom.mass *= factor
+
+
+_TURNING: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+
+
+def anchor(body: mujoco.MjsBody) -> Array:
+    """Where the segment is held, in its own frame, m."""
+    return next((np.array(j.pos) for j in body.joints if j.type in _TURNING), np.zeros(3))
+
+
+def held_at(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
+    """Where the segment is held, in its parent's frame, m."""
+    return body.pos + rotation(orientation(spec, body)) @ anchor(body)
+
+
+def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
+    """The point of the segment's axis farthest from its anchor, in the body's frame, m.
+
+    Raises:
+        MorphologyError: If the body has no capsule or cylinder.
+    """
+    held = anchor(body)
+    ends = [end for geom in body.geoms for end in axis_ends(spec, geom) or ()]
+    if not ends:
+        raise MorphologyError(
+            f"{body.name!r} has no capsule or cylinder, so it has no far end to build on."
+        )
+    return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
+
+
+def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+    """Whether mass and inertia are the body's own numbers instead of those of its geoms."""
+    from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    return bool(body.explicitinertial) and not from_geoms
+
+
+def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+    """Refuse a body whose mass does not follow from its geoms, or whose geoms are meshes.
+
+    Raises:
+        MorphologyError: If so: an edit of its shape would leave mass and inertia behind.
+    """
+    if inertia_is_written_out(spec, body):
+        raise MorphologyError(
+            f"{body.name!r} has its inertia written out, so a new shape would leave it behind: "
+            "remove its <inertial> or set inertiafromgeom."
+        )
+    for geom in body.geoms:
+        if geom.type in (_G.mjGEOM_MESH, _G.mjGEOM_HFIELD, _G.mjGEOM_SDF):
+            raise MorphologyError(
+                f"{body.name!r} holds {geom.name!r}, a mesh; only spheres, capsules, cylinders, "
+                "boxes and ellipsoids can be reshaped."
+            )
+
+
+def stretch_segment(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float, axis: str | None = None
+) -> None:
+    """Make the segment `factor` times as long, at the same thickness, held at its anchor.
+
+    What hangs on it moves outwards with it.
+
+    Args:
+        spec: The model that `body` is in.
+        body: The segment.
+        factor: New length over old length.
+        axis: "x", "y" or "z" to stretch along that axis of the body only; None for all three.
+    """
+    if factor == 1.0:
+        return  # Moving a point by nothing may still round it.
+    held = anchor(body)
+    for geom in body.geoms:
+        stretch_geom(spec, geom, held, factor, axis)
+    _carry_outwards(spec, body, held, factor, axis)
+
+
+def _carry_outwards(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
+) -> None:
+    """Move what hangs on a segment that is stretched: further joints, sites, bodies."""
+    for joint in body.joints:
+        joint.pos = stretched(joint.pos, held, factor, axis)
+    for site in body.sites:
+        move_outwards(site, held, factor, axis)
+    for child in body.bodies:
+        held_there = held_at(spec, child)
+        child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
+
+
+def thicken_segment(spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float) -> None:
+    """Make every geom of the body `factor` times as thick, at the same length."""
+    for geom in body.geoms:
+        thicken_geom(spec, geom, factor)
+
+
+def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
+    """Make a limb and all that hangs on it `factor` times as large and as strong, in place.
+
+    Raises:
+        MorphologyError: If a body of it cannot be reshaped.
+    """
+    joints: set[str] = set()
+    for body in subtree(limb):
+        require_geometry(spec, body)
+        held = anchor(body)
+        for geom in body.geoms:
+            resize_geom(spec, geom, held, factor)
+        _carry_outwards(spec, body, held, factor)
+        for joint in body.joints:
+            joints.add(joint.name)
+            joint.armature *= factor
+            joint.damping = joint.damping * factor
+            joint.stiffness = joint.stiffness * factor
+            joint.frictionloss *= factor
+    for actuator in spec.actuators:
+        if actuator.target in joints:
+            actuator.gear = actuator.gear * factor
+
+
+def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
+    """Scale a body's mass and inertia alike, whichever way they are given."""
+    if body.explicitinertial:
+        body.mass *= factor
+        body.inertia = body.inertia * factor
+        body.fullinertia = body.fullinertia * factor
+    for geom in body.geoms:
+        scale_geom_mass(geom, factor)

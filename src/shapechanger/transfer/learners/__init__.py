@@ -1,0 +1,5 @@
+"""Learners: training, evaluating and storing policies."""
+
+from __future__ import annotations
+
+__all__: list[str] = []

@@ -1,0 +1,499 @@
+"""Four of the five measures of Taylor & Stone; the fifth, time to threshold, has its own file.
+
+Source of all of them: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcement Learning
+Domains: A Survey", JMLR 10 (2009) 1633-1685, section 2.
+
+With p the mean curve over seeds and H the horizon. Every function takes the arm in target steps or,
+through `in_total_steps`, in total steps. Positive differences mean that transfer helped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.metrics.curves import (
+    LearningCurves,
+    Reference,
+    check_comparable,
+    in_total_steps,
+)
+from shapechanger.transfer.metrics.intervals import (
+    Estimate,
+    estimate_difference,
+    estimate_ratio,
+    undefined,
+)
+
+__all__ = [
+    "DEFAULT_THRESHOLDS",
+    "MIN_HEADROOM",
+    "NO_CURVE",
+    "Measures",
+    "ReachTimes",
+    "Summary",
+    "TimeToThreshold",
+    "asymptotic_gain",
+    "auc_ratio",
+    "forward_transfer",
+    "jumpstart",
+    "steps_to_reach",
+    "summarise",
+    "time_to_threshold",
+    "total_reward_gain",
+]
+
+NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
+
+_NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."
+
+# An area of scores below this is zero with rounding.
+_ZERO_AREA: Final = 1e-9
+
+
+def jumpstart(
+    arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
+) -> Estimate:
+    """How much better the arm starts on the target, in units of the curves.
+
+    p_arm(0) - p_scratch(0) in target steps. In total steps p_arm(0) - p_scratch(source_steps): what
+    scratch has learnt by the time the arm has finished its source. If that is after the horizon,
+    scratch's last evaluation stands for it.
+
+    Args:
+        arm: Curves of the arm; one evaluation will do.
+        scratch: Curves of the baseline, evaluated at the same steps.
+        confidence: Of Welch's interval.
+
+    Raises:
+        StudyError: If the curves cannot be compared.
+    """
+    check_comparable(arm, scratch)
+    return estimate_difference(
+        arm.returns[:, 0], scratch.at(arm.source_steps)[:, 0], confidence=confidence
+    )
+
+
+def asymptotic_gain(
+    arm: LearningCurves, scratch: LearningCurves, *, last_k: int, confidence: float = 0.95
+) -> Estimate:
+    """How much better the arm ends, in units of the curves.
+
+    Mean of p_arm over the last k evaluations minus that of p_scratch. In total steps the arm is
+    read at the same k steps, of which its source steps are a part. The one evaluation of an arm
+    that is not trained on the target stands for its end, because the policy does not change.
+
+    Args:
+        arm: Curves of the arm.
+        scratch: Curves of the baseline, evaluated at the same steps.
+        last_k: k, how many evaluations count as the end, >= 1. One is the definition by the letter;
+            more of them take out noise.
+        confidence: Of Welch's interval.
+
+    Raises:
+        StudyError: If the curves cannot be compared or have fewer than k evaluations.
+    """
+    check_comparable(arm, scratch)
+    steps = scratch.last_steps(last_k)
+    gain = estimate_difference(
+        arm.at(steps).mean(axis=1), scratch.at(steps).mean(axis=1), confidence=confidence
+    )
+    if arm.n_evals > 1:
+        return gain
+    return Estimate(
+        gain.value, gain.low, gain.high, gain.method, f"{_NOT_TRAINED} {gain.note}".rstrip()
+    )
+
+
+def total_reward_gain(
+    arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
+) -> Estimate:
+    """How much more the arm is worth over its whole life, in units of the curves.
+
+    (∫ p_arm - ∫ p_scratch) / H by the trapezoid rule. Taylor & Stone's total reward is the area;
+    divided by the horizon it is the mean height of the curve, which keeps the unit and does not
+    grow with the budget.
+
+    Args:
+        arm: Curves of the arm.
+        scratch: Curves of the baseline, evaluated at the same steps.
+        confidence: Of Welch's interval.
+
+    Raises:
+        StudyError: If the curves cannot be compared.
+    """
+    check_comparable(arm, scratch)
+    if arm.n_evals == 1:
+        return undefined(NO_CURVE)
+    return estimate_difference(arm.auc(), scratch.auc(), confidence=confidence)
+
+
+def auc_ratio(
+    arm: LearningCurves,
+    scratch: LearningCurves,
+    *,
+    rng: np.random.Generator,
+    confidence: float = 0.95,
+    n_resamples: int = 10_000,
+) -> Estimate:
+    """Area under the arm's curve over area under scratch's, a pure number; 1 if they are equal.
+
+    ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It moves with any constant
+    added to the reward, so it has a meaning for scores only, where 0 is the random policy.
+    Undefined unless scratch's area is above zero.
+
+    Args:
+        arm: Scores of the arm.
+        scratch: Scores of the baseline, evaluated at the same steps.
+        rng: Draws the resamples.
+        confidence: Of the studentised bootstrap interval.
+        n_resamples: Resamples of the studentised bootstrap.
+
+    Raises:
+        StudyError: If the curves cannot be compared.
+    """
+    check_comparable(arm, scratch)
+    if arm.n_evals == 1:
+        return undefined(NO_CURVE)
+    return estimate_ratio(
+        arm.auc(),
+        scratch.auc(),
+        least=_ZERO_AREA,
+        too_small="Undefined: the area under scratch's curve is not above zero.",
+        rng=rng,
+        confidence=confidence,
+        n_resamples=n_resamples,
+    )
+
+
+# The measure divides by the headroom 1 - AUC_b: below one hundredth of the scale, a difference of
+# 0.01 in the areas, less than runs differ by chance, would already count as a transfer of 1.
+MIN_HEADROOM: Final = 0.01
+
+
+def forward_transfer(
+    arm: LearningCurves,
+    scratch: LearningCurves,
+    *,
+    rng: np.random.Generator,
+    confidence: float = 0.95,
+    n_resamples: int = 10_000,
+) -> Estimate:
+    """Forward transfer of Continual World, a pure number of at most 1; 0 means no effect.
+
+    (AUC - AUC_b) / (1 - AUC_b), with AUC of the arm and AUC_b of scratch, both areas divided by the
+    horizon (Wołczyk et al., "Continual World", NeurIPS 2021). 1 is the most that can be reached
+    only if no score passes 1; there the scores are success rates, here they are clipped. Undefined
+    where scratch leaves less than `MIN_HEADROOM`.
+
+    Args:
+        arm: Scores of the arm from `Reference.scores(..., clip=True)`.
+        scratch: Scores of the baseline, clipped too and evaluated at the same steps.
+        rng: Draws the resamples.
+        confidence: Of the studentised bootstrap interval.
+        n_resamples: Resamples of the studentised bootstrap.
+
+    Raises:
+        StudyError: If the curves cannot be compared or leave [0, 1].
+    """
+    check_comparable(arm, scratch)
+    for curves in (arm, scratch):
+        values = np.append(curves.returns, curves.floor)
+        if values.min() < 0.0 or values.max() > 1.0:
+            raise StudyError(
+                "Forward transfer needs scores in [0, 1]: use Reference.scores(curves, clip=True)."
+            )
+    if arm.n_evals == 1:
+        return undefined(NO_CURVE)
+    # Gain over headroom is one minus the ratio of what the two arms leave to be won.
+    left = estimate_ratio(
+        1.0 - arm.auc(),
+        1.0 - scratch.auc(),
+        least=MIN_HEADROOM,
+        too_small=f"Undefined: scratch leaves less than {MIN_HEADROOM:g} to be won.",
+        rng=rng,
+        confidence=confidence,
+        n_resamples=n_resamples,
+    )
+    return Estimate(
+        _rest(left.value),
+        _rest(left.high),
+        # No arm leaves less than nothing, though the interval does not know.
+        None if left.low is None else _rest(max(left.low, 0.0)),
+        left.method,
+        left.note,
+    )
+
+
+def _rest(share: float | None) -> float | None:
+    """One minus a share, or None."""
+    return None if share is None else 1.0 - share
+
+
+class ReachTimes(msgspec.Struct, frozen=True):
+    """When the seeds of one arm reached a threshold.
+
+    All seeds count. One that did not reach it is right-censored at the horizon H, the same for all
+    seeds, so that the Kaplan-Meier estimate is the plain empirical one.
+
+    Attributes:
+        fraction: Share of the seeds that reached it by H, from 0 to 1.
+        restricted_mean: Mean of min(time, H) in steps, from 0 to H: the restricted mean survival
+            time (Royston & Parmar, BMC Med. Res. Methodol. 13:152, 2013).
+        restricted_median: Step by which half the seeds had reached it; None if fewer did by H.
+    """
+
+    fraction: float
+    restricted_mean: float
+    restricted_median: float | None
+
+
+class TimeToThreshold(msgspec.Struct, frozen=True):
+    """How much sooner an arm reaches a threshold than scratch.
+
+    Attributes:
+        threshold: The declared height, in units of the curves.
+        arm: Times of the arm; None where they are undefined.
+        scratch: Times of scratch; None where they are undefined.
+        steps_saved: Restricted mean of scratch minus that of the arm, in steps; positive if the
+            arm is sooner.
+    """
+
+    threshold: float
+    arm: ReachTimes | None
+    scratch: ReachTimes | None
+    steps_saved: Estimate
+
+
+def steps_to_reach(curves: LearningCurves, threshold: float) -> NDArray[np.float64]:
+    """First step at which each seed is at or above `threshold`, shape (n_seeds,).
+
+    The first step at which the straight line between two evaluations is there; infinity if it is
+    not until the horizon. The grid of evaluations would do as well in target steps, but source
+    steps need not fall on it, and it would round the times of all seeds to a few values.
+
+    Args:
+        curves: Curves in target steps or in total steps.
+        threshold: In units of the curves.
+    """
+    if curves.source_steps > 0.0 and curves.floor >= threshold:
+        return np.zeros(curves.n_seeds)
+    times = [_first_step(curves.steps, row, threshold) for row in curves.returns]
+    steps = np.array(times) + curves.source_steps
+    return np.where(steps <= curves.horizon, steps, np.inf)
+
+
+def time_to_threshold(
+    arm: LearningCurves, scratch: LearningCurves, threshold: float, *, confidence: float = 0.95
+) -> TimeToThreshold:
+    """Taylor & Stone's time to threshold (JMLR 10, 2009, section 2), without dropping seeds.
+
+    The times are compared by their restricted means, because a mean over the seeds that reached the
+    threshold would favour the arm with the fewest of them.
+
+    Args:
+        arm: Curves of the arm.
+        scratch: Curves of the baseline, evaluated at the same steps.
+        threshold: Declared before the study, in units of the curves.
+        confidence: Of Welch's interval.
+
+    Raises:
+        StudyError: If the curves cannot be compared or the threshold is not finite.
+    """
+    check_comparable(arm, scratch)
+    if not math.isfinite(threshold):
+        raise StudyError(f"A threshold must be finite, got {threshold}.")
+    if arm.n_evals == 1:
+        return TimeToThreshold(threshold, None, None, undefined(NO_CURVE))
+    arm_steps = steps_to_reach(arm, threshold)
+    scratch_steps = steps_to_reach(scratch, threshold)
+    saved = estimate_difference(
+        # Swapped, because later means more steps and sooner is the gain.
+        np.minimum(scratch_steps, scratch.horizon),
+        np.minimum(arm_steps, arm.horizon),
+        confidence=confidence,
+    )
+    return TimeToThreshold(
+        threshold,
+        _reach_times(arm_steps, arm.horizon),
+        _reach_times(scratch_steps, scratch.horizon),
+        saved,
+    )
+
+
+def _first_step(steps: NDArray[np.float64], row: NDArray[np.float64], threshold: float) -> float:
+    """First crossing of one curve in its own steps, infinity if there is none."""
+    above = np.flatnonzero(row >= threshold)
+    if above.size == 0:
+        return math.inf
+    after = int(above[0])
+    if after == 0:
+        return 0.0
+    # The curve rises from below the threshold, so it may be read the other way round.
+    around = slice(after - 1, after + 1)
+    return float(np.interp(threshold, row[around], steps[around]))
+
+
+def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
+    """Summarise first steps, shape (n_seeds,), infinite where censored."""
+    half = float(np.sort(steps)[(steps.size - 1) // 2])
+    return ReachTimes(
+        fraction=float(np.isfinite(steps).mean()),
+        restricted_mean=float(np.minimum(steps, horizon).mean()),
+        restricted_median=half if math.isfinite(half) else None,
+    )
+
+
+# A grid instead of one height, because one height can be chosen to please. In units of score.
+DEFAULT_THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
+
+_NO_SCORES: Final = "Undefined: scratch did not end above the random policy, so there is no score."
+
+
+class Measures(msgspec.Struct, frozen=True):
+    """The measures of one arm against scratch, in one way of counting steps.
+
+    Attributes:
+        jumpstart: How much better the arm starts, in the unit of the summary.
+        asymptotic_gain: How much better it ends, in the unit of the summary.
+        total_reward_gain: How much more it is worth on the way, in the unit of the summary.
+        auc_ratio: Area of the arm over area of scratch, a pure number.
+        forward_transfer: Share of scratch's headroom that the arm wins, a pure number.
+        times_to_threshold: One for each declared threshold, in the order of declaration.
+    """
+
+    jumpstart: Estimate
+    asymptotic_gain: Estimate
+    total_reward_gain: Estimate
+    auc_ratio: Estimate
+    forward_transfer: Estimate
+    times_to_threshold: tuple[TimeToThreshold, ...]
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """All measures of one arm against scratch, and what they rest on.
+
+    Attributes:
+        unit: Unit of the gains: "score", or "return" where scratch did not learn, so that there
+            are no scores and only jumpstart, asymptotic gain and total reward gain exist.
+        reference: The scale of scores. A gain in returns is one in scores times final - random.
+        horizon: H, the budget in steps that both ways of counting share.
+        source_steps: Steps the arm spent on the source.
+        n_seeds_arm: Training runs of the arm.
+        n_seeds_scratch: Training runs from scratch.
+        last_k: How many evaluations count as the end.
+        confidence: Of every interval.
+        in_target_steps: Only steps on the target count.
+        in_total_steps: Steps on the source count too.
+    """
+
+    unit: Literal["score", "return"]
+    reference: Reference
+    horizon: float
+    source_steps: float
+    n_seeds_arm: int
+    n_seeds_scratch: int
+    last_k: int
+    confidence: float
+    in_target_steps: Measures
+    in_total_steps: Measures
+
+
+def summarise(
+    scratch: LearningCurves,
+    arm: LearningCurves,
+    reference: Reference,
+    *,
+    source_steps: float,
+    rng: np.random.Generator,
+    thresholds: Sequence[float] = DEFAULT_THRESHOLDS,
+    last_k: int = 5,
+    confidence: float = 0.95,
+    n_resamples: int = 10_000,
+) -> Summary:
+    """Measure one arm against scratch, in target steps and in total steps.
+
+    Args:
+        scratch: Curves of the baseline, in units of return and target steps.
+        arm: Curves of the arm, evaluated at the same steps; or once at step 0 for an arm that is
+            not trained on the target, of which jumpstart and asymptotic gain are defined.
+        reference: The target's own scale.
+        source_steps: Steps the arm spent on the source, >= 0.
+        rng: Draws the resamples. Both ways of counting use the same ones, so that with no source
+            steps they agree to the last digit.
+        thresholds: Declared heights, in units of score.
+        last_k: How many of the last evaluations count as the end.
+        confidence: Of every interval, between 0 and 1.
+        n_resamples: Resamples of each bootstrap interval.
+
+    Raises:
+        StudyError: If the curves cannot be compared, or an argument is out of range.
+    """
+    check_comparable(arm, scratch)
+    draws = int(rng.integers(2**63))
+
+    def measure(counted: LearningCurves) -> Measures:
+        return _measure(
+            counted, scratch, reference, thresholds, last_k, draws, confidence, n_resamples
+        )
+
+    return Summary(
+        unit="score" if reference.defined else "return",
+        reference=reference,
+        horizon=scratch.horizon,
+        source_steps=float(source_steps),
+        n_seeds_arm=arm.n_seeds,
+        n_seeds_scratch=scratch.n_seeds,
+        last_k=last_k,
+        confidence=confidence,
+        in_target_steps=measure(arm),
+        in_total_steps=measure(in_total_steps(arm, source_steps, floor=reference.random)),
+    )
+
+
+def _measure(
+    arm: LearningCurves,
+    scratch: LearningCurves,
+    reference: Reference,
+    thresholds: Sequence[float],
+    last_k: int,
+    draws: int,
+    confidence: float,
+    n_resamples: int,
+) -> Measures:
+    """All measures in one way of counting; the curves are in units of return."""
+    ratio, transfer = undefined(_NO_SCORES), undefined(_NO_SCORES)
+    times = tuple(TimeToThreshold(height, None, None, ratio) for height in thresholds)
+    if reference.defined:
+        transfer = forward_transfer(
+            reference.scores(arm, clip=True),
+            reference.scores(scratch, clip=True),
+            rng=np.random.default_rng(draws),
+            confidence=confidence,
+            n_resamples=n_resamples,
+        )
+        arm, scratch = reference.scores(arm), reference.scores(scratch)
+        ratio = auc_ratio(
+            arm,
+            scratch,
+            rng=np.random.default_rng(draws),
+            confidence=confidence,
+            n_resamples=n_resamples,
+        )
+        times = tuple(
+            time_to_threshold(arm, scratch, height, confidence=confidence) for height in thresholds
+        )
+    return Measures(
+        jumpstart=jumpstart(arm, scratch, confidence=confidence),
+        asymptotic_gain=asymptotic_gain(arm, scratch, last_k=last_k, confidence=confidence),
+        total_reward_gain=total_reward_gain(arm, scratch, confidence=confidence),
+        auc_ratio=ratio,
+        forward_transfer=transfer,
+        times_to_threshold=times,
+    )

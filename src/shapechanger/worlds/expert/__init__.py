@@ -1,0 +1,10 @@
+"""Who knows the whole course, and so always knows the way: paths round it and an expert driver."""
+
+from __future__ import annotations
+
+from shapechanger.worlds.expert.disturbance import Disturbance
+from shapechanger.worlds.expert.driver import CourseExpert
+from shapechanger.worlds.expert.line import CourseProgress
+from shapechanger.worlds.expert.path import CoursePath, plan_path
+
+__all__ = ["CourseExpert", "CoursePath", "CourseProgress", "Disturbance", "plan_path"]

@@ -1,0 +1,309 @@
+"""A smooth line through a lane whose edges are known: the least bent one between bounds.
+
+The points of the line are `middle + offset * left`, so how much it bends, the sum of its squared
+second differences, is a quadratic function of the offsets, and the best offsets between bounds are
+a convex problem. Racing lines are found like this: F. Braghin et al., "Race driver model",
+Computers and Structures 86 (2008); A. Heilmeier et al., "Minimum curvature trajectory planning",
+Vehicle System Dynamics 58 (2020).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from shapechanger.errors import WorldError
+from shapechanger.worlds.course import Course
+from shapechanger.worlds.expert.lattice import ClearanceField, Lattice, cheapest_way, lay_lattice
+from shapechanger.worlds.expert.line import ClosedLine, Spot
+from shapechanger.worlds.expert.traits import Traits
+
+__all__ = ["SPACING_M", "CoursePath", "least_bent", "plan_path", "plan_path_for", "speed_profile"]
+
+ROUNDS: Final = 150
+RELAXATION: Final = 1.6
+"""S. Boyd et al., "Distributed Optimization and Statistical Learning via the Alternating Direction
+Method of Multipliers" (2011), section 3.4.3: 1.5 to 1.8 converge faster than 1."""
+
+
+def least_bent(
+    middle: NDArray[np.float64],
+    left: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    wish: NDArray[np.float64],
+    pull: float,
+) -> NDArray[np.float64]:
+    """Offsets of a closed line that bends little.
+
+    Args:
+        middle: (N, 2) points, m, evenly spaced.
+        left: (N, 2) direction in which each may be moved.
+        low: (N,) smallest offset of each, m.
+        high: (N,) largest offset of each, m.
+        wish: (N,) offset that each would have, m.
+        pull: How much a line is bent for the wish: 1/m^4, a curvature of 1/m costs as much as being
+            `1 / sqrt(pull)` m away.
+
+    Returns:
+        (N,) offsets within the bounds.
+    """
+    count = len(middle)
+    step = float(np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1).mean())
+    bend = (
+        np.roll(np.eye(count), 1, axis=1) + np.roll(np.eye(count), -1, axis=1) - 2 * np.eye(count)
+    )
+    bend /= step**2
+    gram = bend.T @ bend
+    quadratic = gram * (left @ left.T) + pull * np.eye(count)
+    linear = np.einsum("ij,ij->i", left, gram @ middle) - pull * wish
+    # Scaled form of the alternating direction method: a step without bounds, a step onto them.
+    weight = 10.0 * pull + 1.0
+    inverse = np.linalg.inv(quadratic + weight * np.eye(count))
+    bounded = np.clip(wish, low, high)
+    debt = np.zeros(count)
+    for _ in range(ROUNDS):
+        free = inverse @ (weight * (bounded - debt) - linear)
+        free = RELAXATION * free + (1 - RELAXATION) * bounded
+        bounded = np.clip(free + debt, low, high)
+        debt += free - bounded
+    # The rest exactly: whoever lies on a bound stays there.
+    moves = (bounded > low + 1e-6) & (bounded < high - 1e-6)
+    if moves.any():
+        fixed = quadratic[np.ix_(moves, ~moves)] @ bounded[~moves]
+        bounded[moves] = np.linalg.solve(quadratic[np.ix_(moves, moves)], -linear[moves] - fixed)
+    return np.clip(bounded, low, high)
+
+
+SPACING_M: Final = 0.1
+"""About how far apart the points of a path are."""
+
+PULL: Final = 0.02
+"""How much a path bends to stay where there is room; see `least_bent`."""
+
+ATTEMPTS: Final = 8
+"""How often a line that comes too near is bent away before it is given up."""
+
+
+class CoursePath:
+    """A closed line with what a driver must know of it.
+
+    Args:
+        points: (N, 2), m, evenly spaced.
+        heading: (N,) its direction, rad, counter-clockwise from the x axis.
+        curvature: (N,) 1/m; to the left is positive.
+        clearance: (N,) distance to what is nearest, m.
+
+    Attributes:
+        points: As given.
+        heading: As given.
+        curvature: As given.
+        clearance: As given.
+        length: Once round, m.
+    """
+
+    def __init__(
+        self,
+        points: NDArray[np.float64],
+        heading: NDArray[np.float64],
+        curvature: NDArray[np.float64],
+        clearance: NDArray[np.float64],
+    ) -> None:
+        self.points = points
+        self.heading = heading
+        self.curvature = curvature
+        self.clearance = clearance
+        self._line = ClosedLine(points)
+        self.length = self._line.length
+
+    @property
+    def stations(self) -> NDArray[np.float64]:
+        """(N,) distance of each point along the path, m."""
+        return self._line.stations
+
+    def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
+        """The spot of the path that is nearest to a point.
+
+        Args:
+            x: m.
+            y: m.
+            hint: Station to look around, m; None looks everywhere.
+        """
+        return self._line.nearest(x, y, hint)
+
+    def ahead(self, station: float, distance: float) -> tuple[float, float]:
+        """The point that lies a distance farther along the path, m."""
+        return self._line.at(station + distance)
+
+    def index(self, station: float) -> int:
+        """Number of the point at a station, m."""
+        return self._line.index(station)
+
+    def way(self, start: float, end: float) -> float:
+        """The shorter way from one station to another, m; backward is negative."""
+        return self._line.ahead_by(start, end)
+
+
+def plan_path(
+    course: Course, half_width_m: float, margin_m: float, *, comfort_m: float | None = None
+) -> CoursePath:
+    """Find a smooth way round a course.
+
+    Args:
+        course: Where.
+        half_width_m: Of the vehicle, m.
+        margin_m: What must be left between its sides and everything else, m.
+        comfort_m: What should be left where there is room, m; three times the margin as it comes.
+
+    Returns:
+        A path whose points all have a clearance of `half_width_m + margin_m`.
+
+    Raises:
+        WorldError: Nothing gets through with so much room.
+    """
+    least = half_width_m + margin_m
+    comfort = half_width_m + (3 * margin_m if comfort_m is None else comfort_m)
+    obstacles = ClearanceField(course)
+    lattice = lay_lattice(course, obstacles)
+    # Between two points that are clear enough a line may come nearer by what lies between them.
+    for spare in (0.03, 0.0):
+        try:
+            way = cheapest_way(lattice, least + spare, max(comfort, least + 0.05))
+        except WorldError:
+            if not spare:
+                raise
+            continue
+        path = _smoothed(lattice, way, obstacles, least, comfort)
+        if path is not None:
+            return path
+    raise WorldError(
+        f"A way through the {course.world} with seed {course.seed} exists, but not one that is "
+        f"smooth and leaves {margin_m:.2f} m at each side of a vehicle of "
+        f"{2 * half_width_m:.2f} m. Use a smaller margin, or another seed."
+    )
+
+
+def plan_path_for(course: Course, traits: Traits) -> CoursePath:
+    """The way round a course for one vehicle.
+
+    Raises:
+        WorldError: There is none.
+    """
+    return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
+
+
+def _smoothed(
+    lattice: Lattice,
+    way: NDArray[np.int64],
+    obstacles: ClearanceField,
+    least: float,
+    comfort: float,
+) -> CoursePath | None:
+    """A smooth path that passes everything on the same side as a way, or None."""
+    extra = np.zeros(len(way))
+    for _ in range(ATTEMPTS):
+        low, high = _room(lattice, way, least, comfort, extra)
+        offsets = least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], PULL)
+        path = _splined(lattice.middle + offsets[:, None] * lattice.left, obstacles)
+        short = least - path.clearance
+        if short.max() <= 0:
+            return path
+        # Ask for more room about wherever it is missing, and try again.
+        knots = np.arange(len(path.points)) * len(way) // len(path.points)
+        need = np.zeros(len(way))
+        np.maximum.at(need, knots, np.maximum(short, 0.0))
+        for shift in (-2, -1, 1, 2):
+            need = np.maximum(need, np.roll(need, shift))
+        extra += 1.2 * need + 0.005 * (need > 0)
+    return None
+
+
+def _room(
+    lattice: Lattice,
+    way: NDArray[np.int64],
+    least: float,
+    comfort: float,
+    extra: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bounds of the offset at each station, m: comfortable ones where there is room for them."""
+    low, high = np.empty(len(way)), np.empty(len(way))
+    for i, k in enumerate(way):
+        # The way itself is always inside, so bounds of neighbours never lie past one another.
+        clear = float(lattice.clearance[i, k])
+        wanted = min(max(comfort, least + extra[i]), clear - 0.02 + extra[i])
+        wanted = min(max(wanted, least + extra[i]), clear)
+        first, last = _run(lattice.clearance[i] >= wanted, int(k))
+        low[i] = _edge(lattice, i, first, -1, wanted)
+        high[i] = _edge(lattice, i, last, +1, wanted)
+    return low, high
+
+
+def _run(mask: NDArray[np.bool_], k: int) -> tuple[int, int]:
+    """First and last number of the run of true values about one."""
+    false = np.flatnonzero(~mask)
+    after = np.searchsorted(false, k)
+    first = int(false[after - 1]) + 1 if after else 0
+    last = int(false[after]) - 1 if after < len(false) else len(mask) - 1
+    return first, last
+
+
+def _edge(lattice: Lattice, i: int, k: int, side: int, wanted: float) -> float:
+    """Offset beyond point k at which the clearance falls below what is wanted, m."""
+    here = float(lattice.offsets[k])
+    beyond = k + side
+    if not 0 <= beyond < len(lattice.offsets):
+        return here
+    inside, outside = float(lattice.clearance[i, k]), float(lattice.clearance[i, beyond])
+    if outside == 0.0 or inside <= wanted or outside >= inside:
+        return here  # 0 may mean that the point is no part of the lane.
+    share = (inside - wanted) / (inside - outside)
+    return here + min(share, 1.0) * (float(lattice.offsets[beyond]) - here)
+
+
+def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePath:
+    """An evenly spaced path through points, by a closed cubic spline."""
+    closed = np.vstack((knots, knots[:1]))
+    chords = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
+    spline = CubicSpline(chords, closed, bc_type="periodic")
+    # Even steps of the parameter are only nearly even steps along the line.
+    around = float(chords[-1])
+    count = max(round(around / SPACING_M), 8)
+    fine = np.linspace(0.0, around, 4 * count + 1)
+    arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
+    even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)
+    where = np.interp(even, arcs, fine)
+    points, first, second = spline(where), spline(where, 1), spline(where, 2)
+    speed = np.hypot(first[:, 0], first[:, 1])
+    curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3
+    heading = np.arctan2(first[:, 1], first[:, 0])
+    return CoursePath(points, heading, curvature, obstacles.distance(points))
+
+
+def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
+    """The speed to drive each point of a path at, m/s.
+
+    Bends limit it by the acceleration across, narrow places by care, and both are seen early
+    enough to slow down.
+
+    Args:
+        path: What is driven.
+        traits: By what.
+
+    Returns:
+        (N,) one a point of the path.
+    """
+    least = traits.half_width_m + traits.margin_m
+    comfort = traits.half_width_m + traits.comfort_m
+    room = np.clip((path.clearance - least) / (comfort - least), 0.0, 1.0)
+    speed = traits.top_speed * traits.cruise * (0.65 + 0.35 * room)
+    bend = np.maximum(np.abs(path.curvature), 1e-6)
+    speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
+    step = path.length / len(speed)
+    for i in range(2 * len(speed) - 1, -1, -1):  # Twice round, for the end is before the start.
+        here, after = i % len(speed), (i + 1) % len(speed)
+        can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
+        speed[here] = min(speed[here], can_brake_from)
+    return speed

@@ -1,0 +1,202 @@
+"""Choices by chance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.worlds.course import Lamp, Thing, ThingKind, Wall
+from shapechanger.worlds.layout.geometry import (
+    arcs,
+    between,
+    from_thing,
+    length,
+    normals,
+    segments,
+    to_segments,
+)
+
+__all__ = ["Furniture", "Lane", "Scatter", "Size", "scattered", "sunlit", "weighted_choice"]
+
+
+def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
+    """Index of one of several, each as often as its share of their sum says.
+
+    `Generator.choice` does the same thirty times slower, and it is asked for every panel of a wall.
+    """
+    left = float(rng.random()) * sum(shares)
+    for i, share in enumerate(shares):
+        left -= share
+        if left < 0.0:
+            return i
+    return len(shares) - 1
+
+
+FREE_AHEAD_M: Final = 3.0
+"""Nothing stands this far ahead of the first point of the route."""
+
+FREE_BEHIND_M: Final = 2.0
+"""Nor this far behind it: a truck with its trailer is 1 m long."""
+
+_BEFORE_DOORS_M: Final = 0.3
+"""Nothing stands this near to a door."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How large a kind of thing is: each number lies between two, m."""
+
+    kind: ThingKind
+    length: tuple[float, float]
+    width: tuple[float, float]
+    height: tuple[float, float]
+
+    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Thing:
+        """One of them, at a place. A round one is as wide as it is long."""
+        length, width, height = (
+            float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
+        )
+        thing = Thing(self.kind, x, y, yaw, length, width, height)
+        return Thing(self.kind, x, y, 0.0, length, length, height) if thing.is_round else thing
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A lane that is still empty.
+
+    Attributes:
+        route: Its middle, as that of a Course, (n, 2).
+        left: Walls at its left hand.
+        right: Walls at its right hand.
+    """
+
+    route: NDArray[np.float64]
+    left: tuple[Wall, ...]
+    right: tuple[Wall, ...]
+
+    def half_width(self) -> NDArray[np.float64]:
+        """Distance of each point of the route from the nearest wall, m, shape (n,)."""
+        return to_segments(self.route, segments((*self.left, *self.right))).min(axis=1)
+
+
+class Furniture:
+    """The things in a lane. One that would close it is refused.
+
+    Everything leaves its wider side free. Two that leave the same side free may stand close
+    together; where a vehicle has to change sides between two, they are as far apart as the gap.
+
+    Args:
+        lane: Where they stand.
+        half_width: What `lane.half_width()` said, (n,).
+        gap_m: Narrowest way through that may be left, m.
+    """
+
+    def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
+        self.lane = lane
+        self.half_width = half_width
+        self.things: list[Thing] = []
+        self.gap_m = 2.0 * float(half_width.min())
+        """Narrowest way through that is left, m."""
+        walls = (*lane.left, *lane.right)
+        self._walls = segments(walls)
+        self._lefts = len(lane.left)
+        self._doors = np.array([wall.surface == "door" for wall in walls])
+        self._wanted = gap_m
+        self._round_m = length(lane.route)
+        self._passed_left: list[bool] = []
+
+    def offer(self, thing: Thing, s: float) -> bool:
+        """Put a thing into the lane, if it fits.
+
+        Args:
+            thing: What, and where.
+            s: How far along the route its middle is, m.
+
+        Returns:
+            Whether it stands there now.
+        """
+        reach = max(thing.length, thing.width) / 2.0
+        s %= self._round_m
+        if s - reach < FREE_AHEAD_M or self._round_m - s - reach < FREE_BEHIND_M:
+            return False
+        far = from_thing(thing, self._walls)
+        left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
+        if min(left, right) <= 0.0 or max(left, right) < self._wanted:
+            return False
+        # Nobody puts a cabinet before a door.
+        if (far[self._doors] < _BEFORE_DOORS_M).any():
+            return False
+        narrowest = max(left, right)
+        passed_left = left >= right
+        for other, other_left in zip(self.things, self._passed_left, strict=True):
+            apart = between(thing, other)
+            if passed_left == other_left:
+                if apart <= 0.0:
+                    return False
+            elif apart < self._wanted + 0.1:
+                return False
+            else:
+                narrowest = min(narrowest, apart)
+        self.gap_m = min(self.gap_m, narrowest)
+        self.things.append(thing)
+        self._passed_left.append(passed_left)
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """A kind of thing to strew.
+
+    Attributes:
+        size: What, and how large.
+        share: How often it is chosen.
+        moored: How often it lies along the wall, from 0 to 1.
+    """
+
+    size: Size
+    share: float
+    moored: float = 0.0
+
+
+def scattered(
+    rng: np.random.Generator, furniture: Furniture, kinds: tuple[Scatter, ...], per_m: float
+) -> None:
+    """Offer things to a lane, about `per_m` for each metre of it; those that fit stay."""
+    route, half_width = furniture.lane.route, furniture.half_width
+    along, left = arcs(route), normals(route)
+    shares = [kind.share for kind in kinds]
+    for _ in range(rng.poisson(per_m * float(along[-1]))):
+        kind = kinds[weighted_choice(rng, shares)]
+        i = int(rng.integers(len(route)))
+        heading = float(np.arctan2(-left[i, 0], left[i, 1]))
+        thing = kind.size.draw(rng, 0.0, 0.0, heading)
+        if rng.random() < kind.moored:
+            side = 1.0 if rng.random() < 0.5 else -1.0
+            aside = side * (
+                float(half_width[i]) - thing.width / 2.0 - float(rng.uniform(0.05, 0.3))
+            )
+        else:
+            most = float(half_width[i]) - thing.width / 2.0
+            aside = float(rng.uniform(-most, most))
+            yaw = 0.0 if thing.is_round else float(rng.uniform(-np.pi, np.pi))
+            thing = replace(thing, yaw=yaw)
+        x, y = route[i] + left[i] * aside
+        furniture.offer(replace(thing, x=float(x), y=float(y)), float(along[i]))
+
+
+def sunlit(
+    rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
+) -> tuple[Lamp, ...]:
+    """Patches of sun on the lane, from two to eight."""
+    left = normals(route)
+    lamps: list[Lamp] = []
+    for _ in range(int(rng.integers(2, 9))):
+        i = int(rng.integers(len(route)))
+        x, y = route[i] + left[i] * half_width[i] * float(rng.uniform(-0.6, 0.6))
+        long, wide = float(rng.uniform(0.8, 2.0)), float(rng.uniform(0.4, 1.0))
+        lamps.append(Lamp(float(x), float(y), float(rng.uniform(-np.pi, np.pi)), long, wide))
+    return tuple(lamps)

@@ -1,0 +1,477 @@
+"""Textures made of numbers: no picture is stored or copied from anywhere."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import UnknownName
+
+__all__ = [
+    "CELLS",
+    "PAINTERS",
+    "ROWS",
+    "Field",
+    "asphalt",
+    "blend",
+    "board",
+    "brick",
+    "ceiling",
+    "clouds",
+    "door",
+    "fence",
+    "floor",
+    "glass",
+    "grain",
+    "grass",
+    "hedge",
+    "panel",
+    "plaster",
+    "quay",
+    "rock",
+    "shed",
+    "sky",
+    "stuffs",
+    "texture",
+    "water",
+    "window",
+]
+
+Field = NDArray[np.floating[Any]]
+"""A picture (H, W, 3) or one of its channels (H, W); single precision where it is large."""
+
+
+def clouds(
+    rng: np.random.Generator, height: int, width: int, rows: int, columns: int, octaves: int = 3
+) -> Field:
+    """Soft random patches, shape (height, width), mean 0, standard deviation 1.
+
+    It repeats without a seam in both directions. `rows` and `columns` are how many patches fit
+    into it; each further octave has twice as many, half as strong.
+    """
+    total = np.zeros((height, width), np.float32)
+    for octave in range(octaves):
+        down, across = min(rows << octave, height), min(columns << octave, width)
+        knots = rng.standard_normal((down, across)).astype(np.float32)
+        total += _stretch(_stretch(knots, height).T, width).T * np.float32(0.5**octave)
+    return (total - total.mean()) / (total.std() + np.float32(1e-6))
+
+
+def grain(rng: np.random.Generator, height: int, width: int) -> Field:
+    """Each pixel on its own, shape (height, width), mean 0, standard deviation 1."""
+    return rng.standard_normal((height, width), np.float32)
+
+
+def blend(ground: Field, colour: tuple[float, float, float], share: Field | float) -> Field:
+    """`ground` (H, W, 3) with `share` (H, W), from 0 to 1, of a colour painted over it."""
+    over = np.asarray(share, np.float32)[..., None]
+    return ground + over * (np.asarray(colour, np.float32) - ground)
+
+
+def _stretch(knots: Field, size: int) -> Field:
+    """Columns of `knots` (k, n) drawn out to (size, n), smoothly and round the edge."""
+    count = len(knots)
+    place = np.arange(size, dtype=np.float32) * np.float32(count / size)
+    below = place.astype(np.intp)
+    part = place - below
+    smooth = (part * part * (3.0 - 2.0 * part))[:, None].astype(np.float32)
+    return knots[below % count] * (1.0 - smooth) + knots[(below + 1) % count] * smooth
+
+
+_SIZE: Final = 256
+_TALL: Final = 512
+# Height of what is painted on a wall's texture from the floor up, as a share of the wall's 2.4 m.
+_SKIRTING: Final = 0.05
+_DARK: Final = (0.24, 0.22, 0.16)
+_FRAME: Final = (0.24, 0.22, 0.19)
+_STEEL: Final = (0.75, 0.75, 0.72)
+
+
+def _plain(colour: tuple[float, float, float], height: int, width: int) -> Field:
+    return np.tile(np.asarray(colour, np.float32), (height, width, 1))
+
+
+def plaster(rng: np.random.Generator) -> Field:
+    """A painted wall, 2.4 m high, with a dark skirting board; sockets and a notice on some."""
+    height, width = _SIZE, _SIZE
+    hue = np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3)
+    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
+    up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
+    image *= 0.86 + 0.14 * up  # Brighter towards the lamps.
+    if rng.random() < 0.7:
+        x = int(rng.integers(10, width - 20))
+        image[int(height * 0.84) : int(height * 0.88), x : x + 5] *= 0.62
+    if rng.random() < 0.8:
+        x = int(rng.integers(10, width - 50))
+        top, bottom = int(height * 0.28), int(height * 0.5)
+        image[top:bottom, x : x + 34] = _FRAME
+        image[top + 3 : bottom - 3, x + 3 : x + 31] = rng.uniform(0.45, 0.9, 3)
+        image[top + 8 : bottom - 12, x + 8 : x + 26] *= rng.uniform(0.5, 1.1)
+    edge = int(height * (1.0 - _SKIRTING))
+    image[edge:] = np.asarray(_DARK, np.float32) * rng.uniform(0.8, 1.7)
+    image[edge : edge + 2] *= 1.5  # The edge of the board catches the light.
+    image[-2:] *= 0.5
+    return image
+
+
+def panel(rng: np.random.Generator) -> Field:
+    """A wall clad in orange wood, with the skirting board of the others."""
+    image = plaster(rng) * np.asarray((0.92, 0.62, 0.40), np.float32)
+    image *= 1.0 + 0.04 * clouds(rng, _SIZE, _SIZE, 2, 40, 2)[..., None]
+    image[:, ::64] *= 0.8
+    return image
+
+
+def door(rng: np.random.Generator) -> Field:
+    """A wooden door in its frame, 2.1 m high, with a handle and a kick plate or a small window."""
+    height, width = _TALL, _SIZE
+    hue = np.array([0.46, 0.26, 0.12]) * rng.uniform(0.75, 1.25) + rng.uniform(-0.04, 0.04, 3)
+    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image *= 1.0 + 0.10 * clouds(rng, height, width, 2, 24, 2)[..., None]
+    if rng.random() < 0.5:  # Panels.
+        for top, bottom in ((0.10, 0.42), (0.52, 0.88)):
+            rows = slice(int(top * height), int(bottom * height))
+            image[rows, 60:196] *= 0.82
+            image[rows, 60:64] *= 0.6
+            image[rows, 192:196] *= 1.25
+    if rng.random() < 0.4:
+        image[60:220, 165:195] = (0.10, 0.12, 0.11)
+        image[60:220, 165:168] = _STEEL
+    if rng.random() < 0.4:
+        image[int(0.86 * height) : -4, 34:222] = np.asarray(_STEEL, np.float32) * 0.8
+    image[int(0.54 * height) : int(0.57 * height), 48:66] = _STEEL
+    image[int(0.50 * height) : int(0.62 * height), 46:54] = _STEEL
+    frame = np.asarray(_FRAME, np.float32) * rng.uniform(0.7, 1.6)
+    image[:, :24] = image[:, -24:] = image[:26] = frame
+    image[:, 24:28] = image[:, -28:-24] = image[26:30] = 0.04
+    image[:, 20:24] *= 1.4
+    image[-5:] = 0.03
+    return image
+
+
+def window(rng: np.random.Generator) -> Field:
+    """Tall panes with the night behind them, and what little they mirror."""
+    height, width = _SIZE, _SIZE
+    image = _plain((0.035, 0.04, 0.04), height, width)
+    glint = np.clip(clouds(rng, height, width, 6, 4), 0.0, 3.0)
+    image += 0.03 * glint[..., None]
+    for _ in range(4):
+        y, x = int(rng.integers(10, 150)), int(rng.integers(20, 220))
+        image[y : y + 3, x : x + 12] += rng.uniform(0.2, 0.6)
+    bar = np.asarray((0.62, 0.62, 0.55), np.float32)
+    for row in (0.0, 0.3, 0.62, 0.9):
+        image[int(row * height) : int(row * height) + 6] = bar
+    for column in (0.0, 0.5):
+        image[:, int(column * width) : int(column * width) + 6] = bar
+    image[int(0.93 * height) :] = _DARK
+    return image
+
+
+def brick(rng: np.random.Generator) -> Field:
+    """Courses of red brick, 12 of them, each half a brick further on than the one below."""
+    height, width, rows, columns = _SIZE, _SIZE, 24, 5
+    y = np.arange(height)[:, None] * rows / height
+    x = np.arange(width)[None, :] * columns / width + 0.5 * (y.astype(int) % 2)
+    number = y.astype(int) * columns + x.astype(int) % columns
+    shade = rng.uniform(0.65, 1.2, rows * columns).astype(np.float32)[number]
+    image = np.asarray((0.58, 0.26, 0.14), np.float32) * shade[..., None]
+    image *= 1.0 + 0.10 * grain(rng, height, width)[..., None]
+    joint = ((y % 1.0) < 0.14) | ((x % 1.0) < 0.05)
+    return blend(image, (0.62, 0.55, 0.42), joint.astype(np.float32))
+
+
+def board(rng: np.random.Generator) -> Field:
+    """A whiteboard on a painted wall, with something left on it."""
+    image, height, width = plaster(rng), _SIZE, _SIZE
+    top, bottom = int(0.14 * height), int(0.62 * height)
+    image[top - 3 : bottom + 3, 12:-12] = np.asarray(_STEEL, np.float32) * 0.7
+    image[top:bottom, 16:-16] = (0.86, 0.88, 0.82)
+    for _ in range(7):
+        y, x = int(rng.integers(top + 6, bottom - 6)), int(rng.integers(24, width - 90))
+        length = int(rng.integers(20, 70))
+        image[y : y + 2, x : x + length] = rng.uniform(0.1, 0.6, 3)
+    return image
+
+
+def glass(rng: np.random.Generator) -> Field:
+    """A partition of glass in steel: dim, a little green, brighter above."""
+    height, width = _SIZE, _SIZE
+    image = _plain((0.30, 0.36, 0.32), height, width)
+    up = np.linspace(1.3, 0.6, height, dtype=np.float32)[:, None, None]
+    image *= up * (1.0 + 0.08 * clouds(rng, height, width, 1, 5)[..., None])
+    image[:8] = image[-10:] = image[:, :6] = image[:, -6:] = np.asarray(_STEEL, np.float32) * 0.6
+    return image
+
+
+def floor(rng: np.random.Generator) -> Field:
+    """Polished concrete, 3 m wide: blotches, specks and a few scratches."""
+    height, width = _TALL, _TALL
+    hue = np.array([0.56, 0.54, 0.42]) + rng.uniform(-0.04, 0.04, 3)
+    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image *= 1.0 + 0.10 * clouds(rng, height, width, 5, 5, 4)[..., None]
+    image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
+    image *= 1.0 - 0.12 * np.clip(clouds(rng, height, width, 3, 3, 5), 0.0, 2.0)[..., None]
+    return image
+
+
+def ceiling(rng: np.random.Generator) -> Field:
+    """Pale tiles in a grid, 0.6 m each."""
+    height, width = _SIZE, _SIZE
+    image = _plain((0.60, 0.58, 0.46), height, width)
+    image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
+    image[::64] *= 0.7
+    image[:, ::64] *= 0.7
+    return image
+
+
+_GROUND: Final = 512
+
+
+def hedge(rng: np.random.Generator) -> Field:
+    """Leaves, darker below and between the twigs."""
+    leaves = clouds(rng, _SIZE, _SIZE, 24, 24, 3)
+    image = np.asarray((0.20, 0.34, 0.10), np.float32) * (1.0 + 0.32 * leaves[..., None])
+    image *= 1.0 + 0.18 * clouds(rng, _SIZE, _SIZE, 3, 4, 2)[..., None]
+    image = blend(image, (0.45, 0.52, 0.18), np.clip(leaves - 1.2, 0.0, 1.0) * 0.6)
+    up = np.linspace(1.15, 0.55, _SIZE, dtype=np.float32)[:, None, None]
+    return image * up
+
+
+def fence(rng: np.random.Generator) -> Field:
+    """Upright planks with gaps, eight of them, and a rail behind."""
+    planks = 8
+    wide = _SIZE // planks
+    shade = np.repeat(rng.uniform(0.75, 1.15, planks).astype(np.float32), wide)
+    image = np.asarray((0.56, 0.43, 0.29), np.float32) * shade[None, :, None]
+    image = image * (1.0 + 0.10 * clouds(rng, _SIZE, _SIZE, 2, 48, 2)[..., None])
+    image[:, np.arange(_SIZE) % wide < 3] = (0.10, 0.09, 0.06)
+    for row in (0.2, 0.75):
+        image[int(row * _SIZE) : int(row * _SIZE) + 3] *= 0.7
+    image[-14:] *= 0.6
+    return image
+
+
+def shed(rng: np.random.Generator) -> Field:
+    """Boards that lie flat, painted, with a plinth."""
+    hue = np.array([(0.50, 0.16, 0.11), (0.25, 0.34, 0.42), (0.42, 0.40, 0.33)][rng.integers(3)])
+    image = np.tile(hue.astype(np.float32), (_SIZE, _SIZE, 1))
+    image *= 1.0 + 0.07 * clouds(rng, _SIZE, _SIZE, 40, 3, 2)[..., None]
+    image[np.arange(_SIZE) % 16 < 2] *= 0.55
+    image[-20:] = (0.34, 0.33, 0.31)
+    return image
+
+
+def quay(rng: np.random.Generator) -> Field:
+    """Blocks of stone, pale above and green and wet below."""
+    rows, columns = 4, 3
+    y = np.arange(_SIZE)[:, None] * rows / _SIZE
+    x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
+    number = y.astype(int) * columns + x.astype(int) % columns
+    shade = rng.uniform(0.82, 1.12, rows * columns).astype(np.float32)[number]
+    image = np.asarray((0.60, 0.57, 0.51), np.float32) * shade[..., None]
+    image *= 1.0 + 0.09 * clouds(rng, _SIZE, _SIZE, 10, 10, 3)[..., None]
+    joint = ((y % 1.0) < 0.05) | ((x % 1.0) < 0.03)
+    image = blend(image, (0.25, 0.24, 0.21), joint.astype(np.float32))
+    edge = 0.70 + 0.04 * clouds(rng, 1, _SIZE, 1, 8, 2)
+    down = np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[:, None]
+    return blend(image, (0.13, 0.17, 0.10), np.clip((down - edge) * 8.0, 0.0, 0.85))
+
+
+def rock(rng: np.random.Generator) -> Field:
+    """Rough grey stone with a dark foot."""
+    rough = clouds(rng, _SIZE, _SIZE, 5, 5, 4)
+    image = np.asarray((0.42, 0.40, 0.37), np.float32) * (1.0 + 0.24 * rough[..., None])
+    up = np.linspace(1.1, 0.55, _SIZE, dtype=np.float32)[:, None, None]
+    return image * up
+
+
+def asphalt(rng: np.random.Generator) -> Field:
+    """A worn lane, 3 m wide: stones, patches, leaves blown over it."""
+    image = np.tile(np.asarray((0.40, 0.39, 0.37), np.float32), (_GROUND, _GROUND, 1))
+    image *= 1.0 + 0.11 * clouds(rng, _GROUND, _GROUND, 4, 4, 4)[..., None]
+    image *= 1.0 + 0.13 * grain(rng, _GROUND, _GROUND)[..., None]
+    cracks = np.abs(clouds(rng, _GROUND, _GROUND, 4, 4, 3)) < 0.025
+    image = blend(image, (0.16, 0.16, 0.15), cracks.astype(np.float32) * 0.8)
+    leaves = clouds(rng, _GROUND, _GROUND, 64, 64, 1) > 2.4
+    return blend(image, (0.42, 0.30, 0.12), leaves.astype(np.float32))
+
+
+def grass(rng: np.random.Generator) -> Field:
+    """Short grass with bare patches."""
+    image = np.tile(np.asarray((0.30, 0.42, 0.15), np.float32), (_SIZE, _SIZE, 1))
+    image *= 1.0 + 0.22 * clouds(rng, _SIZE, _SIZE, 40, 40, 2)[..., None]
+    bare = np.clip(clouds(rng, _SIZE, _SIZE, 3, 3, 3) - 0.6, 0.0, 1.0)
+    return blend(image, (0.42, 0.36, 0.22), bare * 0.7)
+
+
+def water(rng: np.random.Generator) -> Field:
+    """Green water, 4 m wide, with ripples that lie across."""
+    ripples = clouds(rng, _GROUND, _GROUND, 24, 10, 3)
+    image = np.asarray((0.20, 0.32, 0.33), np.float32) * (1.0 + 0.20 * ripples[..., None])
+    image *= 1.0 + 0.10 * clouds(rng, _GROUND, _GROUND, 3, 3, 2)[..., None]
+    return blend(image, (0.75, 0.82, 0.84), np.clip(ripples - 1.6, 0.0, 1.0) * 0.5)
+
+
+_SKY_SIZE: Final = 64
+_ZENITH: Final = np.array([0.36, 0.55, 0.82], np.float32)
+_HORIZON: Final = np.array([0.80, 0.86, 0.90], np.float32)
+# Where the middle of each face is, in the order in which MuJoCo takes them, and where its columns
+# and its rows, from the last to the first, run to. Found by drawing: as seen from within, columns
+# run to the left.
+_FACES: Final = (
+    ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
+    ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
+    ((0, 0, -1), (1, 0, 0), (0, -1, 0)),
+    ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
+)
+
+
+def sky(rng: np.random.Generator) -> Field:
+    """Shape (6 * size, size, 3), 0 to 1: blue above, pale at the horizon, mirrored below it."""
+    across = (np.arange(_SKY_SIZE, dtype=np.float32) + 0.5) * (2.0 / _SKY_SIZE) - 1.0
+    field = clouds(rng, 256, 256, 4, 4, 5)
+    cover = rng.uniform(-0.3, 0.9)
+    faces: list[Field] = []
+    for ahead, right, up in np.asarray(_FACES, np.float32):
+        rays = ahead + across[None, :, None] * right - across[:, None, None] * up
+        rays /= np.linalg.norm(rays, axis=2, keepdims=True)
+        height = np.abs(rays[..., 2])  # What is below the horizon is the image in the water.
+        image = _HORIZON + (_ZENITH - _HORIZON) * np.sqrt(height)[..., None]
+        # A layer of clouds, seen from below; 40 pixels of the field are its height.
+        place = rays[..., :2] / np.maximum(height, 0.08)[..., None] * 40.0
+        column, row = (np.mod(place[..., i], 256).astype(np.intp) for i in (0, 1))
+        share = np.clip(field[row, column] * 0.5 + cover, 0.0, 1.0)
+        share = share * np.clip(height * 4.0, 0.0, 1.0) * 0.8
+        faces.append(image + share[..., None] * (0.92 - image))
+    return np.concatenate(faces)
+
+
+ROWS: Final = 4
+"""Cells in a row of the picture, and rows."""
+
+_CELL: Final = 64
+# The colour of each stuff.
+_COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
+    {
+        "wood": (0.52, 0.34, 0.18),
+        "dark wood": (0.26, 0.12, 0.07),
+        "cardboard": (0.66, 0.52, 0.34),
+        "metal": (0.50, 0.52, 0.52),
+        "leaves": (0.19, 0.36, 0.12),
+        "clay": (0.58, 0.30, 0.18),
+        "cone": (0.92, 0.36, 0.06),
+        "post": (0.80, 0.78, 0.70),
+        "cabinet": (0.45, 0.47, 0.42),
+        "crate": (0.60, 0.45, 0.26),
+        "bark": (0.30, 0.22, 0.15),
+        "buoy": (0.85, 0.14, 0.08),
+        "hull": (0.86, 0.87, 0.88),
+        "bin": (0.16, 0.22, 0.20),
+        "black": (0.07, 0.07, 0.06),
+        "lamp": (1.0, 1.0, 0.96),
+    }
+)
+
+CELLS: Final[Mapping[str, int]] = MappingProxyType({name: i for i, name in enumerate(_COLOURS)})
+"""Where each stuff is: row by row from the top left."""
+
+
+def stuffs(rng: np.random.Generator) -> Field:
+    """All stuffs in one picture, shape (256, 256, 3), 0 to 1."""
+    image = np.zeros((ROWS * _CELL, ROWS * _CELL, 3), np.float32)
+    for name, colour in _COLOURS.items():
+        row, column = divmod(CELLS[name], ROWS)
+        cell = image[row * _CELL : (row + 1) * _CELL, column * _CELL : (column + 1) * _CELL]
+        cell[:] = _cell(name, np.asarray(colour, np.float32), rng)
+    return image
+
+
+def _cell(name: str, colour: Field, rng: np.random.Generator) -> Field:
+    """One stuff, shape (64, 64, 3)."""
+    cell = np.tile(colour, (_CELL, _CELL, 1))
+    if name == "lamp":
+        return cell
+    cell *= 1.0 + rng.uniform(-0.1, 0.1, 3).astype(np.float32)
+    cell *= 1.0 + 0.04 * grain(rng, _CELL, _CELL)[..., None]
+    if name == "leaves":
+        cell *= 1.0 + 0.35 * clouds(rng, _CELL, _CELL, 10, 10, 2)[..., None]
+    elif name in ("wood", "dark wood", "bark"):
+        cell *= 1.0 + 0.12 * clouds(rng, _CELL, _CELL, 16, 2, 2)[..., None]
+    elif name == "cone":
+        cell[24:38] = (0.92, 0.92, 0.88)
+    elif name == "post":
+        cell[14:24] = cell[40:50] = (0.75, 0.12, 0.08)
+    elif name == "cabinet":
+        cell[:, 31:33] *= 0.4
+        cell[28:36, 26:28] = cell[28:36, 36:38] = 0.75
+        cell[:4] *= 1.3
+        cell[-4:] *= 0.5
+    elif name == "crate":
+        cell[np.arange(_CELL) % 13 < 2] *= 0.3
+        cell[:, 8:13] *= 0.8
+        cell[:, -13:-8] *= 0.8
+    elif name == "cardboard":
+        cell[30:34] *= 1.2
+        cell[8:20, 10:26] *= 0.7
+    elif name == "hull":
+        cell[10:18] = (0.16, 0.24, 0.46)
+        cell[50:] *= 0.6
+    elif name == "buoy":
+        cell[26:40] = (0.90, 0.90, 0.86)
+    elif name == "bin":
+        cell[6:10] *= 2.2
+    return cell
+
+
+PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingProxyType(
+    {
+        "plaster": plaster,
+        "panel": panel,
+        "door": door,
+        "window": window,
+        "brick": brick,
+        "board": board,
+        "glass": glass,
+        "floor": floor,
+        "ceiling": ceiling,
+        "hedge": hedge,
+        "fence": fence,
+        "shed": shed,
+        "quay": quay,
+        "rock": rock,
+        "asphalt": asphalt,
+        "grass": grass,
+        "water": water,
+        "sky": sky,
+        "things": stuffs,
+    }
+)
+"""What paints each texture."""
+
+# A set of textures has at most ten of these, and there are a dozen sets per world to draw from.
+_KEPT: Final = 400
+
+
+@functools.lru_cache(_KEPT)
+def texture(name: str, seed: int) -> NDArray[np.uint8]:
+    """A texture, shape (H, W, 3), upright: the first row is the top. It cannot be written to.
+
+    Raises:
+        UnknownName: If nothing paints `name`.
+    """
+    if name not in PAINTERS:
+        raise UnknownName("texture", name, PAINTERS)
+    rng = np.random.default_rng([seed, crc32(name.encode())])
+    image = np.clip(PAINTERS[name](rng), 0.0, 1.0)
+    result = (image * 255.0 + 0.5).astype(np.uint8)
+    result.flags.writeable = False
+    return result

@@ -1,0 +1,306 @@
+"""How bright each place of a course is."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from shapechanger.worlds.course import Course, Thing, Wall
+from shapechanger.worlds.look import Look
+from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned
+
+__all__ = [
+    "Light",
+    "ceiling_patches",
+    "ground_patches",
+    "lamp_patches",
+    "thing_patches",
+    "verge_patches",
+    "wall_patches",
+]
+
+# Half of a lamp's light is gone this far to its side, m: about its height above the ground.
+_REACH: Final = 1.6
+# What a wall that looks away from the sun keeps of its light.
+_SHADE: Final = 0.72
+# What is left far from any lamp at full contrast, and under the open sky.
+_DARKEST: Final = 0.12
+_CLOUDED: Final = 0.6
+
+
+class Light:
+    """The light on walls and ground, worked out beforehand.
+
+    Args:
+        course: Its lamps, or patches of sun; without any, all is as bright as the sky.
+        look: Its contrast.
+    """
+
+    def __init__(self, course: Course, look: Look) -> None:
+        self._lamps = np.array([(lamp.x, lamp.y) for lamp in course.lamps]).reshape(-1, 2)
+        self._contrast = look.contrast
+        self._darkest = _DARKEST if course.ceiling_m > 0.0 else _CLOUDED
+        # Where the sun is, or which side the lamps shine to, follows from the course.
+        self._sun = np.random.default_rng([course.seed, 77]).uniform(-np.pi, np.pi)
+
+    def on_ground(self, points: Array) -> Array:
+        """Light at points (..., 2), 0 to 1."""
+        if not len(self._lamps):
+            return np.ones(points.shape[:-1])
+        flat = points.reshape(-1, 1, 2) - self._lamps
+        away = (flat * flat).sum(axis=2) / (_REACH * _REACH)
+        total = 1.0 - np.exp(-1.2 * (1.0 / (1.0 + away * away)).sum(axis=1))
+        dark = 1.0 - self._contrast * (1.0 - self._darkest)
+        return (dark + (1.0 - dark) * total).reshape(points.shape[:-1])
+
+    def facing(self, angle: float) -> float:
+        """What is left of it on a wall whose front looks along `angle`, rad; 0 to 1."""
+        turned = 0.5 + 0.5 * np.cos(angle - self._sun)
+        return float(1.0 - (1.0 - _SHADE) * min(1.0, 2.0 * self._contrast) * (1.0 - turned))
+
+
+# Size of a patch indoors, where the light changes, and outdoors, m.
+_FINE: Final = 0.6
+_COARSE: Final = 3.0
+# How far the ground goes on behind the walls, m; farther out it is under the horizon's pixel.
+_INDOORS_BEHIND: Final = 0.8
+_OUTDOORS_BEHIND: Final = 30.0
+# Width of the picture on the ground, and on the ceiling, m.
+_GROUND_PERIOD: Final = 3.0
+_CEILING_PERIOD: Final = 2.4
+# Lamps hang this far below the ceiling, m; verges lie this far above the ground.
+_GAP: Final = 0.02
+_VERGE_RISE: Final = 0.004
+_VERGE_WIDTH: Final = 0.4
+
+
+def ground_patches(course: Course, light: Light) -> Patches:
+    """The ground under the lane and a little farther, seen from above."""
+    corners = _tiles(course)
+    patches = Patches()
+    patches.add(
+        np.concatenate([corners, np.zeros((*corners.shape[:2], 1))], axis=2),
+        corners / _GROUND_PERIOD,
+        light.on_ground(corners),
+    )
+    return patches
+
+
+def ceiling_patches(course: Course, light: Light) -> Patches:
+    """The ceiling, seen from below."""
+    corners = _tiles(course)[:, ::-1]
+    patches = Patches()
+    patches.add(
+        np.concatenate([corners, np.full((*corners.shape[:2], 1), course.ceiling_m)], axis=2),
+        corners / _CEILING_PERIOD,
+        0.9 * light.on_ground(corners),
+    )
+    return patches
+
+
+def lamp_patches(course: Course, place: Array) -> Patches:
+    """The lamps, seen from below; each shows the texture at one `place` (2,)."""
+    patches = Patches()
+    for lamp in course.lamps:
+        cos, sin = np.cos(lamp.yaw), np.sin(lamp.yaw)
+        half = 0.5 * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)]) * (lamp.length, lamp.width)
+        corners = np.full((1, 4, 3), course.ceiling_m - _GAP)
+        corners[0, :, 0] = lamp.x + cos * half[:, 0] - sin * half[:, 1]
+        corners[0, :, 1] = lamp.y + sin * half[:, 0] + cos * half[:, 1]
+        patches.add(corners, np.tile(place, (1, 4, 1)))
+    return patches
+
+
+def verge_patches(course: Course, light: Light) -> Patches:
+    """Strips of grass along the feet of the walls."""
+    patches = Patches()
+    for wall in course.walls:
+        start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
+        length = float(np.hypot(*(end - start)))
+        if length <= 0.0:
+            continue
+        along = (end - start) / length
+        inwards = _VERGE_WIDTH * np.array([-along[1], along[0]])
+        flat = np.array([start, end, end + inwards, start + inwards])
+        corners = np.concatenate([flat, np.full((4, 1), _VERGE_RISE)], axis=1)[None]
+        far = length / 1.5
+        places = np.array([[(0.0, 0.2), (far, 0.2), (far, 0.0), (0.0, 0.0)]])
+        patches.add(corners, places, light.on_ground(flat)[None])
+    return patches
+
+
+def _tiles(course: Course) -> Array:
+    """Corners (n, 4, 2) of the tiles that cover the lane, counter-clockwise from above."""
+    indoors = course.ceiling_m > 0.0
+    size = _FINE if indoors else _COARSE
+    reach = float(course.half_width.max()) + (_INDOORS_BEHIND if indoors else _OUTDOORS_BEHIND)
+    low, high = course.route.min(axis=0) - reach, course.route.max(axis=0) + reach
+    count = np.ceil((high - low) / size).astype(int)
+    origin = low + size * np.argwhere(np.ones(count, bool))
+    if indoors:
+        # Under what nobody gets to see there is no floor: the hall is long, and its lane narrow.
+        every = max(1, int(size / course.spacing))
+        gaps = (origin + 0.5 * size)[:, None, :] - course.route[::every]
+        near = (gaps * gaps).sum(axis=2).min(axis=1) < (reach + size) ** 2
+        origin = origin[near]
+    return origin[:, None, :] + size * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+
+
+# Width of what a texture shows, m, of those that go on and on.
+_PERIOD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "plaster": 4.0,
+        "panel": 4.0,
+        "brick": 1.2,
+        "hedge": 1.5,
+        "fence": 1.2,
+        "quay": 2.4,
+        "shed": 2.0,
+        "rock": 2.0,
+    }
+)
+# Of those that show one whole thing, which is fitted into its wall.
+_WHOLE: Final[Mapping[str, float]] = MappingProxyType(
+    {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
+)
+# Share of the plastered walls that are clad in wood instead.
+_CLAD: Final = 0.2
+# A texture of a brick wall is this high, m, and goes on above; the others are drawn out to fit.
+_BRICK_HEIGHT: Final = 1.8
+# A usual door with its frame, m; above it is the wall it stands in.
+_DOOR_HEIGHT: Final = 2.1
+# The longest patch, m: the light changes over about the distance between two lamps.
+_LONGEST: Final = 0.8
+# Places up a wall at which its light is worked out, and what is left there of it.
+_ROWS: Final = np.array([0.0, 0.35, 1.0])
+_UPWARDS: Final = np.array([0.86, 1.0, 0.94])
+
+
+def wall_patches(course: Course, light: Light) -> dict[str, Patches]:
+    """Patches for each texture that the course has."""
+    result: dict[str, Patches] = defaultdict(Patches)
+    rng = np.random.default_rng([course.seed, 78])
+    for number, wall in enumerate(course.walls):
+        clad = rng.random() < _CLAD
+        # Walls of one kind do not start with the same part of the texture.
+        offset = (0.37 * number) % 1.0
+        if wall.surface == "door" and wall.height > _DOOR_HEIGHT + 0.05:
+            _add(result["door"], wall, light, 0.0, _DOOR_HEIGHT, offset)
+            _add(result["plaster"], wall, light, _DOOR_HEIGHT, wall.height, offset)
+        else:
+            name = "panel" if clad and wall.surface == "plaster" else wall.surface
+            _add(result[name], wall, light, 0.0, wall.height, offset)
+    return dict(result)
+
+
+def _add(
+    patches: Patches, wall: Wall, light: Light, low: float, high: float, offset: float
+) -> None:
+    """The part of a wall between two heights, in pieces short enough for the light to change."""
+    start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
+    length = float(np.hypot(*(end - start)))
+    if length <= 0.0:
+        return
+    columns = max(1, int(np.ceil(length / _LONGEST)))
+    share = np.linspace(0.0, 1.0, columns + 1)
+    across, down = _spread(wall, length, low, high)
+    # Who looks at the front has the end of the wall at the left.
+    base = end + share[:, None] * (start - end)
+    rows = low + _ROWS * (high - low)
+    points = np.empty((len(rows), columns + 1, 3))
+    points[..., :2] = base
+    points[..., 2] = rows[:, None]
+    places = np.empty((len(rows), columns + 1, 2))
+    places[..., 0] = offset * (wall.surface in _PERIOD) + across * share
+    places[..., 1] = (1.0 - _ROWS[:, None]) * down
+    along = end - start
+    facing = light.facing(float(np.arctan2(along[0], -along[1])))
+    lights = _UPWARDS[:, None] * (facing * light.on_ground(base))[None, :]
+    patches.add(_cells(points), _cells(places), _cells(lights[..., None])[..., 0])
+
+
+def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, float]:
+    """How often the texture is repeated along the wall, and upwards."""
+    if low > 0.0:
+        # Above a door: the upper part of the plaster, where there is no skirting board.
+        return length / _PERIOD["plaster"], (high - low) / wall.height
+    if wall.surface in _WHOLE:
+        return float(max(1, round(length / _WHOLE[wall.surface]))), 1.0
+    return length / _PERIOD[wall.surface], high / _BRICK_HEIGHT if wall.surface == "brick" else 1.0
+
+
+def _cells(grid: Array) -> Array:
+    """The four corners of each cell of a grid (rows, columns, k) whose rows go up: (n, 4, k)."""
+    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+    return np.stack(corners, axis=2).reshape(-1, 4, grid.shape[-1])
+
+
+# Parts of each thing, from below: half sizes and middle as shares of its length, width and height,
+# then the stuff. A box from -0.5 to 0.5 in x and y, and 0 to 1 in z, is the whole thing.
+_Part = tuple[tuple[float, float, float], tuple[float, float, float], str]
+_LEG: Final = (0.05, 0.06, 0.4)
+_BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
+    {
+        "box": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cardboard"),),
+        "cabinet": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cabinet"),),
+        "crate": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "crate"),),
+        "bench": (
+            (_LEG, (-0.4, -0.38, 0.4), "black"),
+            (_LEG, (-0.4, 0.38, 0.4), "black"),
+            (_LEG, (0.4, -0.38, 0.4), "black"),
+            (_LEG, (0.4, 0.38, 0.4), "black"),
+            ((0.5, 0.5, 0.15), (0.0, 0.0, 0.85), "dark wood"),
+        ),
+        "dinghy": (
+            ((0.34, 0.5, 0.5), (-0.16, 0.0, 0.5), "hull"),
+            ((0.10, 0.38, 0.5), (0.28, 0.0, 0.5), "hull"),
+            ((0.06, 0.22, 0.5), (0.44, 0.0, 0.5), "hull"),
+            ((0.04, 0.42, 0.06), (-0.05, 0.0, 1.05), "wood"),
+        ),
+    }
+)
+# Turned bodies: radius as a share of the diameter, and height as a share of the height.
+_Turned = tuple[tuple[tuple[float, float], ...], str]
+_ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
+    {
+        "bin": ((((0.42, 0.0), (0.5, 0.95), (0.5, 1.0), (0.0, 1.0)), "bin"),),
+        "plant": (
+            (((0.3, 0.0), (0.4, 0.3), (0.0, 0.3)), "clay"),
+            (((0.1, 0.28), (0.5, 0.5), (0.48, 0.75), (0.2, 0.98), (0.0, 1.0)), "leaves"),
+        ),
+        "cone": ((((0.5, 0.0), (0.5, 0.05), (0.36, 0.06), (0.05, 1.0), (0.0, 1.0)), "cone"),),
+        "post": ((((0.5, 0.0), (0.5, 0.96), (0.3, 1.0), (0.0, 1.0)), "post"),),
+        "tree": (
+            (((0.5, 0.0), (0.38, 0.1), (0.34, 0.5), (0.0, 0.5)), "bark"),
+            (((0.3, 0.4), (1.6, 0.55), (1.8, 0.72), (1.0, 0.92), (0.0, 1.0)), "leaves"),
+        ),
+        "buoy": ((((0.4, 0.0), (0.5, 0.25), (0.42, 0.5), (0.12, 0.8), (0.0, 1.0)), "buoy"),),
+    }
+)
+
+
+def thing_patches(course: Course, light: Light) -> Patches:
+    """All things of a course; they share one texture."""
+    patches = Patches()
+    for thing in course.things:
+        bright = float(light.on_ground(np.array([thing.x, thing.y])))
+        if thing.is_round:
+            for outline, stuff in _ROUND[thing.kind]:
+                profile = np.array(outline) * (thing.length, thing.height)
+                add_turned(patches, thing.x, thing.y, profile, stuff, bright)
+        else:
+            _add_boxes(patches, thing, bright)
+    return patches
+
+
+def _add_boxes(patches: Patches, thing: Thing, bright: float) -> None:
+    size = np.array([thing.length, thing.width, thing.height])
+    cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
+    for half, place, stuff in _BOXES[thing.kind]:
+        dx, dy, dz = np.array(place) * size
+        middle = np.array([thing.x + cos * dx - sin * dy, thing.y + sin * dx + cos * dy, dz])
+        add_box(patches, middle, np.array(half) * size, thing.yaw, stuff, bright)

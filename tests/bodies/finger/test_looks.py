@@ -1,0 +1,184 @@
+"""The anatomy that is shown: where it should be, and of no weight."""
+
+from __future__ import annotations
+
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters
+from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST
+from shapechanger.bodies.finger.looks import (
+    TENDON_COLOURS,
+    THICKEST_M,
+    THINNEST_M,
+    courses_of,
+)
+from shapechanger.bodies.finger.model import TARGET, FingerFigure
+from tests.bodies.finger.commands import STRETCHED, at_rest, made, modes
+
+
+@pytest.mark.parametrize("mode", modes())
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
+def test_what_is_shown_moves_nothing(parameters: FingerParameters, mode: str) -> None:
+    """Bit by bit: angles, speeds and tensions are those of the finger without it."""
+    found = []
+    for anatomy in (False, True):
+        model = made(parameters, mode, anatomy=anatomy)
+        data = at_rest(model, parameters)
+        rng = np.random.default_rng(0)
+        states = []
+        for _ in range(100):
+            data.ctrl[:] = rng.uniform(-1.0, 1.0, 7)
+            mujoco.mj_step(model, data, 5)
+            states.append(np.concatenate([data.qpos, data.qvel, data.act, data.actuator_force]))
+        found.append(np.array(states))
+    np.testing.assert_array_equal(*found)
+
+
+def test_what_is_not_drawn_is_not_there() -> None:
+    """No spatial tendon, no site and no geom more than the finger needs."""
+    plain, shown = made(), made(anatomy=True)
+    assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (7, 1, 5, 0)
+    assert (plain.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all()
+    assert shown.ntendon > 14
+    np.testing.assert_array_equal(shown.body_mass.sum(), plain.body_mass.sum())
+
+
+def _site(model: mujoco.MjModel, data: mujoco.MjData, body: str, at: int) -> np.ndarray:
+    """The point `at` (first 0, last -1) of a spatial tendon, in the axes of a body, m."""
+    world = data.site_xpos[at]
+    k = model.body(body).id
+    return data.xmat[k].reshape(3, 3).T @ (world - data.xpos[k])
+
+
+def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
+    """Body and number of each site that a course passes, from the wrist on."""
+    tendon = model.tendon(course).id
+    start, n = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
+    return [
+        (model.body(int(model.site_bodyid[site])).name, int(site))
+        for kind, site in zip(
+            model.wrap_type[start : start + n], model.wrap_objid[start : start + n], strict=True
+        )
+        if kind == mujoco.mjtWrap.mjWRAP_SITE
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tendon", "ends_at"),
+    [
+        ("FDP", "distal"),
+        ("FDS", "middle"),
+        ("EIP", "distal"),
+        ("EDC", "distal"),
+        ("LUM", "distal"),
+        ("DI", "proximal"),
+        ("PI", "distal"),
+    ],
+)
+def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
+    """And begins in the hand, and passes the bones in their order."""
+    model = made(anatomy=True)
+    order = ["hand", "proximal", "middle", "distal"]
+    for course in courses_of(tendon):
+        bodies = [body for body, _ in _stops(model, course)]
+        assert bodies[0] == "hand"
+        assert bodies[-1] == ends_at
+        assert bodies == sorted(bodies, key=order.index)
+
+
+def _places(tendon: str, body: str) -> np.ndarray:
+    """Where the courses of a tendon pass a bone of the straight finger, in its axes, m, (n, 3)."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return np.array(
+        [
+            _site(model, data, body, site)
+            for course in courses_of(tendon)
+            for at, site in _stops(model, course)
+            if at == body
+        ]
+    )
+
+
+def test_tendons_run_where_anatomy_has_them() -> None:
+    """Flexors below the bones, extensors above, the interossei and the lumbrical at their sides."""
+    for tendon, side in itertools.product(("FDP", "FDS"), ("hand", "proximal", "middle")):
+        assert (_places(tendon, side)[:, 2] < -0.002).all()
+    for tendon, side in itertools.product(("EIP", "EDC"), ("hand", "proximal", "middle", "distal")):
+        assert (_places(tendon, side)[:, 2] > 0.002).all()
+    for bone in ("hand", "proximal", "middle", "distal"):
+        assert _places("EIP", bone)[:, 1].max() < _places("EDC", bone)[:, 1].min()
+    assert _places("DI", "proximal")[0, 1] > 0.006
+    for tendon, sign in (("LUM", 1.0), ("PI", -1.0)):
+        assert sign * _places(tendon, "hand")[-1, 1] > 0.005
+        assert _places(tendon, "hand")[-1, 2] < -0.002
+        hood = _places(tendon, "proximal")
+        assert hood[0, 2] < 0.0 < hood[-1, 2]
+        assert (_places(tendon, "middle")[:, 2] > 0.003).all()
+        assert (sign * _places(tendon, "middle")[:, 1] > 0.0).all()
+
+
+def test_what_is_shown_pulls_as_what_moves() -> None:
+    """In mid-range each course shortens where its fixed tendon does, of arms above 2.5 mm."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    arms = []
+    for sign in (1.0, -1.0):
+        lengths = []
+        for j in range(len(JOINTS)):
+            data.qpos[:] = JOINT_REST
+            data.qpos[j] += sign * 0.05
+            mujoco.mj_forward(model, data)
+            lengths.append([data.ten_length[model.tendon(f"{t}/course").id] for t in TENDONS])
+        arms.append(np.array(lengths).T)
+    shown = (arms[1] - arms[0]) / 0.1
+    true = NOMINAL.arms
+    large = np.abs(true) > 2.5e-3
+    # FDP and FDS pass the knuckle in its middle here, and the arms have them a little ulnar.
+    large[:2, 1] = False
+    assert large.sum() == 12
+    np.testing.assert_array_equal(np.sign(shown[large]), np.sign(true[large]))
+
+
+def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
+    """Over all corners of the joints' ranges lengths stay within some centimetres."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    courses = [model.tendon(c).id for t in TENDONS for c in courses_of(t)]
+    straight = data.ten_length[courses].copy()
+    for corner in itertools.product(*JOINT_RANGE):
+        data.qpos[:] = corner
+        mujoco.mj_forward(model, data)
+        assert np.abs(data.ten_length[courses] - straight).max() < 0.045
+
+
+def test_each_tendon_has_a_colour_of_its_own() -> None:
+    """Also for those who see no difference between red and green: lightness or blue differs."""
+    assert tuple(TENDON_COLOURS) == TENDONS
+    # As deuteranopes see them: red and green become one, weighted as Viénot et al. 1999 do.
+    seen = [(0.29 * r + 0.71 * g, b) for r, g, b in TENDON_COLOURS.values()]
+    for one, other in itertools.combinations(seen, 2):
+        assert np.linalg.norm(np.subtract(one, other)) > 0.1
+
+
+def test_a_figure_takes_the_posture_it_is_shown_in() -> None:
+    """With its tendons as thick as they are pulled, and the target in its place."""
+    figure = FingerFigure()
+    pulled = np.linspace(0.0, 1.2, 7)
+    figure.show(JOINT_REST, pulled, np.array([0.05, 0.01, -0.04]))
+    np.testing.assert_array_equal(figure.data.qpos, JOINT_REST)
+    body = figure.model.body(TARGET).id
+    np.testing.assert_array_equal(figure.data.xpos[body], [0.05, 0.01, -0.04])
+    widths = figure.model.tendon_width[[figure.model.tendon(f"{t}/course").id for t in TENDONS]]
+    assert widths[0] == pytest.approx(THINNEST_M)
+    assert widths[-1] == pytest.approx(THICKEST_M)
+    assert (np.diff(widths[:6]) > 0.0).all()
+    hidden = figure.without_target()
+    assert hidden.geom(TARGET).rgba[3] == 0.0
+    assert figure.model.geom(TARGET).rgba[3] > 0.0

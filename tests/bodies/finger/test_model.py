@@ -1,0 +1,170 @@
+"""The finger's model: what each tendon does, and that nothing it is told throws it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters
+from shapechanger.bodies.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    PHALANX_LENGTH_M,
+)
+from shapechanger.bodies.finger.model import FINGERTIP, SIM_DT
+from shapechanger.envs.finger.gap import GAPS
+from tests.bodies.finger.commands import STRETCHED, at_rest, harsh_commands, made, modes
+
+# How far beyond its range a joint may be thrown, degrees: measured at most 4.8, 1.6, 5.9 and 15.3
+# (the end joint weighs 3 g, and a lumbrical with a servo's stiffness hits its stop at 39 rad/s).
+_MOST_BEYOND = np.array([7.0, 3.0, 8.0, 18.0])
+# rad/s; measured 40.
+_FASTEST = 50.0
+
+# In which direction each tendon moves the joints when it is pulled alone.
+_ANATOMY = {
+    "FDP": {"MCP_flexion": 1, "PIP_flexion": 1, "DIP_flexion": 1},
+    "FDS": {"MCP_flexion": 1, "PIP_flexion": 1},
+    "EIP": {"MCP_flexion": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "EDC": {"MCP_flexion": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "LUM": {"MCP_flexion": 1, "MCP_abduction": 1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "DI": {"MCP_flexion": 1, "MCP_abduction": 1},
+    "PI": {"MCP_flexion": 1, "MCP_abduction": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+}
+
+
+@pytest.mark.parametrize("tendon", TENDONS)
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
+def test_each_tendon_moves_the_joints_as_anatomy_says(
+    parameters: FingerParameters, tendon: str
+) -> None:
+    """Pulled alone for 0.08 s from the posture of rest, without weight, by a degree and more."""
+    model = made(parameters)
+    model.opt.gravity[:] = 0.0
+    ends = {}
+    for pulled in (-1.0, 1.0):
+        data = at_rest(model, parameters)
+        data.ctrl[TENDONS.index(tendon)] = pulled
+        seconds = 0.08 + parameters.command_delay
+        mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+        ends[pulled] = np.degrees(data.qpos[:4])
+    moved = dict(zip(JOINTS, ends[1.0] - ends[-1.0], strict=True))
+    for joint, sign in _ANATOMY[tendon].items():
+        assert sign * moved[joint] > 1.0, moved
+
+
+@pytest.mark.parametrize("tendon", TENDONS)
+def test_a_newton_of_tension_is_its_moment_arms_in_torque(tendon: str) -> None:
+    """MuJoCo's torque about each joint is minus the length's change with the angle: the arm."""
+    model = made()
+    data = at_rest(model)
+    i = TENDONS.index(tendon)
+    data.act[i] = 1.0
+    mujoco.mj_forward(model, data)
+    tensions = -data.actuator_force
+    np.testing.assert_allclose(data.qfrc_actuator, MOMENT_ARMS.T @ tensions, atol=1e-12)
+    assert tensions[i] == pytest.approx(NOMINAL.most_tension[i])
+    np.testing.assert_allclose(np.delete(tensions, i), LEAST_TENSION_N)
+
+
+@pytest.mark.parametrize("mode", modes())
+@pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
+def test_nothing_diverges_whatever_is_commanded(finger: str, mode: str) -> None:
+    """No warning, no joint far beyond its stop, no tendon that pushes or pulls too hard."""
+    parameters = {"nominal": NOMINAL, "stretched": STRETCHED}.get(finger)
+    if parameters is None:
+        parameters = GAPS[finger].draw(np.random.default_rng(3))
+    model = made(parameters, mode)
+    assert model.opt.timestep <= SIM_DT
+    if not parameters.gives:
+        assert model.opt.timestep == SIM_DT
+    steps = round(0.02 / model.opt.timestep)
+    most = np.array(parameters.most_tension)
+    low, high = JOINT_RANGE.T
+    for name, commands in harsh_commands(np.random.default_rng(0)):
+        data = at_rest(model, parameters)
+        for command in commands:
+            data.ctrl[:] = command
+            for _ in range(steps):
+                mujoco.mj_step(model, data)
+                angles = data.qpos[:4]
+                beyond = np.degrees(np.maximum(low - angles, angles - high))
+                assert (beyond < _MOST_BEYOND).all(), name
+                assert np.abs(data.qvel[:4]).max() < _FASTEST, name
+                # Stiff tendons shorten under tension, spools wind up: each pull has its sign.
+                tensions = data.actuator_force * (1.0 if parameters.gives else -1.0)
+                assert (tensions >= LEAST_TENSION_N - 1e-12).all(), name
+                assert (tensions <= most + 1e-12).all(), name
+        assert not any(warning.number for warning in data.warning), name
+
+
+def test_commands_beyond_their_range_are_those_at_its_end() -> None:
+    """A motor that is told 100 gives what it has."""
+    model = made()
+    ends = []
+    for command in (1.0, 100.0):
+        data = at_rest(model)
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, 50)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_stretched_tendon_is_slack_until_the_backlash_is_wound_up() -> None:
+    """Spools that turn by less than it move nothing."""
+    parameters = STRETCHED.replace(backlash=2e-3)
+    model = made(parameters)
+    data = at_rest(model, parameters)
+    data.qpos[4:] -= 1e-3
+    mujoco.mj_forward(model, data)
+    stretch = [model.tendon(f"{name}/stretch").id for name in TENDONS]
+    assert (data.ten_length[stretch] < parameters.backlash).all()
+    np.testing.assert_array_equal(data.qfrc_spring[4:], 0.0)
+    data.qpos[4:] += 2e-3
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_spring[4:], -10e3 * 1e-3)
+
+
+def test_lengths_are_those_beyond_the_straight_finger() -> None:
+    """0 when straight; flexion shortens flexors by their arms and lengthens extensors."""
+    model = made()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.ten_length[:7], 0.0, atol=1e-15)
+    data.qpos[:] = JOINT_REST
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.ten_length[:7], -MOMENT_ARMS @ JOINT_REST, atol=1e-15)
+
+
+def test_the_finger_has_the_size_and_weight_of_one() -> None:
+    """9 cm from knuckle to tip, and some 25 g."""
+    model = made()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    tip = data.site_xpos[model.site(FINGERTIP).id]
+    np.testing.assert_allclose(tip, [sum(PHALANX_LENGTH_M), 0.0, 0.0], atol=1e-12)
+    assert 0.020 < model.body_mass.sum() < 0.035
+    assert (np.diff(model.body_mass[1:4]) < 0.0).all()
+
+
+def test_a_command_acts_after_its_delay() -> None:
+    """Nothing before, and then as without a delay."""
+    late = NOMINAL.replace(command_delay=0.030)
+    tensions = []
+    for parameters in (NOMINAL, late):
+        model = made(parameters)
+        data = at_rest(model)
+        for _ in range(200):  # Until nothing is left of what was commanded before.
+            mujoco.mj_step(model, data)
+        data.ctrl[:] = 1.0
+        found = []
+        for _ in range(60):
+            mujoco.mj_step(model, data)
+            found.append(-data.actuator_force[0])
+        tensions.append(np.array(found))
+    now, later = tensions
+    np.testing.assert_allclose(later[:15], LEAST_TENSION_N, atol=1e-6)
+    np.testing.assert_allclose(later[15:], now[:45], atol=1e-6)

@@ -1,0 +1,81 @@
+"""The numbers of a finger: what they may be, and that they survive being written down."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
+from shapechanger.errors import FingerError
+from tests.bodies.finger.commands import STRETCHED
+
+
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["nominal", "stretched"])
+def test_parameters_survive_json(parameters: FingerParameters) -> None:
+    """To the last bit, as text and as bytes."""
+    text = parameters.to_json()
+    assert FingerParameters.from_json(text) == parameters
+    assert FingerParameters.from_json(text.encode()) == parameters
+
+
+def test_what_is_left_out_is_nominal() -> None:
+    """In Python and in JSON."""
+    changed = NOMINAL.replace(tendon_friction=1.0)
+    assert changed != NOMINAL
+    assert FingerParameters(tendon_friction=1.0) == changed
+    assert FingerParameters.from_json('{"tendon_friction": 1.0}') == changed
+    np.testing.assert_array_equal(changed.arms, MOMENT_ARMS)
+    assert not changed.gives
+    assert STRETCHED.gives
+
+
+def test_arms_are_a_copy() -> None:
+    """Whoever changes them changes no finger."""
+    NOMINAL.arms[:] = 0.0
+    np.testing.assert_array_equal(NOMINAL.arms, MOMENT_ARMS)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"moment_arms": ((1.0,) * 4,) * 6}, r"moment_arms: the shape must be \(7, 4\), got \(6"),
+        ({"most_tension": (25.0,)}, r"most_tension: the shape must be \(7,\), got \(1,\)."),
+        ({"joint_damping": (1.0,) * 3}, r"joint_damping: the shape must be \(4,\), got \(3,\)."),
+        ({"motor_lag": (1.0,)}, r"motor_lag: the shape must be \(\), got \(1,\)."),
+        ({"joint_noise": math.nan}, "joint_noise: the numbers must be finite, got nan."),
+        ({"tendon_stiffness": math.inf}, "tendon_stiffness: the numbers must be finite, got inf."),
+        ({"tendon_friction": -1.0}, "tendon_friction: the numbers must not be below zero, got -1"),
+        ({"motor_lag": 0.0}, "motor_lag must be above zero, got 0.0."),
+        ({"motor_kg": 0.0}, "motor_kg must be above zero, got 0.0."),
+        ({"motor_kg": "x"}, "motor_kg: these are no numbers: 'x'."),
+        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms: these are no numbers"),
+        ({"tendon_stiffness": 0.0}, "tendon_stiffness above zero."),
+        ({"most_tension": (0.5,) * 7}, "most_tension must be above least_tension, 0.5 N"),
+        ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
+    ],
+)
+def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """By name, with what must be."""
+    with pytest.raises(FingerError, match=sentence):
+        NOMINAL.replace(**changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("{", r"no parameters of a finger: Input data was truncated\.$"),
+        ("[]", "no parameters of a finger: Expected `object`, got `array`"),
+        ('{"tendon_fricton": 1.0}', "unknown field `tendon_fricton`"),
+        ('{"motor_lag": "slow"}', "Expected `float`, got `str`"),
+        ('{"motor_lag": 0.0}', r"motor_lag must be above zero, got 0\.0\.$"),
+        (b"\xff", "no parameters of a finger"),
+    ],
+)
+def test_json_that_is_no_finger_is_refused(text: str | bytes, sentence: str) -> None:
+    """In one sentence, whatever is wrong with it."""
+    with pytest.raises(FingerError, match=sentence):
+        FingerParameters.from_json(text)

@@ -1,0 +1,59 @@
+"""A family: one model, and the bodies that have a name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.bodies import Family
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import Mass, Stretch, to_json
+from tests.morphology.models import LEG
+
+FAMILY = Family("Leg", {"Leg": (), "LongLeg": (Stretch("thigh", 2.0),)}, {"knee": "calf"})
+
+
+def test_bodies_are_found_by_name() -> None:
+    """The first is the model as it is."""
+    assert FAMILY.body("Leg") == ()
+    assert FAMILY.body("LongLeg") == (Stretch("thigh", 2.0),)
+
+
+def test_a_name_that_is_not_there_is_named() -> None:
+    """With the nearest, and the family."""
+    with pytest.raises(
+        UnknownName, match=r"No body of the family Leg matches 'LongLegs'\. Did you"
+    ):
+        FAMILY.body("LongLegs")
+    with pytest.raises(UnknownName, match="No body of the family Leg matches ''"):
+        FAMILY.body("")
+
+
+def test_bodies_may_be_edits_or_their_json() -> None:
+    """JSON is told from a name by how it begins."""
+    edits = (Stretch("thigh", 2.0), Mass("shin", scale=2.0))
+    text = to_json(edits)
+    for value in (edits, list(edits), iter(edits), text, f"  {text}\n"):
+        assert FAMILY.body(value) == edits
+    assert FAMILY.body(edits[0]) == edits[:1]
+    assert FAMILY.body('{"edit":"stretch","body":"thigh","factor":2}') == edits[:1]
+
+
+@pytest.mark.parametrize("value", ["[1]", "{}", "[", 3, None, ["LongLeg"]])
+def test_what_is_no_body_is_refused(value: Any) -> None:
+    """As everywhere."""
+    with pytest.raises(MorphologyError):
+        FAMILY.body(value)
+
+
+def test_a_model_is_loaded_with_names(tmp_path: Path) -> None:
+    """Those of the file, those that the family chooses, and those that follow."""
+    path = tmp_path / "leg.xml"
+    path.write_text(LEG.replace('<body name="shin"', "<body"))
+    for given in (path, str(path)):
+        spec = FAMILY.load(given)
+        assert [body.name for body in spec.bodies] == ["world", "trunk", "thigh", "calf"]
+    plain = Family("Leg", {}).load(path)
+    assert [body.name for body in plain.bodies] == ["world", "trunk", "thigh", "knee"]

@@ -1,0 +1,101 @@
+"""The list of vehicles, and which robots fit them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import pytest
+
+from shapechanger.bodies.vehicles import VEHICLES, add_vehicle, require_fit, vehicle_model
+from shapechanger.bodies.vehicles.parts import HOBBY_MOTOR, HOBBY_SERVO
+from shapechanger.errors import ProfileError, UnknownName
+
+
+def test_each_is_listed_under_its_name() -> None:
+    """And none moves on both land and water."""
+    assert {name: model.name for name, model in VEHICLES.items()} == {n: n for n in VEHICLES}
+    assert set(VEHICLES) == {"car", "tank", "truck", "boat"}
+    assert [name for name, model in VEHICLES.items() if model.floats] == ["boat"]
+
+
+def test_an_unknown_name_gets_a_hint() -> None:
+    """With the nearest spelling."""
+    with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
+        vehicle_model("truk")
+    with pytest.raises(UnknownName):
+        add_vehicle(mujoco.MjSpec(), "plane")
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("car", {"wheels", "steering"}),
+        ("truck", {"wheels", "steering"}),
+        ("truck", {"wheels", "steering", "gear", "bed"}),
+        ("tank", {"left track", "right track"}),
+        ("boat", {"propeller", "rudder"}),
+        ("boat", {"left propeller", "right propeller"}),
+    ],
+)
+def test_robots_that_fit(name: str, parts: set[str]) -> None:
+    """Those of the shipped profiles."""
+    require_fit(name, parts)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "message"),
+    [
+        ("car", {"left track", "right track"}, "A car has no 'left track' or 'right track'."),
+        ("car", {"wheels"}, "The robot drives 'wheels'; a car is driven by 'steering' and"),
+        ("car", set[str](), "The robot drives nothing;"),
+        ("car", {"wheels", "steering", "bed"}, "A car has no 'bed'."),
+        ("truck", {"gear"}, "The robot drives nothing;"),
+        ("boat", {"propeller", "left propeller", "right propeller"}, ", or by 'left propeller'"),
+    ],
+)
+def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> None:
+    """The message says what it has and what would fit."""
+    with pytest.raises(ProfileError) as caught:
+        require_fit(name, parts)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("degrees", [True, False])
+def test_the_unit_of_angles_in_the_model_does_not_matter(degrees: bool) -> None:
+    """A world may be written in degrees or in radians."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = degrees
+    add_vehicle(spec, "truck")
+    limits = spec.compile().joint("vehicle/trailer yaw").range
+    assert limits == pytest.approx((-1.4835, 1.4835), abs=1e-3)
+
+
+def test_the_motor_is_that_of_its_data_sheet() -> None:
+    """At 6 V: 6 A and 1.2 kgf·cm when stalled, 0.5 A at 2200 turns a minute without load."""
+    free = 2200.0 * 2.0 * 3.141592653589793 / 60.0
+    assert HOBBY_MOTOR.amperes(6.0, 0.0) == pytest.approx(6.0)
+    assert HOBBY_MOTOR.amperes(6.0, free) == pytest.approx(0.5)
+    assert HOBBY_MOTOR.torque_per_current * 6.0 == pytest.approx(1.2 * 0.0980665)
+
+
+def test_a_gear_trades_speed_for_torque() -> None:
+    """Without losses, what comes out is what goes in."""
+    geared = HOBBY_MOTOR.geared(3.0)
+    assert geared.amperes(6.0, 10.0) == pytest.approx(HOBBY_MOTOR.amperes(6.0, 30.0))
+    assert geared.torque_per_current == pytest.approx(3.0 * HOBBY_MOTOR.torque_per_current)
+    assert geared.rotor_inertia == pytest.approx(9.0 * HOBBY_MOTOR.rotor_inertia)
+    assert HOBBY_MOTOR.geared(3.0, 0.5).friction == pytest.approx(1.5 * HOBBY_MOTOR.friction)
+
+
+def test_a_motor_that_brakes_draws_nothing() -> None:
+    """Neither shorted nor overrun by the wheels, in both directions."""
+    assert HOBBY_MOTOR.amperes(0.0, 100.0) == 0.0
+    assert HOBBY_MOTOR.amperes(1.0, 100.0) == 0.0
+    assert HOBBY_MOTOR.amperes(-6.0, -100.0) == HOBBY_MOTOR.amperes(6.0, 100.0) > 0.0
+
+
+def test_a_servo_turns_at_its_rate_under_full_torque() -> None:
+    """Which is how its damping is made."""
+    servo = replace(HOBBY_SERVO, stall_torque=0.5, free_rate=5.0)
+    assert servo.damping == pytest.approx(0.1)
