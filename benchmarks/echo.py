@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from shapechanger.layout import Feature, Layout
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.daemon.plan import DaemonPlan

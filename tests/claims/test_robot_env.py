@@ -11,8 +11,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.errors import LinkError
-from shapechanger.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.running import RunningRobot, run_robot

@@ -13,7 +13,7 @@ from typing import Final
 import pytest
 
 from shapechanger.cli.robot.trial.driver import Driver
-from shapechanger.remote.known import KnownRobot
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.oracle import propelled
 from shapechanger.twin.running import RunningRobot, run_robot

@@ -17,7 +17,7 @@ from typing import IO, Any, Final, Literal, Self
 
 from shapechanger.errors import RobotError
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile

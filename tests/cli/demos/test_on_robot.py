@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.remote.known_robots import KnownRobot, remember
 from shapechanger.twin.running import RunningRobot, run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually

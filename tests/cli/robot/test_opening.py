@@ -12,8 +12,8 @@ from shapechanger.cli import main
 from shapechanger.cli.robot import opening
 from shapechanger.cli.robot.opening import can_open, open_console
 from shapechanger.errors import LinkError
-from shapechanger.link.proof import new_key
-from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.link.authentication import new_key
+from shapechanger.remote.known_robots import KnownRobot, remember
 from shapechanger.twin.running import run_robot
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 

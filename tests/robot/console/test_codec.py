@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from shapechanger.link import messages as m
-from shapechanger.link.proof import make_proof, new_key, parse_key
+from shapechanger.link.authentication import make_proof, new_key, parse_key
 from shapechanger.twin.running import RunningRobot
 from tests.robot.console.browser import Console
 

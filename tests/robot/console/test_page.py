@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Route
 
-from shapechanger.link.proof import new_key
+from shapechanger.link.authentication import new_key
 from shapechanger.twin.running import RunningRobot
 from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
 

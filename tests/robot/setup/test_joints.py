@@ -13,7 +13,7 @@ from shapechanger.robot.drivers.as5600 import As5600, connect_encoders
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import examine_robot
-from shapechanger.robot.setup.joints import find_joint_zeros
+from shapechanger.robot.setup.zeros import find_joint_zeros
 from shapechanger.twin.chips.as5600 import Magnet
 from shapechanger.twin.local import LocalBoard
 from shapechanger.twin.wiring import Wiring

@@ -9,7 +9,7 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.tendons import find_zeros
+from shapechanger.robot.setup.zeros import find_zeros
 from shapechanger.twin.local import LocalBoard
 from shapechanger.twin.wiring import Wiring
 from shapechanger.twin.world.driving import DrivingWorld

@@ -33,7 +33,7 @@ def play_on_robot(episode: Episode, name: str) -> None:
         NoTerminal: If there is no terminal for a person to stop it from.
     """
     from shapechanger.remote.client import RobotClient
-    from shapechanger.remote.known import recall
+    from shapechanger.remote.known_robots import recall
     from shapechanger.teleop.terminal import Terminal
 
     known = recall(name)

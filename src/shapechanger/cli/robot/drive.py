@@ -15,7 +15,7 @@ from shapechanger.errors import LinkError
 if TYPE_CHECKING:
     from shapechanger.cli.robot.piloting import Pilot
     from shapechanger.remote.client import RobotClient
-    from shapechanger.remote.known import KnownRobot
+    from shapechanger.remote.known_robots import KnownRobot
 
 __all__ = ["Drive"]
 
@@ -45,7 +45,7 @@ class Drive:
         """Drive until Q, or until Ctrl-C beside the console."""
         from shapechanger.cli.robot.opening import can_open
         from shapechanger.cli.robot.piloting import load_pilot
-        from shapechanger.remote.known import recall
+        from shapechanger.remote.known_robots import recall
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")

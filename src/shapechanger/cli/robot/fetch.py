@@ -30,7 +30,7 @@ class Fetch:
         """Fetch; exits with 1 where an episode could not be fetched."""
         from shapechanger.cli.robot.fetching import episodes_there, fetch_episode
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known import recall
+        from shapechanger.remote.known_robots import recall
 
         console, failed = plain_console(), 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:

@@ -32,8 +32,7 @@ class Home:
         from shapechanger.robot.hardware import REAL, connect
         from shapechanger.robot.profile.edit import rewrite
         from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-        from shapechanger.robot.setup.joints import find_joint_zeros
-        from shapechanger.robot.setup.tendons import find_zeros
+        from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
         path = find_profile(self.profile)
         if path in shipped_profiles().values():

@@ -31,10 +31,10 @@ class Init:
         """Write it all, and say how to go on."""
         from shapechanger.cli.robot.key import how_to_remember, shown_credentials
         from shapechanger.cli.robot.serving import credentials_of
-        from shapechanger.link.fingerprint import fingerprint_hex
-        from shapechanger.remote.known import KnownRobot, check_name, remember
+        from shapechanger.link.authentication import fingerprint_hex
+        from shapechanger.remote.known_robots import KnownRobot, check_name, remember
         from shapechanger.robot.profile.starter import starter_text, write_profile
-        from shapechanger.robot.setup.unit import write_unit
+        from shapechanger.robot.setup.systemd import write_unit
 
         name = self.name or self.kind
         check_name(name)

@@ -21,11 +21,11 @@ from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (
     PULSES,
-    Jogging,
+    JogResult,
     motor_changes,
     pulse_changes,
     wheel_changes,
-    widened,
+    with_widest_pulses,
 )
 from shapechanger.twin.running import run_robot
 
@@ -92,7 +92,7 @@ class Calibration:
                 self.found |= self._wheel(sensor.name, float(_number(sensor.settings["wheel_m"])))
 
     def _pulses(self, output: OutputPlan) -> dict[str, Any]:
-        wide = widened(output)
+        wide = with_widest_pulses(output)
         low_key, _, high_key = PULSES[output.driver]
         settings = {
             f"output.{output.name}.{key}": wide.settings[key] for key in (low_key, high_key)
@@ -112,7 +112,7 @@ class Calibration:
                 if value is None:
                     return {}
                 found.append(value)
-        return dict(pulse_changes(wide, Jogging(*found)))
+        return dict(pulse_changes(wide, JogResult(*found)))
 
     def _ask_beyond(self, cap: float) -> None:
         self._console.print(f"  That is the cap of {cap:g}. Go beyond it? Y does.")

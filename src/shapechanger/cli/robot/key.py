@@ -59,8 +59,8 @@ class Key:
         except ImportError as error:
             raise MissingExtra("segno", "robot") from error
         from shapechanger.cli.robot.opening import console_address
-        from shapechanger.link.fingerprint import fingerprint_hex
-        from shapechanger.remote.known import KnownRobot
+        from shapechanger.link.authentication import fingerprint_hex
+        from shapechanger.remote.known_robots import KnownRobot
 
         key = credentials.key_file.read_text().strip()
         address = self.address or f"{socket.gethostname()}.local"
@@ -73,7 +73,7 @@ class Key:
 
 def shown_credentials(credentials: Credentials) -> str:
     """The key and the fingerprint, whole and in short, for people to read and to compare."""
-    from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
+    from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 
     key = credentials.key_file.read_text().strip()
     fingerprint = credentials.fingerprint
@@ -86,7 +86,7 @@ def shown_credentials(credentials: Credentials) -> str:
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
     """What to type on the computer that shall drive the robot."""
-    from shapechanger.link.fingerprint import fingerprint_hex
+    from shapechanger.link.authentication import fingerprint_hex
 
     return (
         "On the workstation, with the key from above:\n"

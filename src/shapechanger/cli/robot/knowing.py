@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapechanger.errors import LinkError, UnknownName
 from shapechanger.link.address import is_loopback, parse_address
-from shapechanger.remote.known import KnownRobot, check_name, known_names, recall, remember
+from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
 
 __all__ = ["can_be_known", "make_known"]
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import LinkError
 from shapechanger.link.address import parse_address
-from shapechanger.remote.trust import INSECURE
+from shapechanger.remote.known_robots import INSECURE
 
 if TYPE_CHECKING:
-    from shapechanger.remote.known import KnownRobot
+    from shapechanger.remote.known_robots import KnownRobot
 
 __all__ = ["can_open", "console_address", "open_console"]
 

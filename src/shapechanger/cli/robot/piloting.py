@@ -7,11 +7,11 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot
-from shapechanger.remote.vehicle import RemoteVehicleEnv
+from shapechanger.remote.known_robots import KnownRobot
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy

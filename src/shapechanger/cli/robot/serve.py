@@ -122,8 +122,8 @@ class Serve:
         from shapechanger.cli.robot.knowing import can_be_known, make_known
         from shapechanger.cli.robot.serving import credentials_of
         from shapechanger.link.address import Address
-        from shapechanger.link.fingerprint import fingerprint_hex
-        from shapechanger.remote.known import KnownRobot
+        from shapechanger.link.authentication import fingerprint_hex
+        from shapechanger.remote.known_robots import KnownRobot
 
         # Who asks for any port, or no TLS, tells whoever drives how to reach it.
         if not self.port or self.insecure or not can_be_known(name):

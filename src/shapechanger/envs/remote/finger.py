@@ -23,9 +23,9 @@ from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.envs.remote.finger_rig import RigSenses, StartApproach
+from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
-from shapechanger.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.tasks.finger import FingerSenses
 from shapechanger.twin.operator import Operator
 from shapechanger.twin.running import RunningRobot

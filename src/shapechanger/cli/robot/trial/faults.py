@@ -14,8 +14,8 @@ from typing import Final, Literal
 from shapechanger.cli.robot.trial.driver import Driver
 from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
+from shapechanger.link.authentication import new_key
 from shapechanger.link.messages import Role
-from shapechanger.link.proof import new_key
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault

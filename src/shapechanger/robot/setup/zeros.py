@@ -10,11 +10,12 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, As5600, connect_encoders
+from shapechanger.robot.drivers.dynamixel.plans import bus_settings, servo_settings
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.finding import Finding
 
-__all__ = ["bus_speed", "examine_encoders", "find_joint_zeros", "real_encoders"]
+__all__ = ["bus_speed", "examine_encoders", "find_joint_zeros", "find_zeros", "real_encoders"]
 
 _READINGS: Final = 50  # Half a second: an encoder is off by a count or two from one to the next.
 _FAST_HZ: Final = 400_000
@@ -126,3 +127,42 @@ def bus_speed(config: Path | None) -> Finding:
         f"Four encoders take 3 of every 10 ms at the usual 100000 bits a second: add "
         f"`dtparam=i2c_arm_baudrate={_FAST_HZ}` to {config} and restart the computer.",
     )
+
+
+def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
+    """Pull all tendons gently until nothing moves, and let go.
+
+    Nobody else may have the bus open, and somebody holds the finger straight.
+
+    Args:
+        plan: The robot.
+        hardware: Where its bus is.
+        wait: Lets some ten milliseconds go by.
+
+    Returns:
+        Position of each servo, in counts, by the name of its output.
+
+    Raises:
+        RobotError: If the robot has no servo bus, a servo fails, or a tendon finds no end.
+    """
+    # They need the SDK, which only a rig has.
+    from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+    from shapechanger.robot.drivers.dynamixel.homing import Homing
+
+    outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
+    if not outputs:
+        raise RobotError(f"{plan.name} has no tendons on a servo bus, and so no zeros to find.")
+    settings = bus_settings(outputs[0].settings, tuple(map(servo_settings, outputs)))
+    homing = Homing(settings)
+    bus = ServoBus(settings, hardware.servo_port)
+    try:
+        bus.set_up()
+        bus.hold()
+        while homing.zeros is None and not homing.failure:
+            homing.see(bus.cycle(homing.tensions, hardware.clock.now_ns()))
+            wait()
+    finally:
+        bus.close()
+    if homing.zeros is None:
+        raise RobotError(homing.failure)
+    return homing.zeros

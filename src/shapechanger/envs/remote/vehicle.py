@@ -1,4 +1,4 @@
-"""A robot on the network as a Gymnasium env."""
+"""A fixed control rate, on a clock that is handed in."""
 
 from __future__ import annotations
 
@@ -11,21 +11,115 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.envs.remote.operator import Preparation, Takeover
 from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation, Pace, Role, Welcome
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
-from shapechanger.remote.judge import BUMP, Judge
-from shapechanger.remote.known import KnownRobot, known_names, recall
-from shapechanger.remote.latency import frame_age_s, latencies
-from shapechanger.remote.operator import Preparation
-from shapechanger.remote.schedule import Schedule
-from shapechanger.remote.senses import Senses, View
-from shapechanger.remote.takeover import Takeover
+from shapechanger.remote.known_robots import KnownRobot, known_names, recall
+from shapechanger.remote.observations import BUMP, RobotSpaces, StepScorer, View
 from shapechanger.tasks.drive import DriveReward
 
-__all__ = ["OnReset", "RemoteVehicleEnv"]
+__all__ = ["LATE", "OnReset", "RemoteVehicleEnv", "Schedule", "frame_age_s", "latencies"]
+
+LATE: Final = 0.5
+"""By how much of a period a step may end late without having missed its deadline."""
+
+
+class Schedule:
+    """Ticks of equal distance, in step with the robot.
+
+    A step that ends a little late because this machine is slow is made up for by a shorter one, so
+    that the mean rate holds. Where the robot's observation came after the tick, the ticks go on
+    from there: two clocks are never equally fast, and the one who waits follows the other. A step
+    that misses its deadline is not made up for either, because two commands in quick succession are
+    worse than one that was late.
+
+    Args:
+        period_s: Time from tick to tick, s.
+        clock: The time, s; never runs backwards.
+    """
+
+    def __init__(self, period_s: float, clock: Callable[[], float]) -> None:
+        self._period_s = period_s
+        self._clock = clock
+        self._tick = clock()
+
+    def start(self) -> None:
+        """Let the first step begin now."""
+        self._tick = self._clock()
+
+    @property
+    def left_s(self) -> float:
+        """Time until the step should end, s; below zero when it is late."""
+        return self._tick + self._period_s - self._clock()
+
+    def advance(self, arrived_at: float) -> bool:
+        """End a step and begin the next.
+
+        Args:
+            arrived_at: When the observation came that ends it, s.
+
+        Returns:
+            Whether it missed its deadline.
+        """
+        end = self._tick + self._period_s
+        now = self._clock()
+        missed = now - end > LATE * self._period_s
+        self._tick = now if missed else max(end, arrived_at)
+        return missed
+
+
+_NS_PER_S: Final = 1e9
+
+
+def latencies(
+    answered: Observation,
+    seq: int,
+    sent_at: float,
+    received: Received,
+    clock: Literal["real", "twin"] = "real",
+) -> dict[str, float]:
+    """What can be said about the delays of a step, s; what cannot be measured is left out.
+
+    Args:
+        answered: The observation that the command was decided on.
+        seq: Number of the command.
+        sent_at: When it was sent, s of this machine's clock.
+        received: The observation after it.
+        clock: The robot's clock; a twin's seconds are not ours, so nothing is said of both.
+
+    Returns:
+        `capture_to_send`: from the picture to its departure, by the robot's clock. If the robot
+        acted on this very command, also `round_trip`: on the way there and back, without the time
+        that the robot had it; `observation_age_at_action`: how old the picture was that the command
+        answers when the command arrived; `command_to_pin`: from its arrival to the outputs.
+    """
+    seen = received.message
+    known = {"capture_to_send": (seen.sent_ns - seen.captured_ns) / _NS_PER_S}
+    if seen.applied_seq != seq or not seen.mine:
+        return known
+    if seen.command_ns is not None:
+        on_robot = (seen.sent_ns - seen.command_ns) / _NS_PER_S
+        if clock == "real":
+            known["round_trip"] = received.received_at - sent_at - on_robot
+        known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
+    if seen.command_ns is not None and seen.applied_ns is not None:
+        known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
+    return known
+
+
+def frame_age_s(received: Received, now: float) -> float:
+    """How old the picture of an observation is, s, without its time on the way.
+
+    Args:
+        received: The observation.
+        now: This machine's clock, s.
+    """
+    seen = received.message
+    return (seen.sent_ns - seen.captured_ns) / _NS_PER_S + now - received.received_at
+
 
 OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
 """Who brings the robot to the start."""
@@ -90,7 +184,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             armed at once. "person": a person arms it in any case. "routine": the commands of the
             profile. Or what to call with the seed.
         on_waiting: Is told in a sentence what a reset waits for; None for a warning in the log of
-            `shapechanger.remote.operator` once it waits for 2 s.
+            `shapechanger.envs.remote.operator` once it waits for 2 s.
         reset_timeout_s: How long a reset may wait, s.
         max_observation_age_s: How long a step may wait for an observation, s; None for as long as
             the robot takes an answer to one.
@@ -149,9 +243,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         try:
             welcome = self._client.welcome
             wide, high = size
-            self._senses = Senses(welcome, (int(wide), int(high)), image, state)
+            self._senses = RobotSpaces(welcome, (int(wide), int(high)), image, state)
             weights = DriveReward.from_weights({**welcome.reward, **(reward or {})})
-            self._judge = Judge(self._senses, weights)
+            self._judge = StepScorer(self._senses, weights)
             if pace == "realtime" and welcome.clock == "twin":
                 raise RobotRefused(
                     f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 import simplejpeg
 
@@ -12,7 +12,7 @@ from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.checked import FreezeDetector, check_jpeg
 
-__all__ = ["FrameChecks", "FrameReader"]
+__all__ = ["FrameChecks", "FrameReader", "Latest"]
 
 _FUTURE_NS: Final = 50_000_000  # Two clocks that are one may still be read in another order.
 _FIRST_PAUSE_S: Final = 0.1
@@ -148,3 +148,40 @@ class FrameReader:
         if trouble != self._trouble:
             self._trouble = trouble
             self._report(trouble)
+
+
+_T = TypeVar("_T")
+
+
+class Latest(Generic[_T]):
+    """Holds the newest thing that was put, until it is taken once.
+
+    A queue plays back what piled up while nobody read; this cannot, since it holds one thing and
+    gives it away once. One thread may put and another may take; a race can only lose a thing to a
+    newer one.
+    """
+
+    __slots__ = ("_slot",)
+
+    def __init__(self) -> None:
+        self._slot: list[_T] = []
+
+    def __bool__(self) -> bool:
+        """Whether there is something to take."""
+        return bool(self._slot)
+
+    def put(self, thing: _T) -> None:
+        """Replace what is there."""
+        self._slot = [thing]
+
+    def take(self) -> _T | None:
+        """The newest thing, which is then gone; None if there is none."""
+        slot = self._slot
+        try:
+            return slot.pop()  # Whoever pops first has it; `put` makes a new list.
+        except IndexError:
+            return None
+
+    def clear(self) -> None:
+        """Throw away what is there."""
+        self._slot = []

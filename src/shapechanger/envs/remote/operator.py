@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections.abc import Callable
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
 
-__all__ = ["Preparation"]
+__all__ = ["Preparation", "Takeover"]
 
 # s. How often to look whether a person has done something.
 _LOOK_EVERY_S: Final = 0.05
@@ -213,3 +215,60 @@ class Preparation:
             return False
         time.sleep(_LOOK_EVERY_S)
         return True
+
+
+_PERSON: Final = "person"
+
+
+class Takeover:
+    """Lets an episode go on while a person drives.
+
+    A person who is done gives the robot back and arms it for the program; until both have
+    happened, the program waits and moves nothing.
+
+    Args:
+        allowed: Whether an episode goes on at all when a person takes the robot.
+    """
+
+    def __init__(self, *, allowed: bool) -> None:
+        self._allowed = allowed
+        self._waits = False
+
+    def start(self) -> None:
+        """An episode begins: the robot is ours and armed."""
+        self._waits = False
+
+    def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
+        """Command, or say what we would do while somebody else commands.
+
+        Returns:
+            Number of the command or suggestion.
+
+        Raises:
+            LinkError: If the link is lost.
+        """
+        if not self._allowed or last.mine:
+            return robot.command(values, answers=last.seq)
+        if not last.holder:
+            # The person may have changed their mind meanwhile; then they go on driving.
+            with contextlib.suppress(RobotRefused):
+                robot.take()
+        return robot.suggest(values, answers=last.seq)
+
+    def goes_on(self, seen: Observation) -> bool:
+        """Whether the episode goes on though the robot is not ours, or not armed.
+
+        It does where a person drives, or is about to give it back.
+        """
+        if not self._allowed or seen.emergency:
+            return False
+        if seen.mine and seen.armed:
+            self._waits = False
+        elif seen.holder_role == _PERSON or not seen.holder:
+            self._waits = True
+        return self._waits and (seen.mine or seen.holder_role == _PERSON or not seen.holder)
+
+    @staticmethod
+    def action(seen: Observation) -> tuple[float, ...] | None:
+        """What a person commands; None where nobody but a program commands anything."""
+        return seen.commanded if seen.commanded and seen.holder_role == _PERSON else None

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import ctypes
 import logging
+import os
+import select
 import socket
+import threading
 from collections.abc import Callable
 from typing import Final
 
 from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_state, encode
 
-__all__ = ["GuardPort"]
+__all__ = ["LIFELINE", "GuardLink", "send_heartbeats", "send_lifeline"]
 
 _log = logging.getLogger(__name__)
 
@@ -18,7 +23,7 @@ _log = logging.getLogger(__name__)
 _URGENT: Final = ("end", "emergency", "disarm", "halt")
 
 
-class GuardPort:
+class GuardLink:
     """Hands orders to the guard and reads what it does.
 
     A guard that does not read fills the socket. Then a command is dropped, since it would be too
@@ -115,3 +120,78 @@ class GuardPort:
             self._loop.remove_reader(self._socket)
             self._loop.remove_writer(self._socket)
         self._on_lost()
+
+
+LIFELINE: Final = b"life"
+"""What comes with the descriptor."""
+
+_CLONE_FILES: Final = 0x400  # linux/sched.h
+_READY_S: Final = 1.0
+
+
+def send_lifeline(guard_fd: int) -> bool:
+    """Send the guard a descriptor that ends when this process does.
+
+    To be called while few files are open and nothing else runs.
+
+    Args:
+        guard_fd: The socket to the guard.
+
+    Returns:
+        Whether that is possible here; if not, the guard waits for the end of the socket.
+    """
+    ours, theirs = os.pipe()
+    # The new thread has a copy of each file; the one that nobody else shall have is closed here.
+    apart = threading.Event()
+    failed: list[bool] = []
+    threading.Thread(
+        target=_hold, args=(theirs, apart, failed), name="shapechanger-life", daemon=True
+    ).start()
+    held = apart.wait(_READY_S) and not failed
+    os.close(theirs)
+    if held:
+        # A guard that is gone already is noticed by whoever reads the socket.
+        with (
+            socket.socket(fileno=os.dup(guard_fd)) as guard,
+            contextlib.suppress(BrokenPipeError, ConnectionResetError),
+        ):
+            socket.send_fds(guard, [LIFELINE], [ours])
+    os.close(ours)
+    return held
+
+
+def _hold(fd: int, apart: threading.Event, failed: list[bool]) -> None:
+    """Hold a file that no other thread has, until the process ends or the other side does."""
+    unshare = getattr(ctypes.CDLL(None), "unshare", None)  # There is none but on Linux.
+    if unshare is None or unshare(_CLONE_FILES) != 0:
+        failed.append(True)
+        apart.set()
+        return
+    os.closerange(0, fd)
+    os.closerange(fd + 1, os.sysconf("SC_OPEN_MAX"))
+    ended = select.poll()
+    ended.register(fd, 0)  # Only that nobody reads any more.
+    apart.set()
+    ended.poll()
+
+
+async def send_heartbeats(fd: int, period_s: float) -> None:
+    """Send a byte each period until the supervisor is gone.
+
+    Args:
+        fd: Socket to the supervisor; this function owns it.
+        period_s: Real seconds between two bytes.
+    """
+    with socket.socket(fileno=fd) as heart:
+        heart.setblocking(False)
+        while True:
+            try:
+                # A supervisor that does not read has a full socket; that is no reason to end.
+                with contextlib.suppress(BlockingIOError):
+                    heart.send(b".")
+                with contextlib.suppress(BlockingIOError):
+                    if not heart.recv(1):
+                        return
+            except (BrokenPipeError, ConnectionResetError):
+                return
+            await asyncio.sleep(period_s)

@@ -1,4 +1,4 @@
-"""From what a robot says it senses and moves to spaces, layouts and observations."""
+"""From the JPEG of a robot to the picture of an observation."""
 
 from __future__ import annotations
 
@@ -10,13 +10,64 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import LinkError, RobotRefused, SpaceMismatch
+from shapechanger.errors import LinkError, MissingExtra, RobotRefused, SpaceMismatch
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.remote.inbox import Received
-from shapechanger.remote.picture import decoded, resized
+from shapechanger.tasks.drive import DriveReward
 
-__all__ = ["IMAGE", "Senses", "View"]
+__all__ = ["BUMP", "IMAGE", "RobotSpaces", "StepScorer", "View", "decode_picture", "resize_picture"]
+
+try:
+    import simplejpeg  # pyright: ignore[reportMissingTypeStubs]  # Typed, but for its arrays.
+except ImportError as error:
+    raise MissingExtra("simplejpeg", "remote") from error
+
+
+# Pixels. A few bytes of JPEG can claim a picture of 65,535 x 65,535, which is 12 GB.
+_MOST_PIXELS: Final = 4096 * 4096
+
+
+def decode_picture(jpeg: bytes) -> NDArray[np.uint8]:
+    """The picture, RGB, shape (height, width, 3).
+
+    Raises:
+        LinkError: If these bytes are no picture, or one too large to be meant.
+    """
+    try:
+        height, width = (int(n) for n in simplejpeg.decode_jpeg_header(jpeg)[:2])
+        if height * width > _MOST_PIXELS:
+            raise LinkError(f"A picture of {width} x {height} pixels is too large.")
+        return simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
+    except ValueError as error:
+        raise LinkError(f"The robot sent bytes that are no JPEG: {error}.") from None
+
+
+def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The picture at another size, without a library for it.
+
+    Where width and height shrink by whole numbers, each pixel is the mean of its box, rounded.
+    Otherwise each is the pixel nearest to its middle. The whole picture is kept, so a change of
+    proportions stretches it.
+
+    Args:
+        picture: Shape (height, width, 3).
+        size: Width and height in pixels, each at least 1.
+
+    Returns:
+        Shape (size[1], size[0], 3); the picture itself where the size is its own.
+    """
+    height, width = picture.shape[:2]
+    wide, high = size
+    if (width, height) == (wide, high):
+        return picture
+    if width % wide == 0 and height % high == 0:
+        boxes = picture.reshape(high, height // high, wide, width // wide, 3)
+        return np.rint(boxes.mean(axis=(1, 3))).astype(np.uint8)
+    rows = (2 * np.arange(high) + 1) * height // (2 * high)
+    columns = (2 * np.arange(wide) + 1) * width // (2 * wide)
+    return picture[rows[:, None], columns[None, :]]
+
 
 IMAGE: Final = "camera/image"
 """Name of the picture in an observation layout."""
@@ -40,7 +91,7 @@ class View:
     absent: tuple[str, ...]
 
 
-class Senses:
+class RobotSpaces:
     """The spaces of one robot, and how its messages fill them.
 
     Args:
@@ -140,7 +191,7 @@ class Senses:
         if received.jpeg is None or seq == self._picture_seq:
             return received.jpeg is not None
         try:
-            self._picture = decoded(received.jpeg)
+            self._picture = decode_picture(received.jpeg)
         except LinkError:
             return False
         self._picture_seq = seq
@@ -165,7 +216,7 @@ class Senses:
         if self._picture is None:
             raise LinkError("The robot has sent no picture yet.")
         fresh, self._viewed_seq = self._picture_seq != self._viewed_seq, self._picture_seq
-        image = resized(self._picture, self._size)
+        image = resize_picture(self._picture, self._size)
         image = image.copy() if image is self._picture else image
         seen = {"image": image, "state": state} if self._has_state else image
         return View(seen, fresh, absent)
@@ -202,3 +253,61 @@ class Senses:
             return state
         image = gym.spaces.Box(0, _BRIGHTEST, (self._size[1], self._size[0], 3), np.uint8)
         return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image
+
+
+BUMP: Final = "bump"
+"""Name of the event of a bump, and of the quantity."""
+
+_NS_PER_S: Final = 1e9
+_QUANTITIES: Final = ("speed", "collision", "stall")
+
+
+class StepScorer:
+    """Judges the steps of one robot, one after another.
+
+    Args:
+        senses: Reads the robot's messages.
+        reward: Weights of the task.
+    """
+
+    def __init__(self, senses: RobotSpaces, reward: DriveReward) -> None:
+        self._senses = senses
+        self._reward = reward
+        self._touched = False
+
+    def start(self, seen: Observation) -> None:
+        """Begin an episode: what it touches now is no collision of this episode."""
+        self._touched = bool(self._touches(seen)[0])
+
+    def judge(
+        self, before: Observation, seen: Observation, bumped: bool
+    ) -> tuple[bool, dict[str, float]]:
+        """Whether the task is over, and the terms of the reward.
+
+        Args:
+            before: The observation before.
+            seen: The one after.
+            bumped: Whether there was a bump, which may be over by now.
+        """
+        touches = self._touches(seen)[0]
+        stall = self._senses.quantity(seen, "stall")
+        hits = bool(touches) or bumped
+        collided = None if touches is None else hits and not self._touched
+        self._touched = hits
+        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
+        speed = self._senses.quantity(seen, "speed")
+        stalled = None if stall is None else bool(stall)
+        return self._reward.ends(collided), self._reward.terms(speed, collided, stalled, dt_s)
+
+    def sources(self, seen: Observation) -> dict[str, str]:
+        """Which sensor each quantity of the reward comes from."""
+        sources = {name: self._senses.source(seen, name) for name in _QUANTITIES}
+        return sources | {"collision": self._touches(seen)[1]}
+
+    def _touches(self, seen: Observation) -> tuple[float | None, str]:
+        """Whether it touches something, 0 or 1, and which sensor says so."""
+        for quantity in ("collision", BUMP):
+            value = self._senses.quantity(seen, quantity)
+            if value is not None:
+                return value, self._senses.source(seen, quantity)
+        return None, _ABSENT

@@ -1,7 +1,7 @@
-"""The robots that a workstation knows, one file each.
+"""Who it is that answers: the fingerprint is checked, or it is shown to a person to compare.
 
-They are in `~/.config/shapechanger/known/NAME.toml` (below `$XDG_CONFIG_HOME` where that is set),
-which only their owner may read, because they hold the key.
+Nothing is trusted on first use. A program cannot tell the robot from somebody who stands in
+between; a person who looks at both fingerprints can.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import ssl
 import tempfile
 import tomllib
 from dataclasses import dataclass
@@ -16,19 +17,70 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import LinkError, OutputError, UnknownName
-from shapechanger.link.address import parse_address
-from shapechanger.link.proof import parse_key
-from shapechanger.remote.trust import INSECURE, parse_trust
+from shapechanger.link.address import Address, parse_address
+from shapechanger.link.authentication import (
+    fingerprint_hex,
+    fingerprint_of,
+    fingerprint_short,
+    parse_key,
+)
+from shapechanger.link.authentication import parse_fingerprint as _parse_fingerprint
 
 __all__ = [
+    "INSECURE",
     "KnownRobot",
     "check_name",
     "forget",
     "known_folder",
     "known_names",
+    "parse_trust",
     "recall",
     "remember",
+    "shown_fingerprint",
+    "untrusted",
 ]
+
+INSECURE: Final = "insecure"
+"""In the place of a fingerprint: no encryption, and no proof of who answers."""
+
+
+def parse_trust(fingerprint: str) -> bytes | None:
+    """SHA-256 of the certificate to expect; None for "insecure".
+
+    Raises:
+        LinkError: If it is neither a fingerprint nor that word.
+    """
+    return None if fingerprint == INSECURE else _parse_fingerprint(fingerprint)
+
+
+def shown_fingerprint(address: Address, timeout_s: float) -> bytes:
+    """SHA-256 of the certificate that is shown at an address, whoever shows it.
+
+    Raises:
+        LinkError: If nobody shows one.
+    """
+    try:
+        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
+    except OSError as error:
+        raise LinkError(f"Nobody shows a certificate at {address}: {error}.") from None
+    return fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
+
+
+def untrusted(address: Address, timeout_s: float) -> LinkError:
+    """What to say to somebody who connects without a fingerprint.
+
+    Raises:
+        LinkError: If nobody shows one.
+    """
+    shown = shown_fingerprint(address, timeout_s)
+    digits = fingerprint_hex(shown)
+    return LinkError(
+        f"Nothing says that the robot at {address} is yours. It shows the fingerprint\n"
+        f"  {digits}  (in short {fingerprint_short(shown)})\n"
+        "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
+        f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
+    )
+
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")

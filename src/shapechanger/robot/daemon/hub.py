@@ -13,15 +13,19 @@ from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Command, Event, Lease, Refused, RobotMessage
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.lease import Holder, LeaseDesk
-from shapechanger.robot.daemon.library import Library
+from shapechanger.robot.daemon.control import (
+    ClientIdentity,
+    ControlLease,
+    PendingCommand,
+    PendingCommands,
+)
+from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.recorder import Recorder
-from shapechanger.robot.daemon.wishes import Wish, Wishes
 from shapechanger.robot.guard.wire import GuardState, Order
 
-__all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "Cockpit", "Member"]
+__all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "ConnectedClient", "SessionHub"]
 
 MAX_CLIENTS: Final = 8
 """Connections that are known at the same time."""
@@ -32,11 +36,11 @@ MAX_PROGRAMS: Final = 6
 _ARRIVALS: Final = 64  # Commands whose time of arrival is remembered; more than are on their way.
 
 
-class Member(Protocol):
+class ConnectedClient(Protocol):
     """A connection whose client is known."""
 
     @property
-    def who(self) -> Holder:
+    def who(self) -> ClientIdentity:
         """Who it is."""
         ...
 
@@ -49,7 +53,7 @@ class Member(Protocol):
         ...
 
 
-class Cockpit:
+class SessionHub:
     """The robot, as its connections see it; it waits for nothing and knows no sockets.
 
     Args:
@@ -79,7 +83,7 @@ class Cockpit:
         call: Callable[[Callable[[], None]], None] | None = None,
     ) -> None:
         self.plan = plan
-        self.lease = LeaseDesk()
+        self.lease = ControlLease()
         actions = Layout.from_json(plan.action_layout)
         self.reader = StateReader(Layout.from_json(plan.state_layout), actions)
         self.action_size = actions.size
@@ -89,18 +93,18 @@ class Cockpit:
         self.unsettled = False
         self._now_ns = now_ns
         self._order = order
-        self._members: dict[int, Member] = {}
+        self._members: dict[int, ConnectedClient] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._wishes = Wishes(plan.deadline_ms)
+        self._wishes = PendingCommands(plan.deadline_ms)
         call = _at_once if call is None else call
         self.recorder = Recorder(plan, self._tell, call)
-        self.library = Library(Path(plan.recordings) if plan.recordings else None, call)
+        self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
 
     def now_ns(self) -> int:
         """The robot's time."""
         return self._now_ns()
 
-    def join(self, member: Member) -> None:
+    def join(self, member: ConnectedClient) -> None:
         """Let a client in.
 
         Raises:
@@ -128,7 +132,7 @@ class Cockpit:
             self.recorder.end("The last person has left, and recording ended with that.")
             self._tell(self.recorder.state())
 
-    def take(self, who: Holder) -> None:
+    def take(self, who: ClientIdentity) -> None:
         """Give somebody the command, and tell everybody; or tell them why not."""
         refusal = self.lease.refusal(who)
         if refusal:
@@ -146,7 +150,7 @@ class Cockpit:
             reason = f"{who.name}, a person, took the command from {lost.name}."
         self._tell_lease(reason)
 
-    def release(self, who: Holder, why: str) -> None:
+    def release(self, who: ClientIdentity, why: str) -> None:
         """Take the command from somebody who has it, and disarm."""
         if not self.lease.give_up(who.session):
             return
@@ -188,7 +192,7 @@ class Cockpit:
         self.unsettled = True
         self._order(replace(order, issued_ns=self._now_ns()))
 
-    def suggest(self, who: Holder, values: tuple[float, ...]) -> None:
+    def suggest(self, who: ClientIdentity, values: tuple[float, ...]) -> None:
         """Take down what somebody who does not command would do."""
         self._wishes.suggest(who, values, self._now_ns())
 
@@ -198,7 +202,7 @@ class Cockpit:
             return ()
         return self._wishes.commanded(self._now_ns())
 
-    def suggested(self) -> Wish | None:
+    def suggested(self) -> PendingCommand | None:
         """What somebody who does not command would do; None for nothing."""
         return self._wishes.suggested(self._now_ns())
 
