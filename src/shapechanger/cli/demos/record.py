@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["EXPERT", "Record", "pilot_of"]
+__all__ = ["EXPERT", "RecordEpisodes", "pilot_of"]
 
 EXPERT: Final = "expert"
 
@@ -160,7 +160,7 @@ def _name(env: gym.Env[Any, Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Record:
+class RecordEpisodes:
     """Record an expert or a policy in an env."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]

@@ -15,7 +15,7 @@ from shapechanger.cli.console import plain_console
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = ["ListEpisodes", "Show", "shares", "told_length"]
+__all__ = ["ListEpisodes", "ShowEpisodes", "shares", "told_length"]
 
 _WIDEST: Final = 400
 
@@ -94,7 +94,7 @@ def shares(counts: dict[str, int]) -> str:
 
 
 @dataclass(frozen=True)
-class Show:
+class ShowEpisodes:
     """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
