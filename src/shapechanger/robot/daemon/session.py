@@ -48,7 +48,7 @@ from shapechanger.robot.daemon.limits import (
     printable,
 )
 from shapechanger.robot.daemon.observation import build_observation
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.guard.messages import Order
 
 __all__ = ["Authenticator", "Session", "WrongKey"]
 
