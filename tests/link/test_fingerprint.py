@@ -1,4 +1,4 @@
-"""Fingerprints as people compare them."""
+"""Fingerprints of certificates."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from shapechanger.link.authentication import (
 
 
 @given(certificate=st.binary(max_size=64))
-def test_a_fingerprint_is_read_as_it_is_written(certificate: bytes) -> None:
-    """In digits, in capitals and with colons as OpenSSL writes it."""
+def test_a_fingerprint_survives_a_round_trip(certificate: bytes) -> None:
+    """As hexadecimal digits, and with colons and capitals as OpenSSL writes it."""
     fingerprint = fingerprint_of(certificate)
     text = fingerprint_hex(fingerprint)
     pairs = ":".join(text[i : i + 2] for i in range(0, len(text), 2)).upper()
     assert parse_fingerprint(text) == parse_fingerprint(pairs) == fingerprint
 
 
-def test_the_short_one_has_four_groups() -> None:
-    """Short enough to read aloud, long enough that nobody makes a second one."""
+def test_the_short_form_has_four_groups() -> None:
+    """Short enough to read aloud, long enough to be unique."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]
 
 
 @pytest.mark.parametrize("text", ["", "ab" * 31, "ab" * 33, "zz" * 32])
-def test_what_is_no_fingerprint_is_refused(text: str) -> None:
-    """The message says where to find the right one."""
+def test_an_invalid_fingerprint_is_an_error(text: str) -> None:
+    """The message shows the expected form."""
     with pytest.raises(LinkError, match="64 hexadecimal digits"):
         parse_fingerprint(text)

@@ -1,4 +1,4 @@
-"""The key, and the proof that somebody holds it."""
+"""Keys, and proofs that a client holds one."""
 
 from __future__ import annotations
 
@@ -21,10 +21,8 @@ _roles = st.sampled_from(("person", "program"))
 
 
 @given(key=_parts, nonce=_parts, certificate=_parts, role=_roles)
-def test_who_holds_the_key_can_prove_it(
-    key: bytes, nonce: bytes, certificate: bytes, role: str
-) -> None:
-    """Both sides come to the same proof."""
+def test_the_key_proves_itself(key: bytes, nonce: bytes, certificate: bytes, role: str) -> None:
+    """Both sides compute the same proof."""
     assert is_proof(make_proof(key, nonce, certificate, role), key, nonce, certificate, role)
 
 
@@ -40,7 +38,7 @@ def test_a_proof_fits_nothing_else(
 
 @given(proof=st.binary(max_size=64))
 def test_no_guess_is_a_proof(proof: bytes) -> None:
-    """Not even one of another length."""
+    """Nor any bytes of another length."""
     assert not is_proof(proof, b"k" * 16, b"n" * NONCE_BYTES, b"", "program")
 
 
@@ -66,15 +64,15 @@ def test_a_key_can_be_copied_by_hand() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "26 letters and numbers, this one has 0"),
-        ("ABCD-EFGH", "this one has 8"),
-        ("A" * 25 + "9", "letters A to Z and the numbers 2 to 7"),
-        ("A" * 25 + "ß", "26 letters and numbers, this one has 27"),
+        ("", "26 letters and digits, got 0"),
+        ("ABCD-EFGH", "got 8"),
+        ("A" * 25 + "9", "letters A to Z and the digits 2 to 7"),
+        ("A" * 25 + "ß", "26 letters and digits, got 27"),
         ("A" * 25 + "é", "letters A to Z"),
-        ("A" * 25 + "B", "wrong last letter"),
+        ("A" * 25 + "B", "last letter of this key is wrong"),
     ],
 )
-def test_what_is_no_key_is_refused(text: str, words: str) -> None:
+def test_an_invalid_key_is_an_error(text: str, words: str) -> None:
     """The message says what a key looks like."""
     with pytest.raises(LinkError, match=words):
         parse_key(text)

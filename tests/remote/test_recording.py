@@ -73,7 +73,7 @@ def test_what_cannot_be_is_said_and_the_link_stands(robot: Served) -> None:
             lambda: client.browse("/"),
             lambda: client.judge("x", -1, 0, keep=True),
         ):
-            with pytest.raises(LinkError, match="no message"):
+            with pytest.raises(LinkError, match="Not a valid message"):
                 nonsense()
         for impossible, why in (
             (lambda: client.record(on=False), "Nothing is being recorded"),

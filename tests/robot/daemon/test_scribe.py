@@ -43,7 +43,7 @@ def test_everything_is_written_in_the_order_in_which_it_was_told(tmp_path: Path)
     assert scribe.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
     assert answers == [
-        "There is no step yet that could be marked.",
+        "There is no step to mark yet.",
         "There is nothing to undo.",
         "",
         "",
@@ -91,9 +91,9 @@ _WRITES_FOR_EVER = """
 import sys
 from pathlib import Path
 from tests.robot.daemon.test_scribe import HEADER, step
-from shapechanger.robot.daemon.recorder import Scribe
+from shapechanger.robot.daemon.recorder import EpisodeThread
 
-scribe, number = Scribe(Path(sys.argv[1]), HEADER, lambda *_: None), 0
+scribe, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
 while True:
     if scribe.progress.steps >= number - 100:
         scribe.add(step(number))

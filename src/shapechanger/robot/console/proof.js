@@ -10,7 +10,7 @@ const MISREAD = { 0: "O", 1: "I", 8: "B" };
 export function parseKey(text) {
   const plain = text.toUpperCase().replace(/[-\s]/g, "").replace(/[018]/g, (c) => MISREAD[c]);
   if (plain.length !== CHARACTERS) {
-    throw new Error(`A key has ${CHARACTERS} letters and numbers, this one has ${plain.length}.`);
+    throw new Error(`A key has ${CHARACTERS} letters and digits, got ${plain.length}.`);
   }
   const key = new Uint8Array(KEY_BYTES);
   let bits = 0;
@@ -18,7 +18,7 @@ export function parseKey(text) {
   let at = 0;
   for (const letter of plain) {
     const value = ALPHABET.indexOf(letter);
-    if (value < 0) throw new Error("A key has only the letters A to Z and the numbers 2 to 7.");
+    if (value < 0) throw new Error("A key has only the letters A to Z and the digits 2 to 7.");
     held = (held << 5) | value;
     bits += 5;
     if (bits >= 8) {
@@ -28,7 +28,7 @@ export function parseKey(text) {
       at += 1;
     }
   }
-  if (held !== 0) throw new Error("This key has a wrong last letter.");
+  if (held !== 0) throw new Error("The last letter of this key is wrong.");
   return key;
 }
 
