@@ -106,4 +106,4 @@ def test_a_program_suggests_while_a_person_drives(robot: Served) -> None:
         wrong = program.suggest((0.25,), answers=shown.message.seq)
         eventually(lambda: "2 values" in program.refusal(wrong))
         mine = person.suggest((0.0, 0.0), answers=person.ask().message.seq)
-        eventually(lambda: "You command" in person.refusal(mine))
+        eventually(lambda: "You have control" in person.refusal(mine))

@@ -370,7 +370,9 @@ class Recorder:
         if not self.can_record:
             return "This robot was served without a folder for recordings."
         if self.on:
-            return f"An episode is being recorded already: {self.state().episode or 'it starts now'}."
+            return (
+                f"An episode is being recorded already: {self.state().episode or 'it starts now'}."
+            )
         plan = self._plan
         header = EpisodeHeader(
             action_layout=plan.action_layout,
