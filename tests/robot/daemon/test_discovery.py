@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from shapechanger.robot.daemon import discovery
 from shapechanger.link.address import SERVICE
+from shapechanger.robot.daemon import discovery
 from shapechanger.robot.daemon.discovery import Announcement
 from tests.robot.daemon.plans import car_plan
 

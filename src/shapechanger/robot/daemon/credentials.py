@@ -164,8 +164,8 @@ def check_exposure(plan: DaemonPlan) -> None:
     secured = plan.certificate and plan.private_key and plan.key_file
     if not (secured or plan.insecure or is_loopback(plan.host)):
         raise RobotError(
-            f"Other machines reach {plan.host}, and could drive the robot without a certificate and "
-            "a key. Run `shapechanger robot init`, listen at 127.0.0.1, or pass `--insecure`."
+            f"Other machines reach {plan.host}, and could drive the robot without a key. Run "
+            "`shapechanger robot init`, listen at 127.0.0.1, or pass `--insecure`."
         )
 
 

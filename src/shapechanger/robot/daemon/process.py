@@ -242,7 +242,7 @@ async def _run(plan: DaemonPlan, clock: Clock, options: argparse.Namespace) -> s
 def _start_log() -> QueueListener:
     """Log to stderr from a separate thread, so that a full disk or a stuck pipe delays nothing.
 
-    Lines for which there is no room are lost. Stop the returned listener at the end, so that the
+    Lines that do not fit into the queue are lost. Stop the returned listener at the end, so that the
     last lines are written.
     """
     # A line that cannot be written must not cause another line.

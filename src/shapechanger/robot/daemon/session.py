@@ -327,7 +327,7 @@ class Session:
         if refusal:
             self._refuse(refusal)
             return
-        # The guard knows every emergency stop; this process only those it was told about.
+        # The guard knows every emergency stop; this process only those that were reported to it.
         person = self._client.role == "person"
         self._hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 

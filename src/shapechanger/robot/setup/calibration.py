@@ -106,8 +106,8 @@ def motor_changes(
     full = _number(output, "full")
     if not 0.0 <= starts_at < full:
         raise RobotError(
-            f"The starting duty of {output.name} must be from 0 to below its full duty of {full:g}, "
-            f"got {starts_at:g}."
+            f"{output.name} must start at a duty from 0 to below its full duty of {full:g}, got "
+            f"{starts_at:g}."
         )
     changes: dict[str, Any] = {f"output.{output.name}.start": round(starts_at, 2)}
     if went == "backward":
