@@ -242,8 +242,8 @@ async def _run(plan: DaemonPlan, clock: Clock, options: argparse.Namespace) -> s
 def _start_log() -> QueueListener:
     """Log to stderr from a separate thread, so that a full disk or a stuck pipe delays nothing.
 
-    Lines that do not fit into the queue are lost. Stop the returned listener at the end, so that the
-    last lines are written.
+    Lines that do not fit into the queue are lost. Stop the returned listener at the end, to write
+    the last lines.
     """
     # A line that cannot be written must not cause another line.
     logging.raiseExceptions = False
