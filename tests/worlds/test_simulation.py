@@ -197,7 +197,7 @@ def test_a_current_sets_a_boat_adrift() -> None:
 
 def test_without_a_camera_there_is_no_picture() -> None:
     """The sentence says what to give."""
-    with pytest.raises(WorldError, match="made without a camera: give it a `size`"):
+    with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()
 
 

@@ -31,8 +31,8 @@ class ClearanceField:
         walls = np.array([(*w.start, *w.end) for w in course.walls], np.float64).reshape(-1, 4)
         self._start, self._step = walls[:, :2], walls[:, 2:] - walls[:, :2]
         self._squared = np.maximum(np.einsum("ij,ij->i", self._step, self._step), 1e-12)
-        boxes = [t for t in course.things if not t.is_round]
-        rounds = [t for t in course.things if t.is_round]
+        boxes = [t for t in course.obstacles if not t.is_round]
+        rounds = [t for t in course.obstacles if t.is_round]
         self._box = np.array(
             [(t.x, t.y, np.cos(t.yaw), np.sin(t.yaw), t.length / 2, t.width / 2) for t in boxes],
             np.float64,

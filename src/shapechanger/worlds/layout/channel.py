@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Surface, Wall
 from shapechanger.worlds.layout.furniture import (
-    Furniture,
     Lane,
+    LaneObstacles,
     Scatter,
     Size,
-    scattered,
-    sunlit,
+    place_sun_patches,
+    scatter_obstacles,
     weighted_choice,
 )
 from shapechanger.worlds.layout.geometry import (
-    arcs,
-    at,
-    cross_each_other,
+    any_crossing,
+    arc_lengths,
+    even_distances,
     grow_cells,
+    interpolate,
     length,
     normals,
-    resampled,
+    resample,
     scale_grid,
-    segments,
-    smoothed,
-    spaced,
+    smooth,
     tangent_radii,
     trace_outline,
-    turns,
+    turn_angles,
+    wall_segments,
 )
 
-__all__ = ["QUAY_M", "BankKind", "ChannelShape", "banks", "dug", "harbour", "yard"]
+__all__ = ["QUAY_M", "BankKind", "ChannelShape", "build_banks", "dig_channel", "harbour", "yard"]
 
 _FINE: Final = 1024
 """Points of the line while it is being shaped."""
@@ -91,7 +91,7 @@ class BankKind:
     rough: float = 0.0
 
 
-def dug(
+def dig_channel(
     rng: np.random.Generator, shape: ChannelShape, spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """One attempt at a middle line, (n, 2), m, and its distance from the banks, (n,), m.
@@ -111,10 +111,10 @@ def dug(
     points = points @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     # A grid that is stretched too far would no longer have the lane's proportions.
     points *= float(np.clip(rng.uniform(*shape.length) / length(points), 0.8, 1.2))
-    sharp = resampled(points, length(points) / _FINE)
+    sharp = resample(points, length(points) / _FINE)
     blur = shape.blur[0]
     while True:
-        line = smoothed(sharp, blur * _FINE / length(points))
+        line = smooth(sharp, blur * _FINE / length(points))
         coarse = line[:: _FINE // _COARSE]
         room = tangent_radii(coarse)
         most = np.minimum(0.85 * room, room - shape.wall)
@@ -126,27 +126,27 @@ def dug(
     if not shape.length[0] <= length(line) <= shape.length[1] or not _winds(coarse):
         return None
     # It begins where it is straight, so that a vehicle can start there.
-    first = int(np.argmin(smoothed(np.abs(turns(coarse)), 2.0)))
+    first = int(np.argmin(smooth(np.abs(turn_angles(coarse)), 2.0)))
     line = np.roll(line, -first * (_FINE // _COARSE), axis=0)
     coarse, most = np.roll(coarse, -first, axis=0), np.roll(most, -first)
     low, high = shape.half_width
     # Wider and narrower every few metres, and never wider than the place allows.
-    waves = smoothed(rng.normal(size=_COARSE), 3.0 * _COARSE / length(line))
+    waves = smooth(rng.normal(size=_COARSE), 3.0 * _COARSE / length(line))
     half = low + (high - low) * (0.5 + waves / (4.0 * float(waves.std())))
-    half = smoothed(np.clip(np.minimum(half, most), low, high), 1.0)
-    route = resampled(line, spacing)
-    knots = arcs(coarse)
-    s = spaced(float(knots[-1]), len(route))
-    return route, at(half[:, None], knots, s)[:, 0]
+    half = smooth(np.clip(np.minimum(half, most), low, high), 1.0)
+    route = resample(line, spacing)
+    knots = arc_lengths(coarse)
+    s = even_distances(float(knots[-1]), len(route))
+    return route, interpolate(half[:, None], knots, s)[:, 0]
 
 
 def _winds(line: NDArray[np.float64]) -> bool:
     """Whether a line turns to the left somewhere and to the right elsewhere, enough to be felt."""
-    turned = turns(line)
+    turned = turn_angles(line)
     return bool(turned[turned > 0.0].sum() > _WIND_RAD < -turned[turned < 0.0].sum())
 
 
-def banks(
+def build_banks(
     rng: np.random.Generator,
     route: NDArray[np.float64],
     half_width: NDArray[np.float64],
@@ -162,7 +162,7 @@ def _bank(
     rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[BankKind, ...]
 ) -> tuple[Wall, ...]:
     """Walls along a closed line, with the lane at the left hand."""
-    knots = arcs(line)
+    knots = arc_lengths(line)
     shares = [kind.share for kind in kinds]
     ends: list[float] = []
     chosen: list[BankKind] = []
@@ -181,7 +181,7 @@ def _bank(
                 break
     # Squeezed a little so that the last piece ends where the first begins.
     at_s = np.array(ends) * (knots[-1] / s)
-    points = at(line, knots, at_s)
+    points = interpolate(line, knots, at_s)
     back = -normals(line)[np.searchsorted(knots[:-1], at_s % knots[-1]) % len(line)]
     rough = np.array(
         [min(a.rough, b.rough) for a, b in zip(chosen, [*chosen[1:], chosen[0]], strict=True)]
@@ -217,7 +217,7 @@ _BANKS = (
     BankKind("shed", 0.15, (2.0, 4.0), 1.6, (2.1, 2.5)),
 )
 
-_THINGS = (
+_OBSTACLES = (
     Scatter(Size("cone", (0.22, 0.34), (0.22, 0.34), (0.4, 0.7)), 0.3),
     Scatter(Size("crate", (0.35, 0.6), (0.3, 0.45), (0.25, 0.5)), 0.2),
     Scatter(Size("bin", (0.4, 0.55), (0.4, 0.55), (0.8, 1.1)), 0.15),
@@ -228,27 +228,27 @@ _THINGS = (
 
 def yard(rng: np.random.Generator, seed: int) -> Course | None:
     """One attempt at a course; None where chance made none that fits."""
-    shape = dug(rng, _SHAPE, _SPACING_M)
+    shape = dig_channel(rng, _SHAPE, _SPACING_M)
     if shape is None:
         return None
-    lane = Lane(shape[0], *banks(rng, *shape, _BANKS))
-    if cross_each_other(segments((*lane.left, *lane.right))):
+    lane = Lane(shape[0], *build_banks(rng, *shape, _BANKS))
+    if any_crossing(wall_segments((*lane.left, *lane.right))):
         return None
     half_width = lane.half_width()
     if half_width.min() < 1.5 or half_width.max() > 2.5:
         return None
-    furniture = Furniture(lane, half_width, _GAP_M)
-    scattered(rng, furniture, _THINGS, per_m=float(rng.uniform(0.12, 0.4)))
+    obstacles = LaneObstacles(lane, half_width, _GAP_M)
+    scatter_obstacles(rng, obstacles, _OBSTACLES, per_m=float(rng.uniform(0.12, 0.4)))
     return Course(
         world="yard",
         seed=seed,
         route=lane.route,
         half_width=half_width,
         walls=(*lane.left, *lane.right),
-        things=tuple(furniture.things),
-        lamps=sunlit(rng, lane.route, half_width),
+        obstacles=tuple(obstacles.obstacles),
+        lamps=place_sun_patches(rng, lane.route, half_width),
         ceiling_m=0.0,
-        gap_m=furniture.gap_m,
+        gap_m=obstacles.gap_m,
     )
 
 
@@ -272,7 +272,7 @@ _HARBOUR_BANKS = (
     BankKind("rock", 0.3, (2.5, 8.0), 0.8, (0.35, 0.9), rough=0.35),
 )
 
-_HARBOUR_THINGS = (
+_HARBOUR_OBSTACLES = (
     Scatter(Size("buoy", (0.35, 0.6), (0.35, 0.6), (0.5, 0.9)), 0.4),
     Scatter(Size("crate", (0.4, 0.7), (0.4, 0.6), (0.25, 0.4)), 0.25),
     # Dinghies lie along the quay.
@@ -282,17 +282,17 @@ _HARBOUR_THINGS = (
 
 def harbour(rng: np.random.Generator, seed: int) -> Course | None:
     """One attempt at a course; None where chance made none that fits."""
-    shape = dug(rng, _HARBOUR_SHAPE, _SPACING_M)
+    shape = dig_channel(rng, _HARBOUR_SHAPE, _SPACING_M)
     if shape is None:
         return None
-    lane = Lane(shape[0], *banks(rng, *shape, _HARBOUR_BANKS))
-    if cross_each_other(segments((*lane.left, *lane.right))):
+    lane = Lane(shape[0], *build_banks(rng, *shape, _HARBOUR_BANKS))
+    if any_crossing(wall_segments((*lane.left, *lane.right))):
         return None
     half_width = lane.half_width()
     if half_width.min() < 2.0 or half_width.max() > 3.5:
         return None
-    furniture = Furniture(lane, half_width, _HARBOUR_GAP_M)
-    scattered(rng, furniture, _HARBOUR_THINGS, per_m=float(rng.uniform(0.08, 0.25)))
+    obstacles = LaneObstacles(lane, half_width, _HARBOUR_GAP_M)
+    scatter_obstacles(rng, obstacles, _HARBOUR_OBSTACLES, per_m=float(rng.uniform(0.08, 0.25)))
     speed = float(rng.uniform(0.0, _MOST_CURRENT_MPS))
     where = float(rng.uniform(-np.pi, np.pi))
     return Course(
@@ -301,9 +301,9 @@ def harbour(rng: np.random.Generator, seed: int) -> Course | None:
         route=lane.route,
         half_width=half_width,
         walls=(*lane.left, *lane.right),
-        things=tuple(furniture.things),
-        lamps=sunlit(rng, lane.route, half_width),
+        obstacles=tuple(obstacles.obstacles),
+        lamps=place_sun_patches(rng, lane.route, half_width),
         ceiling_m=0.0,
-        gap_m=furniture.gap_m,
+        gap_m=obstacles.gap_m,
         current_mps=(speed * float(np.cos(where)), speed * float(np.sin(where))),
     )

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Lamp, Surface, Wall
-from shapechanger.worlds.layout.furniture import Furniture, Lane, Size, weighted_choice
+from shapechanger.worlds.layout.furniture import Lane, LaneObstacles, Size, weighted_choice
 from shapechanger.worlds.layout.geometry import (
-    arcs,
+    arc_lengths,
     grow_cells,
-    resampled,
+    resample,
     scale_grid,
     trace_outline,
 )
 
-__all__ = ["CEILING_M", "DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panelled"]
+__all__ = ["CEILING_M", "DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panel_walls"]
 
 DOOR_M: Final = 0.9
 """Width of a door; its wall is wider by a frame at each side."""
@@ -44,7 +44,7 @@ _HOW_OFTEN = [share for _, share, _ in _PANELS]
 _Point = NDArray[np.float64]
 
 
-def panelled(
+def panel_walls(
     rng: np.random.Generator, corners: NDArray[np.float64], bends: NDArray[np.int64], height: float
 ) -> tuple[Wall, ...]:
     """The walls round a closed line of corners, free space at the left hand.
@@ -138,30 +138,30 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
         return None
     widths = rng.uniform(*_WIDTH_M, size=len(corners))
     route, starts = _route(corners, widths)
-    along = arcs(route)
+    along = arc_lengths(route)
     if not _LENGTH_M[0] <= along[-1] <= _LENGTH_M[1]:
         return None
     normals = _normals(corners)
     reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
     turns = _turns(corners)
     # Who walks along the right wall has the lane at the left hand; along the left wall, backwards.
-    right = panelled(rng, corners - reach, -turns, CEILING_M)
-    left = panelled(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
+    right = panel_walls(rng, corners - reach, -turns, CEILING_M)
+    left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
     lane = Lane(route, left, right)
     half_width = lane.half_width()
-    furniture = Furniture(lane, half_width, _GAP_M)
-    _furnish(rng, furniture, corners, widths, starts)
-    _plant(rng, furniture, corners, reach * turns[:, None], starts)
+    obstacles = LaneObstacles(lane, half_width, _GAP_M)
+    _furnish(rng, obstacles, corners, widths, starts)
+    _plant(rng, obstacles, corners, reach * turns[:, None], starts)
     return Course(
         world="corridor",
         seed=seed,
         route=route,
         half_width=half_width,
         walls=(*left, *right),
-        things=tuple(furniture.things),
+        obstacles=tuple(obstacles.obstacles),
         lamps=_lamps(rng, corners, widths),
         ceiling_m=CEILING_M,
-        gap_m=furniture.gap_m,
+        gap_m=obstacles.gap_m,
     )
 
 
@@ -215,13 +215,13 @@ def _route(
         pieces.append(corners[k] + radii[k] * arc)
     line = np.concatenate(pieces)
     # The corner's middle is the thirteenth point of its arc.
-    along = arcs(line)[np.arange(len(corners)) * 25 + 13]
-    return resampled(line, _SPACING_M), np.roll(along, 1)
+    along = arc_lengths(line)[np.arange(len(corners)) * 25 + 13]
+    return resample(line, _SPACING_M), np.roll(along, 1)
 
 
 def _furnish(
     rng: np.random.Generator,
-    furniture: Furniture,
+    obstacles: LaneObstacles,
     corners: NDArray[np.float64],
     widths: NDArray[np.float64],
     along: NDArray[np.float64],
@@ -238,19 +238,19 @@ def _furnish(
             size = _FURNITURE[weighted_choice(rng, _CORRIDOR_HOW_OFTEN)]
             t = float(rng.uniform(1.2, length - 1.2))
             side = 1.0 if rng.random() < 0.5 else -1.0
-            thing = size.draw(rng, 0.0, 0.0, yaw)
-            aside = widths[k] / 2.0 - thing.width / 2.0 - float(rng.uniform(0.005, 0.04))
-            if thing.kind in ("box", "crate") and rng.random() < 0.4:
+            obstacle = size.draw(rng, 0.0, 0.0, yaw)
+            aside = widths[k] / 2.0 - obstacle.width / 2.0 - float(rng.uniform(0.005, 0.04))
+            if obstacle.kind in ("box", "crate") and rng.random() < 0.4:
                 aside *= float(rng.uniform(0.4, 0.9))
-                thing = replace(thing, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
+                obstacle = replace(obstacle, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
             x, y = corners[k] + ahead * t + normals[k] * side * aside
-            thing = replace(thing, x=float(x), y=float(y))
-            furniture.offer(thing, float(along[after]) - (length - t))
+            obstacle = replace(obstacle, x=float(x), y=float(y))
+            obstacles.offer(obstacle, float(along[after]) - (length - t))
 
 
 def _plant(
     rng: np.random.Generator,
-    furniture: Furniture,
+    obstacles: LaneObstacles,
     corners: NDArray[np.float64],
     inward: NDArray[np.float64],
     along: NDArray[np.float64],
@@ -259,10 +259,10 @@ def _plant(
     for corner, way, s in zip(corners, inward, along, strict=True):
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
-            thing = size.draw(rng, 0.0, 0.0, 0.0)
+            obstacle = size.draw(rng, 0.0, 0.0, 0.0)
             # So far from both walls that it touches neither.
-            x, y = corner - way + np.sign(way) * (thing.length / 2.0 + 0.02)
-            furniture.offer(replace(thing, x=float(x), y=float(y)), float(s))
+            x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
+            obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
 
 
 def _lamps(

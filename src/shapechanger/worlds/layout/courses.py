@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.worlds.course import Course, Thing
+from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.layout.channel import harbour, yard
 from shapechanger.worlds.layout.corridor import corridor
-from shapechanger.worlds.layout.geometry import from_thing, segments, turns
+from shapechanger.worlds.layout.geometry import distances_from_obstacle, turn_angles, wall_segments
 from shapechanger.worlds.world import Pose
 
 __all__ = ["WORLDS", "lay_out", "occupancy", "start_pose"]
@@ -75,10 +75,10 @@ def start_pose(course: Course, seed: int) -> Pose:
     free = np.ones(len(route), dtype=bool)
     ahead = np.roll(route, -1, axis=0)
     steps = np.concatenate([route, ahead], axis=1)
-    for thing in course.things:
-        free &= from_thing(thing, steps) > _BESIDE_M
+    for obstacle in course.obstacles:
+        free &= distances_from_obstacle(obstacle, steps) > _BESIDE_M
     behind, before = (round(reach / course.spacing) for reach in (_BEHIND_M, _AHEAD_M))
-    bend = _sums(turns(route), behind, 0)
+    bend = _sums(turn_angles(route), behind, 0)
     places = np.flatnonzero((_sums(~free, behind, before) < 0.5) & (np.abs(bend) < _STRAIGHT_RAD))
     # Where there is none, the first point of the route is the freest: nothing stands near it.
     i = int(places[int(np.random.default_rng(seed).integers(len(places)))]) if len(places) else 0
@@ -114,7 +114,7 @@ def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[f
     """
     if not cell_m > 0.0:
         raise WorldError(f"A cell must be wider than 0 m, and this one is {cell_m} m wide.")
-    feet = segments(course.walls)
+    feet = wall_segments(course.walls)
     low = np.minimum(feet[:, :2], feet[:, 2:]).min(axis=0) - 1.5 * cell_m
     high = np.maximum(feet[:, :2], feet[:, 2:]).max(axis=0) + 1.5 * cell_m
     columns, rows = (int(n) + 1 for n in np.ceil((high - low) / cell_m))
@@ -128,25 +128,27 @@ def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[f
     crossings = np.zeros((rows, columns), dtype=np.int32)
     np.add.at(crossings, (row, np.ceil((x - x0) / cell_m).astype(np.intp)), 1)
     blocked = np.cumsum(crossings, axis=1) % 2 == 0
-    for thing in course.things:
-        _fill(blocked, thing, x0, y0, cell_m)
+    for obstacle in course.obstacles:
+        _fill(blocked, obstacle, x0, y0, cell_m)
     return blocked, (x0, y0)
 
 
-def _fill(blocked: NDArray[np.bool_], thing: Thing, x0: float, y0: float, cell_m: float) -> None:
+def _fill(
+    blocked: NDArray[np.bool_], obstacle: Obstacle, x0: float, y0: float, cell_m: float
+) -> None:
     """Block the cells below a thing."""
-    reach = float(np.hypot(thing.length, thing.width)) / 2.0
+    reach = float(np.hypot(obstacle.length, obstacle.width)) / 2.0
     rows, columns = blocked.shape
-    c1 = max(0, int((thing.x - reach - x0) / cell_m))
-    c2 = min(columns, int((thing.x + reach - x0) / cell_m) + 2)
-    r1 = max(0, int((thing.y - reach - y0) / cell_m))
-    r2 = min(rows, int((thing.y + reach - y0) / cell_m) + 2)
-    x = x0 - thing.x + cell_m * np.arange(c1, c2, dtype=np.float64)[None, :]
-    y = y0 - thing.y + cell_m * np.arange(r1, r2, dtype=np.float64)[:, None]
-    if thing.is_round:
-        inside = np.hypot(x, y) <= thing.length / 2.0
+    c1 = max(0, int((obstacle.x - reach - x0) / cell_m))
+    c2 = min(columns, int((obstacle.x + reach - x0) / cell_m) + 2)
+    r1 = max(0, int((obstacle.y - reach - y0) / cell_m))
+    r2 = min(rows, int((obstacle.y + reach - y0) / cell_m) + 2)
+    x = x0 - obstacle.x + cell_m * np.arange(c1, c2, dtype=np.float64)[None, :]
+    y = y0 - obstacle.y + cell_m * np.arange(r1, r2, dtype=np.float64)[:, None]
+    if obstacle.is_round:
+        inside = np.hypot(x, y) <= obstacle.length / 2.0
     else:
-        c, s = np.cos(thing.yaw), np.sin(thing.yaw)
-        inside = np.abs(x * c + y * s) <= thing.length / 2.0
-        inside &= np.abs(y * c - x * s) <= thing.width / 2.0
+        c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+        inside = np.abs(x * c + y * s) <= obstacle.length / 2.0
+        inside &= np.abs(y * c - x * s) <= obstacle.width / 2.0
     blocked[r1:r2, c1:c2] |= inside

@@ -9,18 +9,26 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.course import Lamp, Thing, ThingKind, Wall
+from shapechanger.worlds.course import Lamp, Obstacle, ObstacleKind, Wall
 from shapechanger.worlds.layout.geometry import (
-    arcs,
-    between,
-    from_thing,
+    arc_lengths,
+    distances_from_obstacle,
+    distances_to_segments,
     length,
     normals,
-    segments,
-    to_segments,
+    obstacle_gap,
+    wall_segments,
 )
 
-__all__ = ["Furniture", "Lane", "Scatter", "Size", "scattered", "sunlit", "weighted_choice"]
+__all__ = [
+    "Lane",
+    "LaneObstacles",
+    "Scatter",
+    "Size",
+    "place_sun_patches",
+    "scatter_obstacles",
+    "weighted_choice",
+]
 
 
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
@@ -50,18 +58,22 @@ _BEFORE_DOORS_M: Final = 0.3
 class Size:
     """How large a kind of thing is: each number lies between two, m."""
 
-    kind: ThingKind
+    kind: ObstacleKind
     length: tuple[float, float]
     width: tuple[float, float]
     height: tuple[float, float]
 
-    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Thing:
+    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Obstacle:
         """One of them, at a place. A round one is as wide as it is long."""
         length, width, height = (
             float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
         )
-        thing = Thing(self.kind, x, y, yaw, length, width, height)
-        return Thing(self.kind, x, y, 0.0, length, length, height) if thing.is_round else thing
+        obstacle = Obstacle(self.kind, x, y, yaw, length, width, height)
+        return (
+            Obstacle(self.kind, x, y, 0.0, length, length, height)
+            if obstacle.is_round
+            else obstacle
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +92,12 @@ class Lane:
 
     def half_width(self) -> NDArray[np.float64]:
         """Distance of each point of the route from the nearest wall, m, shape (n,)."""
-        return to_segments(self.route, segments((*self.left, *self.right))).min(axis=1)
+        return distances_to_segments(self.route, wall_segments((*self.left, *self.right))).min(
+            axis=1
+        )
 
 
-class Furniture:
+class LaneObstacles:
     """The things in a lane. One that would close it is refused.
 
     Everything leaves its wider side free. Two that leave the same side free may stand close
@@ -98,18 +112,18 @@ class Furniture:
     def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
         self.lane = lane
         self.half_width = half_width
-        self.things: list[Thing] = []
+        self.obstacles: list[Obstacle] = []
         self.gap_m = 2.0 * float(half_width.min())
         """Narrowest way through that is left, m."""
         walls = (*lane.left, *lane.right)
-        self._walls = segments(walls)
+        self._walls = wall_segments(walls)
         self._lefts = len(lane.left)
         self._doors = np.array([wall.surface == "door" for wall in walls])
         self._wanted = gap_m
         self._round_m = length(lane.route)
         self._passed_left: list[bool] = []
 
-    def offer(self, thing: Thing, s: float) -> bool:
+    def offer(self, obstacle: Obstacle, s: float) -> bool:
         """Put a thing into the lane, if it fits.
 
         Args:
@@ -119,11 +133,11 @@ class Furniture:
         Returns:
             Whether it stands there now.
         """
-        reach = max(thing.length, thing.width) / 2.0
+        reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
         if s - reach < FREE_AHEAD_M or self._round_m - s - reach < FREE_BEHIND_M:
             return False
-        far = from_thing(thing, self._walls)
+        far = distances_from_obstacle(obstacle, self._walls)
         left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
         if min(left, right) <= 0.0 or max(left, right) < self._wanted:
             return False
@@ -132,8 +146,8 @@ class Furniture:
             return False
         narrowest = max(left, right)
         passed_left = left >= right
-        for other, other_left in zip(self.things, self._passed_left, strict=True):
-            apart = between(thing, other)
+        for other, other_left in zip(self.obstacles, self._passed_left, strict=True):
+            apart = obstacle_gap(obstacle, other)
             if passed_left == other_left:
                 if apart <= 0.0:
                     return False
@@ -142,7 +156,7 @@ class Furniture:
             else:
                 narrowest = min(narrowest, apart)
         self.gap_m = min(self.gap_m, narrowest)
-        self.things.append(thing)
+        self.obstacles.append(obstacle)
         self._passed_left.append(passed_left)
         return True
 
@@ -162,33 +176,33 @@ class Scatter:
     moored: float = 0.0
 
 
-def scattered(
-    rng: np.random.Generator, furniture: Furniture, kinds: tuple[Scatter, ...], per_m: float
+def scatter_obstacles(
+    rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
     """Offer things to a lane, about `per_m` for each metre of it; those that fit stay."""
-    route, half_width = furniture.lane.route, furniture.half_width
-    along, left = arcs(route), normals(route)
+    route, half_width = obstacles.lane.route, obstacles.half_width
+    along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]
     for _ in range(rng.poisson(per_m * float(along[-1]))):
         kind = kinds[weighted_choice(rng, shares)]
         i = int(rng.integers(len(route)))
         heading = float(np.arctan2(-left[i, 0], left[i, 1]))
-        thing = kind.size.draw(rng, 0.0, 0.0, heading)
+        obstacle = kind.size.draw(rng, 0.0, 0.0, heading)
         if rng.random() < kind.moored:
             side = 1.0 if rng.random() < 0.5 else -1.0
             aside = side * (
-                float(half_width[i]) - thing.width / 2.0 - float(rng.uniform(0.05, 0.3))
+                float(half_width[i]) - obstacle.width / 2.0 - float(rng.uniform(0.05, 0.3))
             )
         else:
-            most = float(half_width[i]) - thing.width / 2.0
+            most = float(half_width[i]) - obstacle.width / 2.0
             aside = float(rng.uniform(-most, most))
-            yaw = 0.0 if thing.is_round else float(rng.uniform(-np.pi, np.pi))
-            thing = replace(thing, yaw=yaw)
+            yaw = 0.0 if obstacle.is_round else float(rng.uniform(-np.pi, np.pi))
+            obstacle = replace(obstacle, yaw=yaw)
         x, y = route[i] + left[i] * aside
-        furniture.offer(replace(thing, x=float(x), y=float(y)), float(along[i]))
+        obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(along[i]))
 
 
-def sunlit(
+def place_sun_patches(
     rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
     """Patches of sun on the lane, from two to eight."""

@@ -7,28 +7,28 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.course import Thing, Wall
+from shapechanger.worlds.course import Obstacle, Wall
 
 __all__ = [
     "Cell",
-    "arcs",
-    "at",
-    "between",
+    "any_crossing",
+    "arc_lengths",
     "box_sides",
-    "cross_each_other",
-    "from_thing",
+    "distances_from_obstacle",
+    "distances_to_segments",
+    "even_distances",
     "grow_cells",
+    "interpolate",
     "length",
     "normals",
-    "resampled",
+    "obstacle_gap",
+    "resample",
     "scale_grid",
-    "segments",
-    "smoothed",
-    "spaced",
+    "smooth",
     "tangent_radii",
-    "to_segments",
     "trace_outline",
-    "turns",
+    "turn_angles",
+    "wall_segments",
 ]
 
 Points = NDArray[np.float64]
@@ -36,21 +36,23 @@ Points = NDArray[np.float64]
 
 def length(line: Points) -> float:
     """Once round, m."""
-    return float(arcs(line)[-1])
+    return float(arc_lengths(line)[-1])
 
 
-def arcs(line: Points) -> NDArray[np.float64]:
+def arc_lengths(line: Points) -> NDArray[np.float64]:
     """Distance along the line to each point and, as the last number, once round; shape (n + 1,)."""
     steps = np.diff(line, axis=0, append=line[:1])
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
-def at(line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.float64]) -> Points:
+def interpolate(
+    line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.float64]
+) -> Points:
     """Values at distances `s` along a closed line, between its points linearly.
 
     Args:
         line: Values at the points, shape (n, k).
-        knots: What `arcs` says of the points, shape (n + 1,).
+        knots: What `arc_lengths` says of the points, shape (n + 1,).
         s: Distances, m, of any size: they wrap round. Shape (m,).
 
     Returns:
@@ -62,27 +64,27 @@ def at(line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.floa
     return np.stack(columns, axis=1)
 
 
-def resampled(line: Points, spacing: float) -> Points:
+def resample(line: Points, spacing: float) -> Points:
     """The line by points that are about `spacing` apart: all the same distance, as the crow flies.
 
     Equal distances along a bent line are unequal as the crow flies; two corrections make the rest
     of the difference smaller than a part in a thousand on the bends that vehicles can drive.
     """
-    knots = arcs(line)
+    knots = arc_lengths(line)
     n = max(8, round(float(knots[-1]) / spacing))
-    s = spaced(float(knots[-1]), n)
+    s = even_distances(float(knots[-1]), n)
     for _ in range(2):
-        chords = arcs(at(line, knots, s))
-        s = np.interp(spaced(float(chords[-1]), n), chords, np.append(s, knots[-1]))
-    return at(line, knots, s)
+        chords = arc_lengths(interpolate(line, knots, s))
+        s = np.interp(even_distances(float(chords[-1]), n), chords, np.append(s, knots[-1]))
+    return interpolate(line, knots, s)
 
 
-def spaced(length_m: float, n: int) -> NDArray[np.float64]:
+def even_distances(length_m: float, n: int) -> NDArray[np.float64]:
     """So many distances from 0 on, evenly over a closed line of that length, m, shape (n,)."""
     return np.arange(n, dtype=np.float64) * (length_m / n)
 
 
-def smoothed(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+def smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
     """Columns of a closed line, blurred by a bell curve of `sigma` points. Shape as given."""
     n = len(values)
     waves = np.exp(-2.0 * (np.pi * sigma * np.fft.rfftfreq(n)) ** 2)
@@ -97,7 +99,7 @@ def normals(line: Points) -> Points:
     return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
 
 
-def turns(line: Points) -> NDArray[np.float64]:
+def turn_angles(line: Points) -> NDArray[np.float64]:
     """By how much the line turns to the left at each point, rad, shape (n,)."""
     ahead = np.roll(line, -1, axis=0) - line
     back = np.roll(ahead, 1, axis=0)
@@ -177,12 +179,12 @@ Segments = NDArray[np.float64]
 """Straight pieces, one in a row: x and y of the start, x and y of the end; shape (m, 4)."""
 
 
-def segments(walls: Iterable[Wall]) -> Segments:
+def wall_segments(walls: Iterable[Wall]) -> Segments:
     """The feet of walls, m, shape (m, 4)."""
     return np.array([(*wall.start, *wall.end) for wall in walls], dtype=np.float64).reshape(-1, 4)
 
 
-def to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.float64]:
+def distances_to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.float64]:
     """Distance of points, shape (n, 2), from each straight piece, m, shape (n, m)."""
     x, y = points[:, 0:1] - pieces[:, 0], points[:, 1:2] - pieces[:, 1]
     dx, dy = pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1]
@@ -192,7 +194,7 @@ def to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.flo
     return np.sqrt(x * x + y * y)  # Half the time of np.hypot, whose care is for huge numbers.
 
 
-def cross_each_other(pieces: Segments) -> bool:
+def any_crossing(pieces: Segments) -> bool:
     """Whether any straight piece goes through another; a common end does not count."""
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
@@ -206,40 +208,46 @@ def cross_each_other(pieces: Segments) -> bool:
     return bool((parted & parted.T).any())
 
 
-def box_sides(thing: Thing) -> Segments:
+def box_sides(obstacle: Obstacle) -> Segments:
     """The four sides of a box, counter-clockwise, m, shape (4, 4)."""
-    ends = _to_world(thing, np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2.0)
+    ends = _to_world(obstacle, np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2.0)
     return np.concatenate([ends, np.roll(ends, -1, axis=0)], axis=1)
 
 
-def from_thing(thing: Thing, pieces: Segments) -> NDArray[np.float64]:
+def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.float64]:
     """Distance of a thing from each straight piece, m, shape (m,); 0 or less where they overlap."""
-    if thing.is_round:
-        return to_segments(np.array([[thing.x, thing.y]]), pieces)[0] - thing.length / 2.0
-    starts, ends = _into(thing, pieces[:, :2]), _into(thing, pieces[:, 2:])
-    half = np.array([thing.length, thing.width]) / 2.0
+    if obstacle.is_round:
+        return (
+            distances_to_segments(np.array([[obstacle.x, obstacle.y]]), pieces)[0]
+            - obstacle.length / 2.0
+        )
+    starts, ends = _into(obstacle, pieces[:, :2]), _into(obstacle, pieces[:, 2:])
+    half = np.array([obstacle.length, obstacle.width]) / 2.0
     corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    far = to_segments(corners, np.concatenate([starts, ends], axis=1)).min(axis=0)
+    far = distances_to_segments(corners, np.concatenate([starts, ends], axis=1)).min(axis=0)
     far = np.minimum(far, np.minimum(_from_box(starts, half), _from_box(ends, half)))
     return np.where(_crosses(starts, ends, half), 0.0, far)
 
 
-def between(one: Thing, other: Thing) -> float:
+def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
     """Distance of two things from each other, m; 0 or less where they overlap."""
     if other.is_round:
         return _from_point(one, other.x, other.y) - other.length / 2.0
     if one.is_round:
         return _from_point(other, one.x, one.y) - one.length / 2.0
     return float(
-        min(from_thing(one, box_sides(other)).min(), from_thing(other, box_sides(one)).min())
+        min(
+            distances_from_obstacle(one, box_sides(other)).min(),
+            distances_from_obstacle(other, box_sides(one)).min(),
+        )
     )
 
 
-def _from_point(thing: Thing, x: float, y: float) -> float:
-    if thing.is_round:
-        return float(np.hypot(thing.x - x, thing.y - y)) - thing.length / 2.0
-    half = np.array([thing.length, thing.width]) / 2.0
-    return float(_from_box(_into(thing, np.array([[x, y]])), half)[0])
+def _from_point(obstacle: Obstacle, x: float, y: float) -> float:
+    if obstacle.is_round:
+        return float(np.hypot(obstacle.x - x, obstacle.y - y)) - obstacle.length / 2.0
+    half = np.array([obstacle.length, obstacle.width]) / 2.0
+    return float(_from_box(_into(obstacle, np.array([[x, y]])), half)[0])
 
 
 def _from_box(points: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -260,17 +268,20 @@ def _crosses(
     return np.maximum(enter, 0.0) < np.minimum(leave, 1.0)
 
 
-def _axes(thing: Thing) -> NDArray[np.float64]:
+def _axes(obstacle: Obstacle) -> NDArray[np.float64]:
     """The directions of its length and of its width, one in a row."""
-    c, s = np.cos(thing.yaw), np.sin(thing.yaw)
+    c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
     return np.array([[c, s], [-s, c]])
 
 
-def _into(thing: Thing, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _into(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points as seen from the middle of a thing, along its length and its width."""
-    return (points - np.array([thing.x, thing.y])) @ _axes(thing).T
+    return (points - np.array([obstacle.x, obstacle.y])) @ _axes(obstacle).T
 
 
-def _to_world(thing: Thing, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_world(obstacle: Obstacle, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points given as shares of its length and width, in the world."""
-    return shares * np.array([thing.length, thing.width]) @ _axes(thing) + [thing.x, thing.y]
+    return shares * np.array([obstacle.length, obstacle.width]) @ _axes(obstacle) + [
+        obstacle.x,
+        obstacle.y,
+    ]

@@ -16,7 +16,7 @@ from shapechanger.worlds.scene.surfaces import (
     ceiling_patches,
     ground_patches,
     lamp_patches,
-    thing_patches,
+    obstacle_patches,
     verge_patches,
     wall_patches,
 )
@@ -78,17 +78,17 @@ def add_collision(spec: mujoco.MjSpec, course: Course) -> None:
             [x, y, 0.5 * wall.height],
             float(np.arctan2(along[1], along[0])),
         )
-    for number, thing in enumerate(course.things):
-        half = 0.5 * thing.height
+    for number, obstacle in enumerate(course.obstacles):
+        half = 0.5 * obstacle.height
         _add_solid(
             spec,
             f"world/thing/{number}",
-            mujoco.mjtGeom.mjGEOM_CYLINDER if thing.is_round else mujoco.mjtGeom.mjGEOM_BOX,
-            [0.5 * thing.length, half, 0.0]
-            if thing.is_round
-            else [0.5 * thing.length, 0.5 * thing.width, half],
-            [thing.x, thing.y, half],
-            thing.yaw,
+            mujoco.mjtGeom.mjGEOM_CYLINDER if obstacle.is_round else mujoco.mjtGeom.mjGEOM_BOX,
+            [0.5 * obstacle.length, half, 0.0]
+            if obstacle.is_round
+            else [0.5 * obstacle.length, 0.5 * obstacle.width, half],
+            [obstacle.x, obstacle.y, half],
+            obstacle.yaw,
         )
 
 
@@ -149,14 +149,14 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
 
     for surface, patches in wall_patches(course, light).items():
         show(surface, patches, walls)
-    things = thing_patches(course, light)
+    obstacles = obstacle_patches(course, light)
     if course.ceiling_m > 0.0:
         show("ceiling", ceiling_patches(course, light), plain)
     else:
         _add_sky(spec, look)
     if course.world == "yard":
         show("grass", verge_patches(course, light), plain)
-    show("things", things, plain)
+    show("things", obstacles, plain)
     if course.lamps and course.ceiling_m > 0.0:
         _add_lamps(spec, course, look, mirrored)
     _add_ground(spec, course, look, light)

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from shapechanger.worlds.course import Course, Thing, Wall
+from shapechanger.worlds.course import Course, Obstacle, Wall
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned
 
@@ -18,7 +18,7 @@ __all__ = [
     "ceiling_patches",
     "ground_patches",
     "lamp_patches",
-    "thing_patches",
+    "obstacle_patches",
     "verge_patches",
     "wall_patches",
 ]
@@ -283,24 +283,24 @@ _ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
 )
 
 
-def thing_patches(course: Course, light: Light) -> Patches:
+def obstacle_patches(course: Course, light: Light) -> Patches:
     """All things of a course; they share one texture."""
     patches = Patches()
-    for thing in course.things:
-        bright = float(light.on_ground(np.array([thing.x, thing.y])))
-        if thing.is_round:
-            for outline, stuff in _ROUND[thing.kind]:
-                profile = np.array(outline) * (thing.length, thing.height)
-                add_turned(patches, thing.x, thing.y, profile, stuff, bright)
+    for obstacle in course.obstacles:
+        bright = float(light.on_ground(np.array([obstacle.x, obstacle.y])))
+        if obstacle.is_round:
+            for outline, stuff in _ROUND[obstacle.kind]:
+                profile = np.array(outline) * (obstacle.length, obstacle.height)
+                add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
         else:
-            _add_boxes(patches, thing, bright)
+            _add_boxes(patches, obstacle, bright)
     return patches
 
 
-def _add_boxes(patches: Patches, thing: Thing, bright: float) -> None:
-    size = np.array([thing.length, thing.width, thing.height])
-    cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
-    for half, place, stuff in _BOXES[thing.kind]:
+def _add_boxes(patches: Patches, obstacle: Obstacle, bright: float) -> None:
+    size = np.array([obstacle.length, obstacle.width, obstacle.height])
+    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    for half, place, stuff in _BOXES[obstacle.kind]:
         dx, dy, dz = np.array(place) * size
-        middle = np.array([thing.x + cos * dx - sin * dy, thing.y + sin * dx + cos * dy, dz])
-        add_box(patches, middle, np.array(half) * size, thing.yaw, stuff, bright)
+        middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
+        add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)
