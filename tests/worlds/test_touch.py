@@ -7,8 +7,8 @@ import math
 import mujoco
 import pytest
 
-from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 from shapechanger.bodies.vehicles import PlanarPose
+from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
 # A ball of 0.1 m that can be put anywhere, a wall whose face is at x = 1 m, and the ground.

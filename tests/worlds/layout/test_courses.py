@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import HELD_OUT, Course, Obstacle
-from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
+from shapechanger.worlds.layout import WORLDS, lay_out
 from shapechanger.worlds.layout.geometry import (
     any_crossing,
     distances_from_obstacle,
@@ -19,6 +19,7 @@ from shapechanger.worlds.layout.geometry import (
     obstacle_gap,
     wall_segments,
 )
+from tests.worlds.layout.raster import occupancy
 
 _SEEDS = [*range(20), *HELD_OUT[:20]]
 _WIDTHS = {"corridor": (1.8, 2.4), "yard": (3.0, 5.0), "harbour": (4.0, 7.0)}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Obstacle, Surface, Wall
-from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
+from shapechanger.worlds.layout import WORLDS, lay_out
 from shapechanger.worlds.layout.geometry import distances_to_segments, wall_segments
+from tests.worlds.layout.raster import occupancy
 
 
 def _ring(*obstacles: Obstacle) -> Course:
@@ -80,10 +80,3 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     c = np.rint((behind[:, 0] - x0) / 0.05).astype(int)
     inside = (r >= 0) & (c >= 0) & (r < blocked.shape[0]) & (c < blocked.shape[1])
     assert blocked[r[inside], c[inside]].mean() > 0.97  # The jambs of doors have the lane behind.
-
-
-@pytest.mark.parametrize("cell_m", [0.0, -1.0, float("nan")])
-def test_cells_without_width_are_refused(cell_m: float) -> None:
-    """A sentence, instead of a grid without end."""
-    with pytest.raises(WorldError, match="wider than 0"):
-        occupancy(_ring(), cell_m)

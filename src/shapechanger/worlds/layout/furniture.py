@@ -1,4 +1,4 @@
-"""Choices by chance."""
+"""Random placement of obstacles and patches of sun, which keeps the lane passable."""
 
 from __future__ import annotations
 
@@ -32,9 +32,13 @@ __all__ = [
 
 
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
-    """Index of one of several, each as often as its share of their sum says.
+    """Draw an index with a probability proportional to its share.
 
-    `Generator.choice` does the same thirty times slower, and it is asked for every panel of a wall.
+    `Generator.choice` is thirty times slower, and this is called for every panel of a wall.
+
+    Args:
+        rng: Random generator.
+        shares: Weights, >= 0.
     """
     left = float(rng.random()) * sum(shares)
     for i, share in enumerate(shares):
@@ -45,18 +49,18 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
 
 
 FREE_AHEAD_M: Final = 3.0
-"""Nothing stands this far ahead of the first point of the route."""
+"""Length of the route after its first point that stays free, m."""
 
 FREE_BEHIND_M: Final = 2.0
-"""Nor this far behind it: a truck with its trailer is 1 m long."""
+"""Length before it that stays free, m; a truck with its trailer is 1 m long."""
 
 _BEFORE_DOORS_M: Final = 0.3
-"""Nothing stands this near to a door."""
+"""Smallest distance from a door, m."""
 
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """How large a kind of thing is: each number lies between two, m."""
+    """Ranges of the size of a kind of obstacle, m."""
 
     kind: ObstacleKind
     length: tuple[float, float]
@@ -64,7 +68,14 @@ class Size:
     height: tuple[float, float]
 
     def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Obstacle:
-        """One of them, at a place. A round one is as wide as it is long."""
+        """Draw an obstacle; a round one is as wide as it is long.
+
+        Args:
+            rng: Random generator.
+            x: Position, m.
+            y: Position, m.
+            yaw: Angle of its length, rad.
+        """
         length, width, height = (
             float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
         )
@@ -78,12 +89,12 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """A lane that is still empty.
+    """An empty lane.
 
     Attributes:
-        route: Its middle, as that of a Course, (n, 2).
-        left: Walls at its left hand.
-        right: Walls at its right hand.
+        route: Its middle, as in `Course`, m, (n, 2).
+        left: Walls on its left.
+        right: Walls on its right.
     """
 
     route: NDArray[np.float64]
@@ -91,22 +102,22 @@ class Lane:
     right: tuple[Wall, ...]
 
     def half_width(self) -> NDArray[np.float64]:
-        """Distance of each point of the route from the nearest wall, m, shape (n,)."""
+        """Distance of each point of the route from the nearest wall, m, (n,)."""
         return distances_to_segments(self.route, wall_segments((*self.left, *self.right))).min(
             axis=1
         )
 
 
 class LaneObstacles:
-    """The things in a lane. One that would close it is refused.
+    """Obstacles in a lane; those that would block it are rejected.
 
-    Everything leaves its wider side free. Two that leave the same side free may stand close
-    together; where a vehicle has to change sides between two, they are as far apart as the gap.
+    Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
+    stand close together; two that are passed on different sides are a gap apart.
 
     Args:
-        lane: Where they stand.
-        half_width: What `lane.half_width()` said, (n,).
-        gap_m: Narrowest way through that may be left, m.
+        lane: The lane.
+        half_width: Result of `lane.half_width()`, m, (n,).
+        gap_m: Smallest gap that must remain, m.
     """
 
     def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
@@ -114,7 +125,7 @@ class LaneObstacles:
         self.half_width = half_width
         self.obstacles: list[Obstacle] = []
         self.gap_m = 2.0 * float(half_width.min())
-        """Narrowest way through that is left, m."""
+        """Narrowest remaining passage, m."""
         walls = (*lane.left, *lane.right)
         self._walls = wall_segments(walls)
         self._lefts = len(lane.left)
@@ -124,14 +135,14 @@ class LaneObstacles:
         self._passed_left: list[bool] = []
 
     def offer(self, obstacle: Obstacle, s: float) -> bool:
-        """Put a thing into the lane, if it fits.
+        """Add an obstacle if it fits.
 
         Args:
-            thing: What, and where.
-            s: How far along the route its middle is, m.
+            obstacle: The obstacle.
+            s: Distance of its middle along the route, m.
 
         Returns:
-            Whether it stands there now.
+            Whether it was added.
         """
         reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
@@ -141,7 +152,7 @@ class LaneObstacles:
         left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
         if min(left, right) <= 0.0 or max(left, right) < self._wanted:
             return False
-        # Nobody puts a cabinet before a door.
+        # Doors stay free.
         if (far[self._doors] < _BEFORE_DOORS_M).any():
             return False
         narrowest = max(left, right)
@@ -163,12 +174,12 @@ class LaneObstacles:
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """A kind of thing to strew.
+    """A kind of obstacle to scatter.
 
     Attributes:
-        size: What, and how large.
-        share: How often it is chosen.
-        moored: How often it lies along the wall, from 0 to 1.
+        size: Kind and range of sizes.
+        share: Weight with which it is drawn.
+        moored: Probability of lying along a wall.
     """
 
     size: Size
@@ -179,7 +190,14 @@ class Scatter:
 def scatter_obstacles(
     rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
-    """Offer things to a lane, about `per_m` for each metre of it; those that fit stay."""
+    """Scatter obstacles over a lane.
+
+    Args:
+        rng: Random generator.
+        obstacles: The lane and its obstacles, which are added to.
+        kinds: Kinds to draw from.
+        per_m: Mean number of attempts per metre; obstacles that do not fit are dropped.
+    """
     route, half_width = obstacles.lane.route, obstacles.half_width
     along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]
@@ -205,7 +223,13 @@ def scatter_obstacles(
 def place_sun_patches(
     rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
-    """Patches of sun on the lane, from two to eight."""
+    """Two to eight patches of sun on a lane.
+
+    Args:
+        rng: Random generator.
+        route: Middle of the lane, m, (n, 2).
+        half_width: Half width of the lane, m, (n,).
+    """
     left = normals(route)
     lamps: list[Lamp] = []
     for _ in range(int(rng.integers(2, 9))):
