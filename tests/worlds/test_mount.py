@@ -77,9 +77,7 @@ def test_random_ones_are_small_and_of_both_signs() -> None:
 )
 def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
     """In the floor, or in the air, it is no camera of this vehicle."""
-    with pytest.raises(
-        WorldError, match=r"The camera would be off its vehicle or in the floor, at \("
-    ):
+    with pytest.raises(WorldError, match=r"camera would be off its vehicle or in the floor, at \("):
         _moved(jitter)
 
 

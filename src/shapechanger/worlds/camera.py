@@ -66,8 +66,8 @@ class OnboardCamera:
         if self._gl is None:
             if _drawing - {os.getpid()}:
                 raise RenderError(
-                    "A process that was forked after rendering cannot render: start it by spawning, "
-                    "such as with gym.make_vec(..., vector_kwargs={'context': 'spawn'})."
+                    "A process that was forked after rendering cannot render: start it by "
+                    "spawning, such as with gym.make_vec(..., vector_kwargs={'context': 'spawn'})."
                 )
             choose_gl()
             self._gl = open_context(self._width, self._height)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["LENSES", "Lens", "Picture", "blur", "dirt", "glare", "lens", "night"]
+__all__ = ["LENSES", "Lens", "Picture", "blur", "dirt", "find_lens", "glare", "night"]
 
 Picture = NDArray[np.uint8]
 
@@ -44,7 +44,7 @@ _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """A quarter of the light, bluish, with sensor noise of 5 levels that differs in each picture."""
+    """A quarter of the light, bluish, with sensor noise of 5 levels."""
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -83,7 +83,7 @@ LENSES: Final[Mapping[str, Lens]] = MappingProxyType(
 """Camera faults by name."""
 
 
-def lens(name: str) -> Lens:
+def find_lens(name: str) -> Lens:
     """Find a camera fault by name.
 
     Raises:

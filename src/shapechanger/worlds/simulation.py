@@ -18,7 +18,7 @@ from shapechanger.worlds.expert.line import CourseProgress
 from shapechanger.worlds.expert.path import CoursePath, plan_path_for
 from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.layout import lay_out, start_pose
-from shapechanger.worlds.lens import lens
+from shapechanger.worlds.lens import find_lens
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene import add_course
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
@@ -80,7 +80,7 @@ class MujocoWorld:
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
         self.lenses = tuple(lenses)
-        self._distortions = [lens(name) for name in lenses]
+        self._distortions = [find_lens(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
         self.lay_out(seed)

@@ -239,7 +239,7 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
     """The message says what exists, or what is wrong with the seed."""
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         lay_out("harbor", 0)
-    with pytest.raises(WorldError, match="-1 is less"):
+    with pytest.raises(WorldError, match="from 0, got -1"):
         lay_out("yard", -1)
 
 

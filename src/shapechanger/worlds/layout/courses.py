@@ -88,7 +88,7 @@ def start_pose(course: Course, seed: int) -> Pose:
 def _sums(
     values: NDArray[np.float64] | NDArray[np.bool_], behind: int, before: int
 ) -> NDArray[np.float64]:
-    """Sums over a window of each value of a closed line, `behind` and `before` of its neighbours."""
+    """Sums over windows along a closed line, from `behind` values behind to `before` ahead."""
     whole = np.concatenate([values[-behind:], values, values[:before]])
     sums = np.concatenate([[0.0], np.cumsum(whole)])
     window = behind + before + 1

@@ -16,8 +16,8 @@ from shapechanger.worlds.expert.driver import ThreeWay
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.world import Pose
-from tests.worlds.pathfinder.courses import ring
-from tests.worlds.pathfinder.kinematic import SIZES, TOP, Kinematic
+from tests.worlds.expert.courses import ring
+from tests.worlds.expert.kinematic import SIZES, TOP, Kinematic
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 

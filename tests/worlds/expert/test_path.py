@@ -15,7 +15,7 @@ from shapechanger.worlds.expert.lattice import FAR_M, ClearanceField
 from shapechanger.worlds.expert.line import ClosedLine
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
-from tests.worlds.pathfinder.courses import ring
+from tests.worlds.expert.courses import ring
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 _CASES = list(itertools.product(_HOMES, range(3)))
@@ -88,7 +88,7 @@ def _plug(course: Course, size: float) -> Course:
 
 def test_a_blocked_lane_is_refused_in_words() -> None:
     """With what could be done instead."""
-    with pytest.raises(WorldError, match=r"needs 0\.40 m .* blocked .* another seed"):
+    with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
         plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1)
 
 
