@@ -42,7 +42,7 @@ HULL_FRICTION: Final = 0.2
 _WHEEL_FRICTION: Final = 0.3  # The larger one of the wheel and the ground counts.
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
-"""Field of view of the Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
+"""Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
 
 
 class Paint:
