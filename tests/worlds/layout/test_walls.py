@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -72,5 +74,5 @@ def test_banks_are_split_into_pieces_of_their_kind() -> None:
             np.testing.assert_allclose(distances, radius, rtol=0.01)
         # A run has at least two pieces of sheds and three of hedges, except where it closes.
         surfaces = [wall.surface for wall in walls]
-        changes = sum(a != b for a, b in zip(surfaces, surfaces[1:], strict=False))
+        changes = sum(a != b for a, b in pairwise(surfaces))
         assert 2 <= changes < len(walls) / 2
