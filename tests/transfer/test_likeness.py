@@ -13,7 +13,7 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger import env as finger_env
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import StudyError
-from shapechanger.reports import verdict
+from shapechanger.reports.verdict import verdict
 from shapechanger.reports.study import arm_rows, caveats
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial

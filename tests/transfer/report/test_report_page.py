@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MissingExtra, OutputError
-from shapechanger.reports import verdict
+from shapechanger.reports.verdict import verdict
 from shapechanger.reports.page import png
 from shapechanger.reports.study import measure_rows, report_html, write_report
 from shapechanger.transfer.env_ref import EnvRef
