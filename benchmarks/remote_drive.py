@@ -6,7 +6,7 @@ from typing import Any
 
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
 
 __all__ = ["drive_remote"]
 

@@ -18,7 +18,7 @@ from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.envs.vehicle.evaluation import Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.running import run_robot
+from shapechanger.twin.robot import run_robot
 
 __all__ = ["twin"]
 

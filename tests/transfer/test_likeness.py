@@ -13,8 +13,7 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger import env as finger_env
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import StudyError
-from shapechanger.reports.verdict import verdict
-from shapechanger.reports.study import arm_rows, caveats
+from shapechanger.reports.verdict import arm_rows, caveats, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.methods import default_arms, policy_path

@@ -22,8 +22,8 @@ from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_folder, study_outcomes
+from tests.reports.studies import make_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
-from tests.transfer.report.studies import make_study
 from tests.transfer.studies import files_of
 
 _KINDS = ("source", "random", "scratch", "zero-shot", "fine-tune")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from shapechanger.demos.cloning.goal import named
-from shapechanger.demos.cloning.judge import Judgement
+from shapechanger.demos.cloning.judge import Judgement, named
 from shapechanger.demos.cloning.learn import Training
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.reports.page import png_uri, render, svg_uri
@@ -113,16 +112,9 @@ def write_clone_report(
 
 
 def _verdict(judgement: Judgement, told: str) -> str:
-    better = judgement.accuracy - judgement.always
-    than = (
-        f"{abs(better):.1%} of the steps {'more' if better > 0 else 'less'} often than always "
-        "choosing the driver's most frequent action"
-        if better
-        else "exactly as often as always choosing the driver's most frequent action"
-    )
     return (
-        f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps, {than}. "
-        f"{told}"
+        f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; always "
+        f"choosing the driver's most frequent action is right on {judgement.always:.1%}. {told}"
     )
 
 

@@ -95,8 +95,7 @@ def report_html(study: Study, pictures: Pictures | None = None, picture_note: st
         map=_body_map(plan.body_map),
         rhythm=_rhythm(plan.settings),
         settings=[
-            (name, _setting(value))
-            for name, value in msgspec.structs.asdict(plan.settings).items()
+            (name, _setting(value)) for name, value in msgspec.structs.asdict(plan.settings).items()
         ],
         command=study.command,
         machine=study.machine,

@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.knowing import can_be_known, make_known
+from shapechanger.cli.robot.serve import can_be_known, make_known
 from shapechanger.link.authentication import new_key
 from shapechanger.remote.known_robots import KnownRobot, known_folder, recall, remember
 

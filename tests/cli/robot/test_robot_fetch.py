@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.fetching import fetch_episode
+from shapechanger.cli.robot.fetch import fetch_episode
 from shapechanger.demos.episodes import (
     EpisodeHeader,
     EpisodeWriter,

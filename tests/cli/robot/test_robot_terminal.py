@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.running import run_robot
+from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile

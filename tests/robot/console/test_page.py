@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Route
 
 from shapechanger.link.authentication import new_key
-from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
 
 Visit = Callable[..., Console]

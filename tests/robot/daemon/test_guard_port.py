@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from shapechanger.robot.daemon.guard_link import GuardLink
-from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 from tests.robot.daemon.plans import guard_state
 from tests.robot.daemon.running import until
 

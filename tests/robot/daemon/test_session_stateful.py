@@ -31,7 +31,7 @@ from shapechanger.link.messages import (
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Authenticator, Session
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.guard.messages import Order
 from tests.robot.daemon.plans import car_plan, guard_state
 
 MAX_AGE_NS = 400 * 1_000_000

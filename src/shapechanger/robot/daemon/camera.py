@@ -10,7 +10,7 @@ import simplejpeg
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
-from shapechanger.robot.cameras.checked import FreezeDetector, check_jpeg
+from shapechanger.robot.cameras.jpeg import FreezeDetector, check_jpeg
 
 __all__ = ["FrameChecks", "FrameReader", "Latest"]
 

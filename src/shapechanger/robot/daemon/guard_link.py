@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_state, encode
+from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_state, encode
 
 __all__ = ["LIFELINE", "GuardLink", "send_heartbeats", "send_lifeline"]
 

@@ -23,7 +23,7 @@ from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.recorder import Recorder
-from shapechanger.robot.guard.wire import GuardState, Order
+from shapechanger.robot.guard.messages import GuardState, Order
 
 __all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "ConnectedClient", "SessionHub"]
 

@@ -10,7 +10,7 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity, PendingCommand
-from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.guard.messages import GuardState
 
 __all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
 

@@ -28,9 +28,9 @@ from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
 from shapechanger.robot.daemon.session import Authenticator
+from shapechanger.robot.guard.messages import GuardState
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
-from shapechanger.robot.guard.wire import GuardState
 from shapechanger.robot.hardware import Clock, connect
 
 __all__ = ["Daemon", "main", "start_log"]

@@ -50,7 +50,7 @@ from shapechanger.robot.daemon.limits import (
 )
 from shapechanger.robot.daemon.observation import build_observation
 from shapechanger.robot.daemon.recorder import Recorder
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.guard.messages import Order
 
 __all__ = ["Authenticator", "RecordingRequests", "Session", "WrongKey"]
 

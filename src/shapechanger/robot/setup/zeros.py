@@ -10,7 +10,7 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, As5600, connect_encoders
-from shapechanger.robot.drivers.dynamixel.plans import bus_settings, servo_settings
+from shapechanger.robot.drivers.dynamixel.settings import bus_settings, servo_settings
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.finding import Finding

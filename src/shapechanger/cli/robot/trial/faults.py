@@ -20,8 +20,7 @@ from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.network import BadNetwork
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.robot import Operator, RunningRobot
 
 __all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
 
