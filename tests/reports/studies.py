@@ -12,7 +12,7 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.settings import LearnerSettings
+from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.methods import RunResult
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
@@ -20,7 +20,7 @@ from shapechanger.transfer.study import Study
 
 STEPS = np.linspace(0, 10_240, 11)
 
-SETTINGS = LearnerSettings(
+SETTINGS = PpoSettings(
     n_envs=4,
     n_steps=64,
     batch_size=64,

@@ -12,11 +12,11 @@ from shapechanger.errors import CorruptStudy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.ppo import train
-from shapechanger.transfer.learners.settings import LearnerSettings
+from shapechanger.transfer.learners.settings import PpoSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
 
-def trained(settings: LearnerSettings, seed: int = 0) -> tuple[TrainedPolicy, list[Evaluation]]:
+def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[Evaluation]]:
     """A policy that has learned for a second."""
     curve: list[Evaluation] = []
     policy = train(SMALL, "tiny", settings, 64, seed, on_evaluation=curve.append)
@@ -24,7 +24,7 @@ def trained(settings: LearnerSettings, seed: int = 0) -> tuple[TrainedPolicy, li
 
 
 @pytest.mark.parametrize("settings", [TINY, TINY_NORMALISED], ids=["plain", "normalised"])
-def test_a_policy_goes_round(settings: LearnerSettings, tmp_path: Path) -> None:
+def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
     """Actions, statistics and card read back as they were."""
     policy, curve = trained(settings)
     save_policy(policy, tmp_path / "policy.zip")

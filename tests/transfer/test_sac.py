@@ -161,5 +161,7 @@ def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
 def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
     """Before anything is learned, with the name of the env."""
     task = TransferTask(*(LANE, BIG)[::order])
-    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 has no demonstrator, and sac"):
+    with pytest.raises(
+        StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and sac"
+    ):
         make_plan(task, "sac", TINY_SAC, seeds=2)

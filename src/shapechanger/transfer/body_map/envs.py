@@ -176,7 +176,7 @@ def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
     """
     if not isinstance(space, Box) or space.shape != (layout.size,):
         raise SpaceMismatch(
-            f"The {which} layout holds {layout.size} numbers: "
-            f"the space must be a Box of the shape ({layout.size},), and is {space}."
+            f"The layout of the {which} has {layout.size} numbers, so its space must be a Box of "
+            f"shape ({layout.size},), not {space}."
         )
     return cast("Box[Any]", space)
