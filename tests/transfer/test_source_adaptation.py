@@ -111,7 +111,7 @@ def test_default_arms() -> None:
 
 def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
     """Before anything is trained."""
-    with pytest.raises(StudyError, match="BigInvertedPendulum-v1 cannot adapt .*SmallInv"):
+    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 cannot adapt .*SmallInv"):
         tiny_plan(arms=("scratch", "identified"))
 
 

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import ForeignStudy, SpaceMismatch, StudyError
+from shapechanger.errors import ForeignStudy, ShapechangerError, SpaceMismatch, StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
@@ -97,12 +97,26 @@ class TaskTraits(NamedTuple):
     Attributes:
         source: Traits of the source.
         target: Traits of the target.
-        shift: The certificate of the shift as text; empty if the envs publish none.
+        certificate: The certificate of the shift as text, empty if the envs publish none; or the
+            error that it was refused with.
     """
 
     source: EnvTraits
     target: EnvTraits
-    shift: str
+    certificate: str | ShapechangerError
+
+    @property
+    def shift(self) -> str:
+        """The certificate of the shift.
+
+        Raises:
+            EmptyShift: If nothing changes between source and target.
+            MorphologyError: If the two cannot be compared.
+            StudyError: If an env cannot be stepped.
+        """
+        if isinstance(self.certificate, ShapechangerError):
+            raise self.certificate
+        return self.certificate
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
@@ -111,15 +125,17 @@ def inspect_task(task: TransferTask) -> TaskTraits:
     Raises:
         UnknownName: If an env does not exist.
         LayoutError: If an env publishes no layouts.
-        EmptyShift: If nothing changes between source and target.
-        StudyError: If an env cannot be stepped.
+        StudyError: If an env does not take its arguments.
     """
     source = task.source.make()
     try:
         target = task.target.make()
         try:
             traits = env_traits(source), env_traits(target)
-            return TaskTraits(*traits, certify_shift(source, target))
+            try:
+                return TaskTraits(*traits, certify_shift(source, target))
+            except ShapechangerError as error:
+                return TaskTraits(*traits, error)
         finally:
             target.close()
     finally:
@@ -178,7 +194,6 @@ def make_plan(
     Raises:
         UnknownName: If an env, an arm or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        EmptyShift: If nothing changes between source and target.
         StudyError: If the budget or the number of seeds is too small, the given policy is of
             another kind of learner, or an env lacks what the learner needs.
         CorruptStudy: If the given policy is missing, corrupt or refused.
