@@ -14,8 +14,8 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.twin.hardware import connect
 from shapechanger.twin.robot import Operator
+from shapechanger.twin.server import START_NS
 from shapechanger.twin.start import start_board
-from shapechanger.twin.timekeeper import START_NS
 from tests.twin.robots import CAR, granted, process, steady, until
 
 _GUARD = """

@@ -1,4 +1,4 @@
-"""Starts a board for the command line and for tests."""
+"""Start a board in a process of its own, or find one that runs."""
 
 from __future__ import annotations
 
@@ -14,30 +14,35 @@ from typing import Final, Literal
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.board_client import Link
+from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.twin.world.place import Place
 
 __all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
 
 HARDWARE: Final = "shapechanger.twin.hardware:connect"
-"""Where a robot's processes get the twin's hardware; its argument is the board's socket."""
+"""Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 
 _SOCKET: Final = "board.socket"
 _LEDGER: Final = "ledger.jsonl"
 _FIFO: Final = "camera.mjpeg"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
-_LONGEST_SOCKET: Final = 100  # Bytes; Linux takes 107.
+_MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
 
 
 class BoardAt:
-    """Where a board can be reached.
+    """Paths of a board.
+
+    Args:
+        socket_path: Socket on which it listens; the argument of `HARDWARE`.
+        ledger_path: Its ledger.
+        fifo_path: Pipe of its pictures; None without a camera.
 
     Attributes:
-        socket_path: Where it listens; the argument of `HARDWARE`.
+        socket_path: Socket on which it listens.
         ledger_path: Its ledger.
-        fifo_path: Where its pictures come out; None without a camera.
+        fifo_path: Pipe of its pictures; None without a camera.
     """
 
     def __init__(self, socket_path: str, ledger_path: Path, fifo_path: Path | None) -> None:
@@ -47,21 +52,25 @@ class BoardAt:
 
     @property
     def hardware(self) -> tuple[str, str]:
-        """Where a robot's processes get their hardware, with its argument."""
+        """Source of a robot's hardware, with its argument."""
         return HARDWARE, self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """The camera of a profile, but reading the pictures of this board."""
+        """Return the camera of a profile, reading the pictures of this board.
+
+        Raises:
+            RobotError: If the board has no camera.
+        """
         if self.fifo_path is None:
             raise RobotError("This twin was started without a camera.")
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
 
 
 class RunningBoard(BoardAt):
-    """A board that was started here. It ends with `close`, or when this process does.
+    """A board that this process has started. It ends with `close`, or with this process.
 
     Attributes:
-        process: The process.
+        process: Process of the board.
     """
 
     def __init__(
@@ -83,7 +92,7 @@ class RunningBoard(BoardAt):
         self.close()
 
     def outlive_exec(self) -> None:
-        """Let the board run on when this process becomes another program by exec."""
+        """Keep the board running when this process executes another program."""
         self._owner.set_inheritable(True)
 
     def close(self) -> None:
@@ -97,17 +106,17 @@ class RunningBoard(BoardAt):
 
 
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
-    """The board that runs in a folder, and its clock; None if none does."""
+    """Return the board that runs in a folder, and its clock; None without one."""
     folder = Path(folder).absolute()
     socket_path = folder / _SOCKET
     if not socket_path.is_socket():
         return None
     try:
-        link = Link(str(socket_path), "operator")
+        client = BoardClient(str(socket_path), "operator")
     except RobotError:
         return None
-    clock = link.clock
-    link.close()
+    clock = client.clock
+    client.close()
     fifo_path = folder / _FIFO
     found = BoardAt(str(socket_path), folder / _LEDGER, fifo_path if fifo_path.is_fifo() else None)
     return found, clock
@@ -125,21 +134,21 @@ def start_board(
     """Start a board and wait until it listens.
 
     Args:
-        wiring: What is really attached to its pins.
-        clock: Whether time is the machine's, or moves only when it is asked to.
-        folder: Where its socket, its ledger and its pipe go; new, or without those.
-        camera: What the front camera is like; None for no camera.
-        seed: Of the room, the first start and everything random.
-        one_shot_ms: How long the one-shot of the enable line holds; None where none is fitted.
-        place: Where the vehicle is; None for the plain room.
+        wiring: The robot as it is really wired.
+        clock: The machine's clock ("real"), or one that only clients advance ("twin").
+        folder: Existing folder for its socket, ledger and pipe, without such files.
+        camera: Front camera; None without one.
+        seed: Seed of the room, the first start and everything random.
+        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
+        place: Place of the vehicle; None for the plain room.
 
     Raises:
-        RobotError: If it does not start, or the folder is not as it must be.
+        RobotError: If it does not start, or the folder cannot be used.
     """
-    TwinWiring(wiring, one_shot_ms)  # Says in words what it does not know.
+    TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
     folder = Path(folder).absolute()
     socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
-    if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
+    if len(os.fsencode(socket_path)) > _MAX_SOCKET_PATH:
         raise RobotError(f"The path {socket_path} is too long for a socket.")
     if not folder.is_dir():
         raise RobotError(f"There is no folder {folder} for the twin: make it first.")
@@ -172,7 +181,7 @@ def start_board(
             command,
             stdin=subprocess.DEVNULL,
             pass_fds=(file.fileno(), theirs.fileno()),
-            start_new_session=True,  # So that Ctrl-C reaches the robot, and not the board.
+            start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
     board = RunningBoard(process, ours, str(socket_path), ledger_path, fifo_path)
     ours.settimeout(_READY_S)
@@ -183,6 +192,6 @@ def start_board(
     if not ready:
         process.kill()
         board.close()
-        raise RobotError("The twin's board did not start; what it wrote says why.")
+        raise RobotError("The twin's board did not start; its output above gives the reason.")
     ours.settimeout(None)
     return board

@@ -22,7 +22,7 @@ from shapechanger.errors import RobotError
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 if TYPE_CHECKING:
-    from shapechanger.twin.rig import Rig
+    from shapechanger.twin.servos.rig import Rig
 
 __all__ = ["FingerWorld"]
 
