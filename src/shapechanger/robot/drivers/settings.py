@@ -7,8 +7,6 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from typing import TypeVar, cast
 
-from gpiozero import GPIOZeroError
-
 from shapechanger.errors import RobotError
 
 __all__ = ["in_words", "number", "numbers", "text", "texts", "whole", "wholes"]
@@ -60,22 +58,27 @@ def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: st
 
 @contextmanager
 def in_words(device: str) -> Generator[None]:
-    """Give the errors of gpiozero, lgpio and the kernel as `RobotError`.
+    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError`.
 
     Args:
-        device: What it is, such as "The motor on GPIO22 and GPIO27".
+        device: Description of the device, such as "The motor on GPIO22 and GPIO27".
 
     Raises:
         RobotError: If the device does not answer.
     """
     try:
         yield
-    except _errors() as error:
+    except _device_errors() as error:
         raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
 
 
-def _errors() -> tuple[type[BaseException], ...]:
-    # lgpio has an exception of its own, and is not everywhere; what was never loaded never raises.
-    lgpio = sys.modules.get("lgpio")
-    own: tuple[type[BaseException], ...] = () if lgpio is None else (lgpio.error,)
-    return (GPIOZeroError, OSError, ImportError, *own)
+def _device_errors() -> tuple[type[BaseException], ...]:
+    """Return what gpiozero, lgpio and the kernel raise.
+
+    Profiles read settings where neither library is installed, and a library that was never loaded
+    raises nothing.
+    """
+    names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
+    loaded = [(sys.modules.get(module), name) for module, name in names]
+    own = tuple(getattr(module, name) for module, name in loaded if module is not None)
+    return (OSError, ImportError, *own)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from gpiozero import InputDevice
 
-__all__ = ["Duty", "EdgeInput"]
+__all__ = ["EdgeInput"]
 
 
 class EdgeInput:
@@ -51,43 +49,3 @@ class EdgeInput:
     def _call(self, at_s: float, level: int) -> None:
         if level in (0, 1):  # lgpio has a 2 for "nothing came for a while".
             self._changed(at_s, int(level))
-
-
-# gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). We round to them
-# ourselves, so that every pin factory does the same, and what we answer is what is done.
-_STEPS: Final = 100
-
-
-@dataclass(frozen=True, slots=True)
-class Duty:
-    """A range of duty cycles.
-
-    Attributes:
-        start: Smallest duty that moves the motor, 0 to 1; the smallest values are mapped there.
-        full: Duty at a value of 1, at most 1.
-    """
-
-    start: float = 0.0
-    full: float = 1.0
-
-    def of(self, value: float) -> float:
-        """The duty for the size of a value, in whole steps."""
-        size = min(abs(value), 1.0)
-        if size == 0.0:
-            return 0.0
-        return _step(round((self.start + (self.full - self.start) * size) * _STEPS))
-
-    def size_at(self, duty: float) -> float:
-        """The size of the value that a duty stands for; more than 0 for every duty above 0."""
-        if duty <= 0.0:
-            return 0.0
-        if self.full <= self.start:
-            return 1.0
-        # A duty that was rounded to just below `start` still turns the motor.
-        return min(max((duty - self.start) / (self.full - self.start), 0.5 / _STEPS), 1.0)
-
-
-def _step(steps: int) -> float:
-    """A duty that `int(duty * 100)` turns into these steps: 0.29 * 100 is 28.999999999999996."""
-    duty = steps / _STEPS
-    return duty if int(duty * _STEPS) == steps else math.nextafter(duty, 1.0)
