@@ -78,7 +78,7 @@ class BoardClient:
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
+        """True if `close` was called."""
         return self._socket.fileno() < 0
 
     def fileno(self) -> int:

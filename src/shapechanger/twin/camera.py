@@ -127,7 +127,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Whether somebody wants a picture."""
+        """True if somebody wants a picture."""
         if not self.find_reader():
             return False
         if self._rest:

@@ -31,7 +31,7 @@ class BoardPins(Protocol):
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
+        """True if `close` was called."""
         ...
 
     def claim(

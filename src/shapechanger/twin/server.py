@@ -95,7 +95,7 @@ class BoardConnection:
 
     @property
     def wants_to_write(self) -> bool:
-        """Whether messages wait for the client to read."""
+        """True if messages wait for the client to read."""
         return bool(self._outbox)
 
     def receive(self) -> Request | None:

@@ -117,7 +117,7 @@ class TwinWiring:
         return read
 
     def has_pulses(self, name: str, levels: Levels, now_ns: int) -> bool:
-        """Whether a servo or speed controller gets pulses, and has power."""
+        """True if a servo or speed controller gets pulses, and has power."""
         ends_ns = self.power_ends_ns(levels)
         return (ends_ns is None or now_ns < ends_ns) and self._pulse(
             self._outputs[name], levels

@@ -104,7 +104,7 @@ class Parser:
 
     @property
     def waits(self) -> bool:
-        """Whether it holds the start of a packet."""
+        """True if it holds the start of a packet."""
         return bool(self._bytes)
 
     def forget(self) -> None:

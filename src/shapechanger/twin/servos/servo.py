@@ -125,12 +125,12 @@ class SimulatedServo:
 
     @property
     def is_awake(self) -> bool:
-        """Whether it receives packets."""
+        """True if it receives packets."""
         return self._now_ns >= self._starts_until_ns and not self.faults.deaf
 
     @property
     def has_torque(self) -> bool:
-        """Whether torque enable is on."""
+        """True if torque enable is on."""
         return self._torque
 
     @property

@@ -192,7 +192,7 @@ def test_who_switched_itself_off_needs_a_reboot() -> None:
 def test_nothing_is_rebooted_while_it_is_held() -> None:
     """A tendon would be let go while the others pull."""
     rig = Rig().start()
-    with pytest.raises(RobotError, match="not started afresh while the bus is held"):
+    with pytest.raises(RobotError, match="cannot be rebooted while the bus is held"):
         rig.bus.reboot("EIP")
 
 
