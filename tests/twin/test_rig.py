@@ -104,7 +104,7 @@ def test_the_same_commands_give_the_same_motion() -> None:
         ("hot", "FDS .*(overheated|more than 65 C)"),
         ("overload", "FDS .*overloaded"),
         ("snapped", "FDS .*lost its tendon"),
-        ("power", "FDS .*(started afresh|does not answer)"),
+        ("power", "FDS .*(restarted|does not answer)"),
     ],
 )
 def test_a_servo_that_fails_takes_all_tendons_down(

@@ -204,7 +204,7 @@ class InProcessRobot:
         world: World of the robot.
         pictures: Whether observations have pictures.
         seed: Seed of the phase of software PWM.
-        wired_as: What is really attached to the pins; None for what the profile says.
+        wired_as: The robot as it is really wired; None for the plan of the profile.
 
     Attributes:
         welcome: Description of the robot, as a daemon sends it to a client.

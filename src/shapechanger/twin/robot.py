@@ -248,7 +248,7 @@ class RunningRobot:
                 return int(pid)
         raise RobotError(f"The robot's {program} does not run at the moment.")
 
-    def said(self) -> str:
+    def log_text(self) -> str:
         """Return the log of its processes so far."""
         path = self.folder / "log.txt"
         return path.read_text(errors="replace") if path.exists() else ""
@@ -288,9 +288,9 @@ class RunningRobot:
         while not path.exists():
             if self.supervisor.poll() is not None or time.monotonic() > until_s:
                 self._end()
-                said = self.said().strip()
+                text = self.log_text().strip()
                 self.close()
-                raise RobotError(f"The robot did not start: {said}")
+                raise RobotError(f"The robot did not start: {text}")
             time.sleep(_POLL_S)
         return _Ready(**json.loads(path.read_text()))
 
@@ -333,12 +333,12 @@ def run_robot(
         command += ["--twin", "--clock", clock, "--seed", str(seed)]
         command += ["--twin-folder", str(folder)]
     with contextlib.ExitStack() as stack:
-        said = log or stack.enter_context((folder / "log.txt").open("wb"))
+        output = log or stack.enter_context((folder / "log.txt").open("wb"))
         supervisor = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
             # So that Ctrl-C first reaches the driving program, which then ends the robot.
             process_group=0,
             preexec_fn=_end_with_parent if sys.platform == "linux" else None,

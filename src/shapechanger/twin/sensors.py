@@ -1,4 +1,4 @@
-"""What is attached to the board's inputs: encoders, bumpers, distance sensors, a stop button."""
+"""Around the board: sensors on input pins, speed controllers, and the world that moves them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapechanger.twin.signals import Levels
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import Readings, World
 
-__all__ = ["Edge", "PinSensors", "SpeedController", "Surroundings"]
+__all__ = ["PinSensors", "SpeedController", "Surroundings"]
 
 # HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
 # as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.

@@ -397,7 +397,7 @@ class ServoBus:
         self._registers.sync_write(GOAL_CURRENT, self._goals)
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
-        """Read a register that shows whether servos still obey; drop servos that may have restarted."""
+        """Read a register that shows obedience, and drop servos that may have restarted."""
         # A servo that was away may have lost power, and with it the meaning of its position.
         back = [one for one in heard if self._health[one].missed]
         known = self._audit_register(BUS_WATCHDOG, back)

@@ -210,17 +210,17 @@ class ServoHealth:
             words = ", ".join(hardware_errors(value)) or f"it gives the unknown code {value}"
             self._fail(f"has switched itself off: {words}. Only a reboot gives it torque again")
         elif register == BUS_WATCHDOG and value == TRIPPED:
-            words = f"it heard nothing for {self._bus.watchdog_ms} ms"
-            self._fail(f"was stopped by its own watchdog, for {words}")
+            words = f"it received nothing for {self._bus.watchdog_ms} ms"
+            self._fail(f"was stopped by its own watchdog: {words}")
         elif register == BUS_WATCHDOG and value == 0:
             self.was_reset = True
-            self._fail("was started afresh, as by a dip of its power, and has lost its zero")
+            self._fail("has restarted, for example after a dip of its power, and lost its zero")
         elif register == TORQUE_ENABLE and pulls and value == 0:
             self._fail("has let go by itself")
         elif register == GOAL_CURRENT and pulls:
             self._refused = 0 if value == goal else self._refused + 1
             if self._refused >= _MAX_WRONG_GOALS:
-                self._fail(f"keeps to a goal of {value} counts, and was told {goal}")
+                self._fail(f"has a goal of {value} counts, and was sent {goal}")
 
     def _fail(self, what: str) -> None:
         self.fault = self.fault or f"{self._servo.words} {what}."
