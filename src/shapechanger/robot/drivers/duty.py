@@ -8,14 +8,14 @@ from typing import Final
 
 __all__ = ["Duty"]
 
-# gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). We round to them
-# ourselves, so that every pin factory does the same, and what we answer is what is done.
+# gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
+# here makes all pin factories equal, and the returned value is the applied one.
 _STEPS: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Duty:
-    """A range of duty cycles.
+    """Range of duty cycles.
 
     Attributes:
         start: Smallest duty that moves the motor, 0 to 1; the smallest values are mapped there.
@@ -26,14 +26,14 @@ class Duty:
     full: float = 1.0
 
     def of(self, value: float) -> float:
-        """The duty for the size of a value, in whole steps."""
+        """Return the duty cycle for the magnitude of a value, in whole steps."""
         size = min(abs(value), 1.0)
         if size == 0.0:
             return 0.0
         return _step(round((self.start + (self.full - self.start) * size) * _STEPS))
 
     def size_at(self, duty: float) -> float:
-        """The size of the value that a duty stands for; more than 0 for every duty above 0."""
+        """Return the magnitude of the value of a duty cycle; above 0 for every duty above 0."""
         if duty <= 0.0:
             return 0.0
         if self.full <= self.start:
@@ -43,6 +43,6 @@ class Duty:
 
 
 def _step(steps: int) -> float:
-    """A duty that `int(duty * 100)` turns into these steps: 0.29 * 100 is 28.999999999999996."""
+    """Return a duty for which `int(duty * 100)` is `steps`: 0.29 * 100 is 28.999999999999996."""
     duty = steps / _STEPS
     return duty if int(duty * _STEPS) == steps else math.nextafter(duty, 1.0)

@@ -1,4 +1,4 @@
-"""Inputs whose changes are noticed by interrupt, with the time of each."""
+"""Digital inputs with interrupts and timestamps."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["EdgeInput"]
 
 
 class EdgeInput:
-    """An input that calls back at each change of its level.
+    """Input with a callback on each change of its level.
 
     Args:
-        pin: Its BCM number.
-        pull: Which way the resistor in the Pi pulls it.
-        factory: Where gpiozero takes the pin from.
-        changed: Gets the time in seconds, on a clock of its own, and the new level. lgpio calls it
-            from a thread of its own.
+        pin: BCM number.
+        pull: Direction of the internal pull resistor.
+        factory: Pin factory of gpiozero.
+        changed: Receives the time, s, on a clock of its own, and the new level. lgpio calls it from
+            its own thread.
     """
 
     def __init__(
@@ -31,21 +31,21 @@ class EdgeInput:
         self._active = 0 if pull == "up" else 1
         self._changed = changed
         self._device = InputDevice(pin, pull_up=pull == "up", pin_factory=factory)
-        # The devices of gpiozero that call back keep the time to themselves; their pins tell it.
+        # gpiozero's devices do not pass the timestamp on; their pins do.
         self._device.pin.edges = "both"
         self._device.pin.when_changed = self._call
 
     @property
     def level(self) -> int:
-        """0 or 1 as it is now."""
+        """Current level, 0 or 1."""
         return self._active if self._device.is_active else 1 - self._active
 
     def close(self) -> None:
-        """Let go of the pin."""
+        """Close the pin."""
         if not self._device.closed:
             self._device.pin.when_changed = None
             self._device.close()
 
     def _call(self, at_s: float, level: int) -> None:
-        if level in (0, 1):  # lgpio has a 2 for "nothing came for a while".
+        if level in (0, 1):  # lgpio reports 2 for a watchdog timeout.
             self._changed(at_s, int(level))
