@@ -1,12 +1,11 @@
 """The twin's board, a process of its own: pins, chips, ledger, world and time.
 
 It is started before the robot and outlives the robot's processes, as hardware does. It ends on
-SIGTERM, or when the process at the other end of `--owner-fd` has ended.
+SIGTERM, or with the process at the other end of its owner's descriptor.
 """
 
 from __future__ import annotations
 
-import argparse
 import logging
 import os
 import signal
@@ -15,6 +14,8 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 from typing import Final
+
+import msgspec
 
 from shapechanger.errors import RobotError, UnknownName, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
@@ -53,8 +54,9 @@ from shapechanger.twin.server import (
 )
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter
+from shapechanger.twin.start import BoardSettings
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.place import Place, open_world
+from shapechanger.twin.world.place import open_world
 from shapechanger.worlds.world import RESTING_V, World
 
 __all__ = ["Board", "main"]
@@ -74,7 +76,7 @@ class Board:
         ledger: Record of all changes.
         camera: Front camera; None without one.
         listening: Listening socket for clients.
-        owner_fd: Descriptor whose end ends the board; None for none.
+        owner_fd: Descriptor whose end ends the board.
         seed: Seed of everything random.
     """
 
@@ -86,7 +88,7 @@ class Board:
         ledger: LedgerWriter,
         camera: FrontCameraPipe | None,
         listening: socket.socket,
-        owner_fd: int | None,
+        owner_fd: int,
         seed: int,
     ) -> None:
         self._world = world
@@ -243,66 +245,48 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a board as the command line asks."""
-    parser = argparse.ArgumentParser(description="The simulated board of a robot.")
-    parser.add_argument("--plan-fd", type=int, required=True, help="descriptor of the GuardPlan")
-    parser.add_argument("--socket", required=True, help="path of the socket to listen on")
-    parser.add_argument("--ledger", required=True, help="file to write the ledger to")
-    parser.add_argument("--clock", choices=("real", "twin"), required=True)
-    parser.add_argument("--owner-fd", type=int, help="descriptor whose end ends this process")
-    parser.add_argument("--fifo", help="pipe for the camera's pictures")
-    parser.add_argument("--size", default="160x120", help="width and height of the pictures")
-    parser.add_argument("--fps", type=float, default=20.0, help="pictures per second")
-    parser.add_argument("--quality", type=int, default=80, help="quality of the JPEGs, 1 to 100")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--world", default="", help="kind of world; empty for the plain room")
-    parser.add_argument("--vehicle", default="", help="vehicle in that world, such as car")
-    parser.add_argument("--lens", action="append", default=[], help="defect of the camera")
-    parser.add_argument("--finger", default="", help="parameters of a finger, as JSON")
-    parser.add_argument("--one-shot-ms", type=float, help="hold time of the enable line's one-shot")
-    given = parser.parse_args(arguments)
-
+    """Run a board; the arguments are the descriptors of its `BoardSettings` and of its owner."""
+    settings_fd, owner_fd = map(int, sys.argv[1:] if arguments is None else arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
-    with os.fdopen(given.plan_fd, encoding="utf-8") as file:
-        plan = GuardPlan.from_json(file.read())
+    with os.fdopen(settings_fd, "rb") as file:
+        settings = msgspec.json.decode(file.read(), type=BoardSettings)
+    plan = GuardPlan.from_json(settings.plan)
 
-    width, height = (int(number) for number in given.size.split("x"))
     parts = {output.part for output in plan.outputs if output.part}
-    size = (width, height) if given.fifo is not None else None
-    place = Place(given.world, given.vehicle, tuple(given.lens), given.finger)
-    world = open_world(place, parts, size, given.seed)
-    _warm_up(world, given.seed, pictures=size is not None)
-    if given.clock == "real":
+    plan_of_camera = settings.camera
+    size = None if plan_of_camera is None else plan_of_camera.size
+    world = open_world(settings.place, parts, size, settings.seed)
+    _warm_up(world, settings.seed, pictures=size is not None)
+    if settings.clock == "real":
         run_early()  # Hardware is never late because the machine is busy.
-    time = TwinTime(plan.tick_hz) if given.clock == "twin" else RealTime()
+    time = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
     camera = None
-    if given.fifo is not None:
+    if plan_of_camera is not None:
         camera = FrontCameraPipe(
-            given.fifo,
-            given.fps,
-            given.quality,
-            latest_only=given.clock == "real",
+            settings.fifo,
+            plan_of_camera.fps,
+            plan_of_camera.jpeg_quality,
+            latest_only=settings.clock == "real",
             start_ns=time.now_ns(),
-            seed=given.seed,
-            barcode=not given.world,
+            seed=settings.seed,
+            barcode=not settings.place.world,
         )
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listening.bind(given.socket)
+    listening.bind(settings.socket)
     board = Board(
-        TwinWiring(plan, given.one_shot_ms),
+        TwinWiring(plan, settings.one_shot_ms),
         world,
         time,
-        LedgerWriter(given.ledger),
+        LedgerWriter(settings.ledger),
         camera,
         listening,
-        given.owner_fd,
-        given.seed,
+        owner_fd,
+        settings.seed,
     )
     listening.listen()
-    if given.owner_fd is not None:
-        os.write(given.owner_fd, b"r")  # Ready.
+    os.write(owner_fd, b"r")  # Ready.
     board.run()
 
 

@@ -8,6 +8,7 @@ import struct
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Self
 
@@ -42,6 +43,7 @@ class BadNetwork:
 
     Args:
         port: Port of 127.0.0.1 to forward to.
+        clock: Time of the latency, s.
 
     Attributes:
         latency_s: Delay of each byte, s.
@@ -49,11 +51,12 @@ class BadNetwork:
         silent: Whether to block all data while connections stay open, as when a radio dies.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.latency_s = 0.0
         self.slice_bytes = 0
         self.silent = False
         self._port = port
+        self._clock = clock
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._listener, selectors.EVENT_READ)
@@ -141,11 +144,11 @@ class BadNetwork:
             return
         step = self.slice_bytes or len(data)
         for start in range(0, len(data), step):
-            stream.queue.append((time.monotonic() + self.latency_s, data[start : start + step]))
+            stream.queue.append((self._clock() + self.latency_s, data[start : start + step]))
         stream.size += len(data)
 
     def _write(self, stream: _Stream) -> None:
-        now_s = time.monotonic()
+        now_s = self._clock()
         while stream.queue and not self.silent and stream.queue[0][0] <= now_s:
             due, data = stream.queue[0]
             try:

@@ -170,7 +170,7 @@ class BoardServer:
 
     Args:
         listening: Listening socket.
-        owner_fd: Descriptor whose end ends the board; None for none.
+        owner_fd: Descriptor whose end ends the board.
         pins: Pins and chips.
         input_levels: Levels of the pins that sensors drive, kept up to date by the sensors.
         clock: Kind of clock.
@@ -181,7 +181,7 @@ class BoardServer:
     def __init__(
         self,
         listening: socket.socket,
-        owner_fd: int | None,
+        owner_fd: int,
         pins: PinBoard,
         input_levels: Mapping[int, int],
         clock: Literal["real", "twin"],
@@ -198,8 +198,7 @@ class BoardServer:
         self._input_levels = input_levels
         self._epoll = select.epoll()
         self._epoll.register(listening, select.EPOLLIN)
-        if owner_fd is not None:
-            self._epoll.register(owner_fd, select.EPOLLIN)
+        self._epoll.register(owner_fd, select.EPOLLIN)
         self._by_fd: dict[int, BoardConnection] = {}
 
     @property

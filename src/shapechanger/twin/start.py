@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal
 
+import msgspec
+
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
@@ -18,7 +20,7 @@ from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.twin.world.place import Place
 
-__all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
+__all__ = ["HARDWARE", "BoardAt", "BoardSettings", "RunningBoard", "find_board", "start_board"]
 
 HARDWARE: Final = "shapechanger.twin.hardware:connect"
 """Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
@@ -29,6 +31,32 @@ _FIFO: Final = "camera.mjpeg"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
 _MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
+
+
+class BoardSettings(msgspec.Struct, frozen=True):
+    """Settings of a board's process.
+
+    Attributes:
+        plan: The robot as it is wired, as the JSON of a `GuardPlan`.
+        socket: Path of the socket to listen on.
+        ledger: Path of the ledger to write.
+        clock: Kind of clock.
+        seed: Seed of everything random.
+        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
+        place: Place of the robot.
+        camera: Front camera; None without one.
+        fifo: Path of the pipe for its pictures.
+    """
+
+    plan: str
+    socket: str
+    ledger: str
+    clock: Literal["real", "twin"]
+    seed: int
+    one_shot_ms: float | None
+    place: Place
+    camera: CameraPlan | None
+    fifo: str
 
 
 class BoardAt:
@@ -147,43 +175,40 @@ def start_board(
     """
     TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
     folder = Path(folder).absolute()
-    socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
+    socket_path, ledger_path, fifo_path = (folder / name for name in (_SOCKET, _LEDGER, _FIFO))
     if len(os.fsencode(socket_path)) > _MAX_SOCKET_PATH:
         raise RobotError(f"The path {socket_path} is too long for a socket.")
     if not folder.is_dir():
         raise RobotError(f"There is no folder {folder} for the twin: make it first.")
-    for left in (socket_path, ledger_path, folder / _FIFO):
+    for left in (socket_path, ledger_path, fifo_path):
         if os.path.lexists(left):
             raise RobotError(f"A twin has left {left}: give a folder without it.")
+    if camera is not None:
+        os.mkfifo(fifo_path)
+    settings = BoardSettings(
+        plan=wiring.to_json(),
+        socket=str(socket_path),
+        ledger=str(ledger_path),
+        clock=clock,
+        seed=seed,
+        one_shot_ms=one_shot_ms,
+        place=place or Place(),
+        camera=camera,
+        fifo=str(fifo_path),
+    )
     ours, theirs = socket.socketpair()
     with theirs, tempfile.TemporaryFile() as file:
-        file.write(wiring.to_json().encode())
+        file.write(msgspec.json.encode(settings))
         file.seek(0)
-        command = [sys.executable, "-m", "shapechanger.twin.board"]
-        command += ["--plan-fd", str(file.fileno()), "--owner-fd", str(theirs.fileno())]
-        command += ["--socket", str(socket_path), "--ledger", str(ledger_path)]
-        command += ["--clock", clock, "--seed", str(seed)]
-        if one_shot_ms is not None:
-            command += ["--one-shot-ms", str(one_shot_ms)]
-        if place is not None and place.world:
-            command += ["--world", place.world, "--vehicle", place.vehicle]
-            command += [part for lens in place.lenses for part in ("--lens", lens)]
-        if place is not None and place.finger:
-            command += ["--finger", place.finger]
-        fifo_path = None
-        if camera is not None:
-            fifo_path = folder / _FIFO
-            os.mkfifo(fifo_path)
-            command += ["--fifo", str(fifo_path), "--fps", str(camera.fps)]
-            command += ["--size", "{}x{}".format(*camera.size)]
-            command += ["--quality", str(camera.jpeg_quality)]
+        fds = file.fileno(), theirs.fileno()
         process = subprocess.Popen(
-            command,
+            [sys.executable, "-m", "shapechanger.twin.board", *map(str, fds)],
             stdin=subprocess.DEVNULL,
-            pass_fds=(file.fileno(), theirs.fileno()),
+            pass_fds=fds,
             start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
-    board = RunningBoard(process, ours, str(socket_path), ledger_path, fifo_path)
+    pipe = None if camera is None else fifo_path
+    board = RunningBoard(process, ours, str(socket_path), ledger_path, pipe)
     ours.settimeout(_READY_S)
     try:
         ready = ours.recv(1)
