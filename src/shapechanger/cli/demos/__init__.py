@@ -1,4 +1,4 @@
-"""`shapechanger demos`: record, look, cut, repair, and learn from what was recorded."""
+"""`shapechanger demos`: record, inspect, edit and learn from demonstrations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Demos"]
 
 @dataclass(frozen=True)
 class Demos:
-    """Record demonstrations, look at them, and learn from them."""
+    """Record, inspect and edit demonstrations, and learn from them."""
 
     command: (
         Annotated[Record, tyro.conf.subcommand("record")]
@@ -39,5 +39,5 @@ class Demos:
     )
 
     def run(self) -> None:
-        """Do what was asked."""
+        """Run the subcommand."""
         self.command.run()

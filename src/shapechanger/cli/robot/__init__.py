@@ -1,4 +1,4 @@
-"""`shapechanger robot`: what is done on a robot, and from afar."""
+"""`shapechanger robot`: set up, serve, find, drive and test robots."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Robot"]
 
 @dataclass(frozen=True)
 class Robot:
-    """Set a robot up, serve it, find it and drive it."""
+    """Set up, serve, find, drive and test robots."""
 
     command: (
         Annotated[Init, tyro.conf.subcommand("init")]
@@ -44,5 +44,5 @@ class Robot:
     )
 
     def run(self) -> None:
-        """Do what was asked."""
+        """Run the subcommand."""
         self.command.run()
