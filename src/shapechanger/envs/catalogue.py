@@ -31,7 +31,7 @@ REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
 """Id of the env of a finger on a rig, which has the layout of `Finger-v1`."""
 
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
-"""Id of the env of a robot on the network; its body is whatever answers, so it is no `CatalogueEntry`."""
+"""Id of the env of a robot on the network, whose body is unknown until the robot answers."""
 
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
