@@ -283,7 +283,11 @@ class TunedStep(Reshapable):
         return ""
 
     def conclude(
-        self, bounds: Sequence[Any], before: Sequence[Any], actions: NDArray[Any]
+        self,
+        bounds: Sequence[Any],
+        before: Sequence[Any],
+        actions: NDArray[Any],
+        out: NDArray[np.float64] | None,
     ) -> Outcomes:
         """Compute the results of envs of this one's kind after their physics has stepped.
 
@@ -291,6 +295,7 @@ class TunedStep(Reshapable):
             bounds: The binding of each env.
             before: What `remember` of each binding returned before the step.
             actions: The action of each env, a row each.
+            out: Array to write the observations into; None for a new one.
         """
         raise NotImplementedError
 

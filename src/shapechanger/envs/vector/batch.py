@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["BatchStep", "SubEnv"]
 
+# The number of an env, and work to do for it.
+_Task = tuple[int, Callable[[int], None]]
+
 # Indices of mjWARN_BADQPOS, mjWARN_BADQVEL and mjWARN_BADQACC in `data.warning`.
 _BAD_STATE: Final = slice(3, 6)
 
@@ -131,9 +134,7 @@ class BatchStep:
         self._bounds: list[Any] = [None] * len(subs)
         # Threads rarely take equally long, so each takes its own tasks from the front and then
         # those of others from the back. A deque hands out each task once.
-        self._tasks: list[deque[tuple[int, Callable[[int], None]]]] = [
-            deque() for _ in range(threads)
-        ]
+        self._tasks: list[deque[_Task]] = [deque() for _ in range(threads)]
 
     def begin(
         self, actions: NDArray[Any], results: StepResults, restart: Callable[[int], None] | None
@@ -226,13 +227,16 @@ class BatchStep:
 
     def _conclude(self, numbers: list[int]) -> None:
         subs = [self._subs[number] for number in numbers]
-        where = slice(None) if len(numbers) == len(self._subs) else np.array(numbers)
+        everyone = len(numbers) == len(self._subs)
+        where = slice(None) if everyone else np.array(numbers)
         outcomes = cast("TunedStep", subs[0].tuned).conclude(
             [self._bounds[number] for number in numbers],
             [self._before[number] for number in numbers],
             self._actions[where],
+            self._observations if everyone else None,
         )
-        self._observations[where] = outcomes.observations
+        if not everyone:
+            self._observations[where] = outcomes.observations
         truncated = [sub.tick() for sub in subs]
         infos = InfoColumns(numbers, outcomes.infos)
         self._results.put_columns(infos, outcomes.rewards, outcomes.terminated, truncated)
@@ -246,14 +250,14 @@ class BatchStep:
         results.put(number, step)
 
 
-def _work_off(
-    tasks: deque[tuple[int, Callable[[int], None]]],
-    take: Callable[[], tuple[int, Callable[[int], None]]],
-    failures: Failures,
-) -> None:
+def _work_off(tasks: deque[_Task], take: Callable[[], _Task], failures: Failures) -> None:
+    """Do tasks until none is left; other threads may take some too."""
     while tasks:
         try:
             number, work = take()
         except IndexError:  # Another thread was quicker.
             return
-        attempt(work, number, failures)
+        try:
+            work(number)
+        except Exception as error:  # It crosses to the caller, who raises it.
+            failures.append((number, error))
