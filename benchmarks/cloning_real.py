@@ -38,8 +38,7 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.row import Row
-from shapechanger.demos.cloning.goal import class_numbers, goal_of
-from shapechanger.demos.cloning.judge import macro_f1
+from shapechanger.demos.cloning.judge import class_numbers, goal_of, macro_f1
 from shapechanger.demos.cloning.learn import DEMOS, learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.dataset import Dataset, load_dataset

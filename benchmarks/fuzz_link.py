@@ -38,11 +38,11 @@ from shapechanger.link.messages import (
     Undo,
     encode,
 )
-from shapechanger.robot.daemon.cockpit import Cockpit
+from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.limits import MessageRate
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.session import Door, Session
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.guard.messages import Order
 
 __all__ = ["fuzz", "main", "mutated", "resident_kb"]
 
@@ -143,8 +143,8 @@ def fuzz(
     counts: collections.Counter[str] = collections.Counter()
     orders: list[Order] = []
     now_ns = 1_000_000_000
-    cockpit = Cockpit(PLAN, lambda: now_ns, orders.append)
-    owner = Session(0, cockpit, Door())
+    cockpit = SessionHub(PLAN, lambda: now_ns, orders.append)
+    owner = Session(0, cockpit, Authenticator())
     owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
     owner.receive(encode(Take()))
     known: Session | None = None
@@ -152,7 +152,7 @@ def fuzz(
         now_ns += 1_000_000
         data = mutated(rng)
         if number % 4 == 0:  # A stranger at a door with a key.
-            stranger = Session(number, cockpit, Door(KEY))
+            stranger = Session(number, cockpit, Authenticator(KEY))
             try:
                 stranger.introduce(data)
             except LinkError:
@@ -161,7 +161,7 @@ def fuzz(
                 raise AssertionError(f"A stranger was let in with {data!r}.")
             continue
         if known is None:
-            known = Session(number, cockpit, Door(), MessageRate(1e9))
+            known = Session(number, cockpit, Authenticator(), MessageRate(1e9))
             known.introduce(encode(Hello(version=VERSION, proof=b"", name="known")))
             known.observe()
         try:

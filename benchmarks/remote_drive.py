@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
-from shapechanger.remote.vehicle import RemoteVehicleEnv
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
 
 __all__ = ["drive_remote"]
 

@@ -24,7 +24,7 @@ from benchmarks.echo import EchoRobot
 from benchmarks.row import Row
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.robots import CAR
 
 __all__ = ["fuzz", "hold", "link"]

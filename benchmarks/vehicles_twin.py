@@ -13,12 +13,12 @@ from benchmarks.clones import find_clone, sighted
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.envs.vehicle.evaluation import Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
-from shapechanger.remote.vehicle import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.running import run_robot
+from shapechanger.twin.robot import run_robot
 
 __all__ = ["twin"]
 

@@ -9,11 +9,10 @@ from typing import Any, Literal
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.operator import Operator
 from shapechanger.twin.oracle import propelled
-from shapechanger.twin.running import RunningRobot
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.robot import Operator, RunningRobot
+from shapechanger.twin.signals import read_ledger
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import until
 
 __all__ = ["Clock", "Served", "driving"]
@@ -71,7 +70,7 @@ class Served:
         """What a sensor says."""
         return self.seen.state[self._places[name]]
 
-    def rest_ns(self, wiring: Wiring) -> int:
+    def rest_ns(self, wiring: TwinWiring) -> int:
         """Wait for all that propels to rest, without any command; when it did, by the ledger."""
         if self._clock == "twin":
             self.operator.advance(1.0)

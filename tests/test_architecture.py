@@ -89,8 +89,11 @@ _RULES = {
         _names("errors layout morphology bodies tasks"),
         _names("mujoco scipy numpy msgspec"),
     ),
-    # The package itself registers the ids.
-    "shapechanger": _Rule(_names("errors layout envs"), _names("gymnasium numpy msgspec")),
+    # The package registers the ids; other names are imported on first use.
+    "shapechanger": _Rule(
+        _names("errors layout envs demos identify morphology remote testing transfer"),
+        _names("gymnasium numpy msgspec"),
+    ),
 }
 
 

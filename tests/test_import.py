@@ -8,6 +8,7 @@ import sys
 import gymnasium as gym
 import pytest
 
+import shapechanger
 from shapechanger.envs import CATALOGUE, register_all
 from shapechanger.envs.catalogue import FINGER_ENVS, REMOTE_FINGER, REMOTE_VEHICLE, VEHICLE_ENVS
 
@@ -125,3 +126,12 @@ def test_importing_again_does_no_harm() -> None:
         "print(dict(gym.registry) == before)"
     )
     assert _run(script) == "True\n"
+
+
+def test_every_public_name_is_imported_on_first_use() -> None:
+    """`import shapechanger` documents itself: `dir` lists what can be imported from it."""
+    for name in shapechanger.__all__:
+        assert name in dir(shapechanger)
+        assert getattr(shapechanger, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'Strech'"):
+        _ = shapechanger.Strech

@@ -1,26 +1,151 @@
 """Environments, robots and measurements for transfer learning in robotics.
 
-Importing this registers the ids with Gymnasium and loads no simulator:
+Importing this package registers its ids with Gymnasium and loads neither a simulator nor torch:
 
 >>> import gymnasium as gym
 >>> import shapechanger
 >>> env = gym.make("shapechanger/BigAnt-v1")
 >>> env.unwrapped.observation_layout.names[0]
 'torso/z'
+
+The names below are the public interface; each is imported on first use and may need an extra.
+
+- Layouts: `Layout`, `Feature`, `Element` name the numbers that a robot senses and moves.
+- Body edits: `Stretch`, `Radius`, `Cut`, `Remove`, `Split`, `AddSegment`, `AddLimb`, `Mass`,
+  `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity` and
+  `StartHeight` are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body
+  to another, and `certify` proves what a shift changes.
+- Envs: `make_vec` makes many at once; `examine` runs the exam that every env passes.
+- Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
+  `TransferTask`, `make_plan` and `run_study` measure what a transfer is worth, `load_policy` and
+  `save_policy` store policies.
+- Robots and demonstrations: `RobotClient`, `load_dataset`, `load_log`.
 """
 
 from __future__ import annotations
 
+import importlib
 from importlib.metadata import version
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.envs.catalogue import register_all
 from shapechanger.envs.vector.make import make_vec
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
 
-__all__ = ["Element", "Feature", "Layout", "ShapechangerError", "__version__", "make_vec"]
+if TYPE_CHECKING:
+    from shapechanger.demos.dataset import Dataset, load_dataset
+    from shapechanger.identify import load_log
+    from shapechanger.morphology import (
+        AddLimb,
+        AddSegment,
+        Cut,
+        Damping,
+        Density,
+        Friction,
+        Gear,
+        Gravity,
+        JointRange,
+        Lock,
+        Mass,
+        Radius,
+        Remove,
+        Split,
+        StartHeight,
+        Stiffness,
+        Stretch,
+        compile_body,
+        interpolate,
+        reshape,
+    )
+    from shapechanger.morphology.certificate import Certificate, certify
+    from shapechanger.remote.client import RobotClient
+    from shapechanger.testing import examine
+    from shapechanger.transfer import BodyMap, TransferTask
+    from shapechanger.transfer.learners.policy_file import load_policy, save_policy
+    from shapechanger.transfer.study import make_plan, run_study
+    from shapechanger.transfer.transplant import transplant
+
+__all__ = [
+    "AddLimb",
+    "AddSegment",
+    "BodyMap",
+    "Certificate",
+    "Cut",
+    "Damping",
+    "Dataset",
+    "Density",
+    "Element",
+    "Feature",
+    "Friction",
+    "Gear",
+    "Gravity",
+    "JointRange",
+    "Layout",
+    "Lock",
+    "Mass",
+    "Radius",
+    "Remove",
+    "RobotClient",
+    "ShapechangerError",
+    "Split",
+    "StartHeight",
+    "Stiffness",
+    "Stretch",
+    "TransferTask",
+    "__version__",
+    "certify",
+    "compile_body",
+    "examine",
+    "interpolate",
+    "load_dataset",
+    "load_log",
+    "load_policy",
+    "make_plan",
+    "make_vec",
+    "reshape",
+    "run_study",
+    "save_policy",
+    "transplant",
+]
 
 __version__: Final = version("shapechanger")
 
+_MODULES: Final = {
+    "demos.dataset": ("Dataset", "load_dataset"),
+    "identify": ("load_log",),
+    "morphology": (
+        *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),
+        *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
+        *("Stretch", "compile_body", "interpolate", "reshape"),
+    ),
+    "morphology.certificate": ("Certificate", "certify"),
+    "remote.client": ("RobotClient",),
+    "testing": ("examine",),
+    "transfer": ("BodyMap", "TransferTask"),
+    "transfer.learners.policy_file": ("load_policy", "save_policy"),
+    "transfer.study": ("make_plan", "run_study"),
+    "transfer.transplant": ("transplant",),
+}
+_LAZY: Final = {name: module for module, names in _MODULES.items() for name in names}
+
 register_all()
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use (PEP 562).
+
+    Raises:
+        AttributeError: If the package has no such name.
+        MissingExtra: If the name needs an extra that is not installed.
+    """
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"{__name__}.{_LAZY[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the names of the package, including those not imported yet."""
+    return sorted({*globals(), *_LAZY})

@@ -16,7 +16,7 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger.gap import resolve_gap
 from shapechanger.errors import BadAction, UnknownName
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.twin.robots import until
 
 Env = gym.Env[Any, Any]

@@ -11,9 +11,9 @@ import pytest
 
 from shapechanger.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.running import RunningRobot, run_robot
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.twin.signals import read_ledger
+from shapechanger.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import Clock, Served, driving
 
@@ -54,9 +54,9 @@ def car(robot: RunningRobot, clock: Clock) -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def wiring(profile: Profile) -> Wiring:
+def wiring(profile: Profile) -> TwinWiring:
     """What is attached, without the one-shot, which would hide that a pin is late."""
-    return Wiring(profile.guard_plan(), None)
+    return TwinWiring(profile.guard_plan(), None)
 
 
 def stands(seen: Observation) -> bool:
@@ -96,7 +96,7 @@ def test_forty_commands(car: Served, clock: Clock) -> None:
     assert min(periods) > 0
 
 
-def test_silence_ends_at_the_deadline(car: Served, clock: Clock, wiring: Wiring) -> None:
+def test_silence_ends_at_the_deadline(car: Served, clock: Clock, wiring: TwinWiring) -> None:
     """By the ledger: not before the deadline of the last command, and at rest just after it."""
     seen = car.drive(0.0, 1.0, steps=6)
     assert seen.command_ns is not None
@@ -145,7 +145,7 @@ def test_the_bumper_keeps_it_from_going_forward_only(car: Served, clock: Clock) 
     car.drive_until(drives, 0.0, 1.0)
 
 
-def test_blind_means_stop(car: Served, clock: Clock, wiring: Wiring) -> None:
+def test_blind_means_stop(car: Served, clock: Clock, wiring: TwinWiring) -> None:
     """When the newest picture is stale, though commands still come."""
     car.drive(0.0, 0.4, steps=3)
     car.operator.break_camera("off")

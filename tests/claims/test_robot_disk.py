@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shapechanger.twin.running import run_robot
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.robot import run_robot
+from shapechanger.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving
 
@@ -21,7 +21,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
         car.drive_until(lambda seen: seen.action_applied[1] == 1.0, 0.0, 1.0)
         told_ns = car.seen.command_ns
         assert told_ns is not None
-        rest_ns = car.rest_ns(Wiring(profile.guard_plan(), None))
+        rest_ns = car.rest_ns(TwinWiring(profile.guard_plan(), None))
         assert (rest_ns - told_ns) / 1e6 <= 250 + 200
         car.client.arm()  # It still obeys, and says so.
         assert robot.supervisor.poll() is None

@@ -11,12 +11,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.errors import LinkError
-from shapechanger.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.running import RunningRobot, run_robot
-from shapechanger.twin.wiring import WiredOutput, Wiring
+from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.twin.wiring import TwinWiring, WiredOutput
 from tests.robot.profile.texts import HOVERCRAFT
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.twin.robots import until
@@ -174,7 +174,7 @@ def test_bodies_that_do_not_drive(
 ) -> None:
     """The same class moves legs and tendons, each by what it was told."""
     profile = load_profile(find_profile(name))
-    wiring = Wiring(profile.guard_plan(), None)
+    wiring = TwinWiring(profile.guard_plan(), None)
     robot = serve(profile)
     env = env_of(robot)
     env.reset(seed=0)
@@ -201,7 +201,7 @@ def test_a_vehicle_that_no_code_has_ever_seen(
 ) -> None:
     """A hovercraft is one file: its fans and rudders follow, and it goes."""
     profile = write_profile(tmp_path, HOVERCRAFT)
-    wiring = Wiring(profile.guard_plan(), None)
+    wiring = TwinWiring(profile.guard_plan(), None)
     robot = serve(profile)
     env = env_of(robot)
     env.reset(seed=0)

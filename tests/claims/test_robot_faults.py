@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.cli.robot.trial.faults import FAULTS
 from shapechanger.cli.robot.trial.trial import Trial
-from shapechanger.twin.ledger import Transition, read_ledger
+from shapechanger.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
 TOLERANCE = 10.0

@@ -12,8 +12,7 @@ import pytest
 from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
-from shapechanger.twin.operator import Whereabouts
-from shapechanger.twin.running import run_robot
+from shapechanger.twin.robot import Whereabouts, run_robot
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.simulation import MujocoWorld
 from tests.robots import write_profile

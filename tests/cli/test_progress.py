@@ -6,7 +6,7 @@ import io
 
 from rich.console import Console
 
-from shapechanger.cli.progress import StudyProgress
+from shapechanger.cli.console import StudyProgress
 
 
 def test_a_terminal_shows_a_bar_with_the_time_left() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.gate import Gate, GateRule
+from shapechanger.demos.drivers import Gate, GateRule
 from shapechanger.errors import DemosError
 
 RIGHT = np.array([0.0, 0.5], np.float32)

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 from shapechanger.demos.dataset import load_dataset
+from shapechanger.demos.drivers import (
+    CorrectedPilot,
+    ExpertPilot,
+    Gate,
+    GateRule,
+    PolicyPilot,
+    record_steps,
+)
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.demos.gate import Gate, GateRule
-from shapechanger.demos.pilots import CorrectedPilot, ExpertPilot, PolicyPilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from tests.demos.corridor_env import AlwaysForward, CorridorEnv
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
-from shapechanger.link.fingerprint import (
+from shapechanger.link.authentication import (
     fingerprint_hex,
     fingerprint_of,
     fingerprint_short,

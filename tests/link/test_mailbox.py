@@ -7,7 +7,7 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.link.mailbox import Latest
+from shapechanger.robot.daemon.camera import Latest
 
 _moves = st.lists(st.one_of(st.just("put"), st.just("take"), st.just("clear")), max_size=60)
 

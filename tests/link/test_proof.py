@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
-from shapechanger.link.proof import (
+from shapechanger.link.authentication import (
     NONCE_BYTES,
     is_proof,
     make_proof,

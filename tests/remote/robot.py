@@ -18,9 +18,14 @@ from aiohttp import WSMsgType, web
 
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.link import messages as m
-from shapechanger.link.fingerprint import fingerprint_hex
-from shapechanger.link.proof import is_proof, new_key, new_nonce, parse_key
-from shapechanger.remote.known import KnownRobot
+from shapechanger.link.authentication import (
+    fingerprint_hex,
+    is_proof,
+    new_key,
+    new_nonce,
+    parse_key,
+)
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import Credentials, make_credentials
 
 FULL_SPEED = 2.0  # m/s at a throttle of 1.

@@ -12,7 +12,7 @@ import pytest
 
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.link import messages as m
-from shapechanger.link.proof import new_key
+from shapechanger.link.authentication import new_key
 from shapechanger.remote.client import RobotClient
 from tests.remote.robot import Robot, eventually
 

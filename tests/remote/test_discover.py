@@ -8,8 +8,8 @@ import pytest
 from zeroconf import ServiceInfo, Zeroconf
 
 from shapechanger.link.address import Address
-from shapechanger.remote import discover
-from shapechanger.remote.discover import SERVICE, FoundRobot, find
+from shapechanger.remote import discovery as discover
+from shapechanger.remote.discovery import SERVICE, FoundRobot, find
 from shapechanger.robot.daemon import discovery
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import LinkError, UnknownName
-from shapechanger.link.proof import new_key
-from shapechanger.remote.known import KnownRobot, forget, known_names, recall, remember
+from shapechanger.link.authentication import new_key
+from shapechanger.remote.known_robots import KnownRobot, forget, known_names, recall, remember
 
 KEY = "IVPO-EP6N-42IE-SHAG-6YAL-CDJ5-XI"
 """A key that stays the same, so that each run of the tests has the same names."""

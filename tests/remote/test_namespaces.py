@@ -13,11 +13,11 @@ from typing import Final
 import pytest
 
 from shapechanger.cli.robot.trial.driver import Driver
-from shapechanger.remote.known import KnownRobot
-from shapechanger.twin.ledger import read_ledger
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.twin.oracle import propelled
-from shapechanger.twin.running import RunningRobot, run_robot
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.twin.signals import read_ledger
+from shapechanger.twin.wiring import TwinWiring
 from tests.drawing import missing
 from tests.robots import IN_A_ROOM, write_profile
 from tests.twin.robots import until
@@ -66,7 +66,7 @@ def there(robot: RunningRobot) -> KnownRobot:
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
     """At full throttle: at rest at the deadline; joined again, somebody can drive again."""
     profile = write_profile(tmp_path)
-    wiring = Wiring(profile.guard_plan(), None)
+    wiring = TwinWiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)
     with (
         run_robot(profile, arguments=("--host", ROBOT, *IN_A_ROOM)) as robot,

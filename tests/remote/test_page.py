@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from shapechanger.remote.known import remember
+from shapechanger.remote.known_robots import remember
 from tests.remote.robot import Robot
 
 PAGE = Path(__file__).parents[2] / "docs" / "remote.md"

@@ -15,9 +15,9 @@ import pytest
 
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.link.fingerprint import fingerprint_hex
+from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot
+from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
 from tests.remote.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan

@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 
 AHEAD = np.array([0.25, 0.5], np.float32)
 BACK = (-0.5, -0.4)

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 from shapechanger import testing
+from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.layout import Element, Feature
 from shapechanger.link import messages as m
-from shapechanger.remote.four_way import FOUR_WAYS, FourWay
-from shapechanger.remote.known import remember
-from shapechanger.remote.vehicle import RemoteVehicleEnv
+from shapechanger.remote.known_robots import remember
 from shapechanger.testing import MakeEnv
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from tests.remote.robot import FULL_SPEED, STATE, THROTTLE, WALL, Robot, eventually
@@ -363,7 +363,7 @@ def test_a_reset_that_nobody_is_told_of_says_what_it_waits_for(
     run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Once for each thing, in the log, with the command and the key that help."""
-    monkeypatch.setattr("shapechanger.remote.operator._TOLD_AFTER_S", 0.0)
+    monkeypatch.setattr("shapechanger.envs.remote.operator._TOLD_AFTER_S", 0.0)
     robot = run(arming="person")
     remember(robot.known)
     env = gym.make(ID, robot="tin", pace="lockstep", reset_timeout_s=0.3)

@@ -6,8 +6,15 @@ import sys
 
 import pytest
 
-from shapechanger.teleop.keys import DIRECTIONS, FIRST_HOLD_S, REPEAT_HOLD_S, HeldKeys
-from shapechanger.teleop.terminal import NoTerminal, Terminal, keys_in
+from shapechanger.teleop import (
+    DIRECTIONS,
+    FIRST_HOLD_S,
+    REPEAT_HOLD_S,
+    HeldKeys,
+    NoTerminal,
+    Terminal,
+    keys_in,
+)
 
 
 @pytest.mark.parametrize(("key", "meaning"), DIRECTIONS.items())

@@ -10,8 +10,7 @@ import msgspec
 import pytest
 import torch
 
-from shapechanger.demos.cloning.errors import PolicyError
-from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.executor import Serial

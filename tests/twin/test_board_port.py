@@ -10,14 +10,13 @@ import pytest
 
 from shapechanger.bodies.finger import NOMINAL
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.outputs import Outputs
-from shapechanger.robot.guard.safe_pins import make_safe
+from shapechanger.robot.guard.outputs import OutputBank, make_safe
 from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.hardware import TwinHardware, connect
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.place import Place
+from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import RunningBoard, start_board
+from shapechanger.twin.world.place import Place
 from tests.twin.robots import CAR
 
 _PLAN = load_profile(find_profile("finger")).guard_plan()
@@ -42,7 +41,7 @@ def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
 
 def test_outputs_pull_and_the_sensor_hears(board: RunningBoard, hardware: TwinHardware) -> None:
     """As in a guard: write, let time go by, read."""
-    outputs, sensors = Outputs(_PLAN, hardware), Sensors(_PLAN, hardware)
+    outputs, sensors = OutputBank(_PLAN, hardware), Sensors(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(20):
             outputs.write(_PULL, hardware.clock.now_ns())
@@ -74,7 +73,7 @@ def test_what_makes_pins_safe_leaves_servos_alone(
     board: RunningBoard, hardware: TwinHardware
 ) -> None:
     """A word to them would keep their watchdogs from letting go."""
-    outputs = Outputs(_PLAN, hardware)
+    outputs = OutputBank(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(10):
             outputs.write(_PULL, hardware.clock.now_ns())
@@ -92,7 +91,7 @@ def test_a_bus_at_another_device_is_not_there(hardware: TwinHardware) -> None:
         replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
     )
     with pytest.raises(RobotError, match="There is no /dev/ttyUSB7 at this twin"):
-        Outputs(replace(_PLAN, outputs=outputs), hardware)
+        OutputBank(replace(_PLAN, outputs=outputs), hardware)
 
 
 def test_a_car_has_no_servo_bus(tmp_path: Path) -> None:

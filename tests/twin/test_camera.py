@@ -14,12 +14,12 @@ import pytest
 import simplejpeg
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.barcode import read_barcode
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.cameras.pattern import read_barcode
 from shapechanger.twin.camera import CameraFault, FrontCameraPipe
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import RunningBoard, start_board
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR, until
 
 _CAMERA = CameraPlan("pipe", fps=20.0)

@@ -13,7 +13,7 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.twin.hardware import connect
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import start_board
 from shapechanger.twin.timekeeper import START_NS
 from tests.twin.robots import CAR, granted, process, steady, until

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.guard import start
+from shapechanger.robot.guard.messages import Order, encode
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
-from shapechanger.robot.guard.wire import Order, encode
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.oracle import Command, propelled, time_to_rest, unauthorised
+from shapechanger.twin.oracle import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import CAR, until
 
 _DEADLINE_MS = 250
@@ -49,12 +49,12 @@ def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
             now_ns = operator.advance(0.02)
             daemon.send(encode(Order("arm", session=1, issued_ns=now_ns)))
             now_ns = operator.advance(0.02)
-            commands: list[Command] = []
+            commands: list[ExpectedCommand] = []
             for seq in range(1, 21):
                 values = (-0.5, 0.6)
                 order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=values)
                 daemon.send(encode(order))
-                commands.append(Command(now_ns, 1000))
+                commands.append(ExpectedCommand(now_ns, 1000))
                 now_ns = operator.advance(0.05)
                 while _has_spoken(daemon):
                     pass
@@ -62,7 +62,7 @@ def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
             operator.advance(1.0)
             ledger = read_ledger(board.ledger_path)
             guard.kill()
-        wiring = Wiring(CAR)
+        wiring = TwinWiring(CAR)
         assert driven.travelled_m > 0.3
         assert driven.speed > 0.5
         assert [interval.value for interval in propelled(ledger, wiring)] == [0.6]

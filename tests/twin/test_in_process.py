@@ -13,7 +13,7 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.robots import CAR, SWAPPED_WAYS, changed, write_profile
 
 _PARTS = {"wheels", "steering"}

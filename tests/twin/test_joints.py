@@ -11,12 +11,11 @@ from shapechanger.bodies.finger import JOINTS, NOMINAL
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
-from shapechanger.twin.chips.as5600 import As5600
-from shapechanger.twin.chips.tca9548a import Behind, Tca9548a
-from shapechanger.twin.local import LocalBoard
-from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.chips import Behind, SimulatedAs5600, Tca9548a
+from shapechanger.twin.in_process import LocalBoard
+from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.finger import FingerWorld
+from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.world import World
 
 _TURN = 2.0 * math.pi
@@ -36,7 +35,7 @@ def _sensor(joints: tuple[str, ...] = JOINTS) -> SensorPlan:
 
 
 def _board(world: World, sensor: SensorPlan) -> LocalBoard:
-    return LocalBoard(Wiring(GuardPlan("it", (), (), (sensor,))), world)
+    return LocalBoard(TwinWiring(GuardPlan("it", (), (), (sensor,))), world)
 
 
 def test_what_is_read_is_where_the_joints_are() -> None:
@@ -64,7 +63,7 @@ def test_noise_is_that_of_the_parameters_and_of_the_seed() -> None:
 
 def test_only_open_channels_are_heard() -> None:
     """None at first; with two open, a line is low where either chip pulls it low."""
-    chips = [As5600("knee", lambda: 0.0, counts, 1) for counts in (0x0F3, 0x155)]
+    chips = [SimulatedAs5600("knee", lambda: 0.0, counts, 1) for counts in (0x0F3, 0x155)]
     mux = Tca9548a({0: chips[0], 6: chips[1]})
     behind = Behind(mux)
     with pytest.raises(OSError, match="no chip answers"):
@@ -82,7 +81,7 @@ def test_only_open_channels_are_heard() -> None:
 
 def test_the_two_bytes_of_an_angle_come_again_and_again() -> None:
     """So that whoever stays on them reads newer ones; from the status on it counts on."""
-    chip = As5600("knee", lambda: 0.0, 0x0ABC, 1)
+    chip = SimulatedAs5600("knee", lambda: 0.0, 0x0ABC, 1)
     assert chip.read(0x0C, 4) == chip.read(0x0E, 4) == [0x0A, 0xBC, 0x0A, 0xBC]
     assert chip.read(0x0B, 5) == [0x20, 0x0A, 0xBC, 0x0A, 0xBC]
     assert chip.read(0x50, 2) == [0, 0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.twin.ledger import LedgerWriter, Transition, read_ledger
+from shapechanger.twin.signals import LedgerWriter, Transition, read_ledger
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ import pytest
 from gpiozero import DigitalInputDevice, DigitalOutputDevice, Motor
 
 from shapechanger.errors import RobotError
-from shapechanger.twin.local import LocalBoard
+from shapechanger.twin.in_process import LocalBoard
 from shapechanger.twin.timekeeper import START_NS
-from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.wiring import TwinWiring
+from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR
 
 _MS = 1_000_000
@@ -21,7 +21,7 @@ _MS = 1_000_000
 
 def _board() -> tuple[LocalBoard, DrivingWorld]:
     world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
-    return LocalBoard(Wiring(CAR), world), world
+    return LocalBoard(TwinWiring(CAR), world), world
 
 
 def test_time_moves_only_by_advance() -> None:

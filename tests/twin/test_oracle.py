@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.twin.ledger import Transition
-from shapechanger.twin.oracle import Command, propelled, time_to_rest, unauthorised
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.oracle import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.twin.signals import Transition
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc
 
 _MS = 1_000_000
-_NO_ONE_SHOT = Wiring(CAR, one_shot_ms=None)
+_NO_ONE_SHOT = TwinWiring(CAR, one_shot_ms=None)
 
 
 def _pin(ms: float, pin: int, duty: float) -> Transition:
@@ -25,7 +25,7 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 def test_a_fresh_command_allows_what_it_started() -> None:
     """Driving within the deadline of a command is what robots are for."""
     ledger = [_pin(10, 22, 0.5), _pin(200, 22, 0.0)]
-    assert unauthorised(ledger, _NO_ONE_SHOT, [Command(9 * _MS, 1000)], 250) == []
+    assert unauthorised(ledger, _NO_ONE_SHOT, [ExpectedCommand(9 * _MS, 1000)], 250) == []
 
 
 def test_driving_without_a_command_is_found() -> None:
@@ -38,7 +38,7 @@ def test_driving_without_a_command_is_found() -> None:
 def test_even_one_percent_is_driving() -> None:
     """A stop means 0, not little, also below the duty at which the motor starts to move."""
     plan = replace(CAR, outputs=(replace(DRIVE, settings={**DRIVE.settings, "start": 0.3}), STEER))
-    assert unauthorised([_pin(10, 22, 0.01)], Wiring(plan, None), [], 250)
+    assert unauthorised([_pin(10, 22, 0.01)], TwinWiring(plan, None), [], 250)
 
 
 def test_steering_is_no_driving() -> None:
@@ -82,15 +82,15 @@ def test_the_one_shot_ends_what_a_frozen_pin_drives() -> None:
     toggles = [_pin(ms, 25, float(ms // 10 % 2)) for ms in range(10, 210, 10)]
     gone = [Transition(t=205 * _MS, kind="gone", pid=1), _pin(205, 22, 1.0), _pin(205, 25, 0.0)]
     ledger = sorted([*toggles, _pin(15, 22, 0.5), *gone], key=lambda line: line.t)
-    assert time_to_rest(ledger, Wiring(CAR, 100.0), 205 * _MS) == pytest.approx(0.09, abs=0.006)
+    assert time_to_rest(ledger, TwinWiring(CAR, 100.0), 205 * _MS) == pytest.approx(0.09, abs=0.006)
     assert time_to_rest(ledger, _NO_ONE_SHOT, 205 * _MS) == math.inf
     plain = replace(CAR, enable_pin=None)
-    assert time_to_rest(ledger, Wiring(plan=plain), 205 * _MS) == math.inf
+    assert time_to_rest(ledger, TwinWiring(plan=plain), 205 * _MS) == math.inf
 
 
 def test_without_toggling_the_motors_have_no_power() -> None:
     """A guard that never toggles its enable line cannot drive."""
-    assert propelled([_pin(10, 22, 0.5)], Wiring(CAR, 100.0)) == []
+    assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
 
 
 def test_brakes_and_released_pins_are_rest() -> None:
@@ -105,7 +105,7 @@ def test_brakes_and_released_pins_are_rest() -> None:
 def test_a_speed_controller_rests_near_neutral() -> None:
     """Steps of a PCA9685 beside neutral are rest; no pulses are rest too."""
     drive = esc("drive", "wheels", {"throttle": 1.0}, over="lgpio", pin=12)
-    wiring = Wiring(replace(CAR, outputs=(drive,), enable_pin=None))
+    wiring = TwinWiring(replace(CAR, outputs=(drive,), enable_pin=None))
 
     def pulse(ms: int, us: float) -> Transition:
         return Transition(t=ms * _MS, kind="pulse", pin=12, us=us, hz=50)
@@ -130,7 +130,7 @@ def test_the_oracle_agrees_with_looking_at_each_millisecond(
 ) -> None:
     """At each instant: not at rest, and no command within the deadline, is what is reported."""
     ledger = [_pin(ms, 22, duty) for ms, duty in sorted(duties, key=lambda one: one[0])]
-    wiring = Wiring(replace(CAR, actions=ACTIONS), None)
+    wiring = TwinWiring(replace(CAR, actions=ACTIONS), None)
     found = unauthorised(ledger, wiring, [(ms * _MS, 1000) for ms in arrivals], 250)
     for ms in range(0, 2500, 7):
         now = ms * _MS + 1

@@ -11,13 +11,12 @@ from gpiozero import DigitalOutputDevice
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.output import open_output
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.chips.pca9685 import Pca9685
+from shapechanger.twin.chips import SimulatedPca9685
 from shapechanger.twin.hardware import connect
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.levels import Channel
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.signals import PwmChannel, read_ledger
 from shapechanger.twin.start import start_board
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, esc, process, servo
 
 _ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 3, "output_enable": 24}
@@ -38,14 +37,14 @@ sys.stdin.read()
 """
 
 
-def _awake(chip: Pca9685) -> None:
+def _awake(chip: SimulatedPca9685) -> None:
     chip.write(0xFE, [121])
     chip.write(0x00, [0x21])
 
 
 def test_pulses_are_decoded_from_the_registers() -> None:
     """122 steps of the oscillator a count give 50 Hz, and 307 of 4096 counts 1.5 ms."""
-    chip = Pca9685()
+    chip = SimulatedPca9685()
     assert all(pulse.us == 0.0 for pulse in chip.channels)
     _awake(chip)
     chip.write(0x06, [0, 0, 307 & 0xFF, 307 >> 8])
@@ -56,7 +55,7 @@ def test_pulses_are_decoded_from_the_registers() -> None:
 
 def test_bits_for_full_off_and_full_on() -> None:
     """Bit 4 of the last register is off, whatever the others say; so for all channels at once."""
-    chip = Pca9685()
+    chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFA, [0, 0x10, 0, 0])
     assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.channels)
@@ -66,7 +65,7 @@ def test_bits_for_full_off_and_full_on() -> None:
 
 def test_the_frequency_is_set_while_it_sleeps() -> None:
     """The chip ignores a new frequency while it is awake."""
-    chip = Pca9685()
+    chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFE, [3])
     assert chip.read(0xFE, 1) == [121]
@@ -74,7 +73,7 @@ def test_the_frequency_is_set_while_it_sleeps() -> None:
 
 def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
     """After a sleep the channels wait for RESTART, as the data sheet says."""
-    chip = Pca9685()
+    chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])
     chip.write(0x00, [0x31])
@@ -89,7 +88,7 @@ def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
 
 def test_without_auto_increment_a_block_lands_in_one_register() -> None:
     """A driver that forgets the bit sees its servo not move."""
-    chip = Pca9685()
+    chip = SimulatedPca9685()
     chip.write(0x00, [0x01])
     chip.write(0x06, [0, 0, 51, 1])
     assert chip.read(0x06, 4) == [1, 1, 1, 1]
@@ -112,7 +111,7 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
     with start_board(plan, "real", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         drive, steer = (open_output(output, hardware) for output in plan.outputs)
-        wiring = Wiring(plan)
+        wiring = TwinWiring(plan)
         steer.write(0.2, 0)
         operator.break_chip(1, 0x40)
         with pytest.raises(RobotError, match="Remote I/O"):
@@ -134,8 +133,8 @@ def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:
     ):
         with process(_AWAKE_50_HZ, board.socket_path) as robot:
             robot.send_signal(signal.SIGKILL)
-        wiring, levels = Wiring(_SERVO_CAR), operator.levels()
-        assert levels.channels[Channel(1, 0x40, 3)].us == pytest.approx(1498.16)
+        wiring, levels = TwinWiring(_SERVO_CAR), operator.levels()
+        assert levels.channels[PwmChannel(1, 0x40, 3)].us == pytest.approx(1498.16)
         assert wiring.read(levels, 0)["steer"].value == pytest.approx(0.0, abs=0.01)
         lines = [line for line in read_ledger(board.ledger_path) if line.channel == 3]
         assert [(line.us, line.hz) for line in lines] == [(1498.16, 50.029)]

@@ -10,8 +10,8 @@ from gpiozero import DigitalOutputDevice, Motor, PWMOutputDevice
 
 from shapechanger.errors import RobotError
 from shapechanger.twin.hardware import connect
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
 from tests.twin.robots import CAR, process
 

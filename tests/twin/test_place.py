@@ -10,11 +10,11 @@ import pytest
 
 from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.twin.ledger import NoLedger, read_ledger
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.place import Place, open_world
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.signals import NoLedger, read_ledger
 from shapechanger.twin.start import start_board
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.world.place import Place, open_world
+from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.simulation import MujocoWorld
 from tests.twin.robots import CAR
 
@@ -36,7 +36,7 @@ def test_the_room_does_without_mujoco() -> None:
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
         "from shapechanger.errors import MissingExtra\n"
-        "from shapechanger.twin.place import Place, open_world\n"
+        "from shapechanger.twin.world.place import Place, open_world\n"
         "open_world(Place(), {'wheels'}, None, 1)\n"
         "try:\n"
         "    open_world(Place('corridor', 'car'), {'wheels', 'steering'}, None, 1)\n"

@@ -10,11 +10,11 @@ from gpiozero import DigitalOutputDevice
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.hardware import connect
-from shapechanger.twin.ledger import read_ledger
-from shapechanger.twin.operator import Operator, Whereabouts
-from shapechanger.twin.place import Place
+from shapechanger.twin.robot import Operator, Whereabouts
+from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.twin.world.place import Place
+from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR
 
 _CORRIDOR = Place("corridor", "car")

@@ -14,7 +14,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.hardware import TwinHardware, connect
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import RunningBoard, start_board
 from tests.twin.robots import BUMPER, CAR, ENCODER
 

@@ -11,10 +11,10 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.output import open_output
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.twin.hardware import connect
-from shapechanger.twin.levels import Levels, Pulse
-from shapechanger.twin.operator import Operator
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.signals import Levels, Pulse
 from shapechanger.twin.start import start_board
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
 
 _CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1}
@@ -46,7 +46,7 @@ def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
     """The wiring is the inverse of the driver, to the step of what is between them."""
     output = _OUTPUTS[kind]
     plan = GuardPlan("robot", ACTIONS, (output,))
-    wiring = Wiring(plan)
+    wiring = TwinWiring(plan)
     with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         driver = open_output(output, hardware)
@@ -66,23 +66,23 @@ def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
 
 def test_only_what_throttles_propels() -> None:
     """The mix says so, not the name."""
-    assert Wiring(CAR).propelling == ("drive",)
+    assert TwinWiring(CAR).propelling == ("drive",)
     swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
-    assert Wiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
+    assert TwinWiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
 
 
 def test_wrong_pins_turn_the_wrong_motor() -> None:
     """The wiring is what is there: pins swapped in the served profile steer instead of driving."""
     levels = Levels()
     levels.drive(17, 0.8, 0)
-    read = Wiring(CAR, None).read(levels, 0)
+    read = TwinWiring(CAR, None).read(levels, 0)
     assert (read["drive"].value, read["steer"].value) == (0.0, 0.8)
 
 
 def test_the_one_shot_gives_power_to_motors_only() -> None:
     """100 ms after the last edge the bridge has no power; a servo keeps its pulses."""
     turn = servo("turn", "steering", {"steering": 1.0}, over="lgpio", pin=12)
-    wiring = Wiring(replace(CAR, outputs=(DRIVE, turn)), 100.0)
+    wiring = TwinWiring(replace(CAR, outputs=(DRIVE, turn)), 100.0)
     levels = Levels()
     levels.drive(22, 1.0, 0)
     levels.pulse(12, Pulse(2000, 50))

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.twin.world.driving import RADIUS, DrivingWorld
-from shapechanger.twin.world.vehicle import CAR_SPEED
+from shapechanger.twin.world.vehicle import CAR_SPEED, RADIUS, DrivingWorld
 
 _SIZE = (160, 120)
 _SEEDS = st.integers(0, 10_000)

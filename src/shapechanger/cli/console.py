@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-from rich.console import Console
+import time
+from types import TracebackType
+from typing import Final, Self
 
-__all__ = ["plain_console"]
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+__all__ = ["Interrupted", "StudyProgress", "plain_console"]
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
@@ -15,3 +27,84 @@ def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
         width: Columns; None for those of the terminal.
     """
     return Console(stderr=stderr, width=width, markup=False, emoji=False, highlight=False)
+
+
+_LINE_EVERY_S: Final = 10.0
+_ENOUGH_TO_TELL: Final = 0.05
+
+
+class StudyProgress:
+    """Shows how far a number of runs are, by their steps.
+
+    Args:
+        steps: For each run's name the steps that it takes, at least 1.
+        console: Where to show it; None for the standard error.
+    """
+
+    def __init__(self, steps: dict[str, int], console: Console | None = None) -> None:
+        self._steps = steps
+        self._done = dict.fromkeys(steps, 0)
+        self._ended: set[str] = set()
+        self._console = console or plain_console(stderr=True)
+        self._began = time.monotonic()
+        self._last_line = self._began
+        self._bar: Progress | None = None
+        if self._console.is_terminal:
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("{task.percentage:>3.0f} %"),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                TextColumn("left:"),
+                TimeRemainingColumn(),
+                console=self._console,
+            )
+            self._task = self._bar.add_task("env steps", total=sum(steps.values()))
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the terminal as it was."""
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, run: str, steps: int, ended: bool) -> None:
+        """Take in that `run` has done `steps` steps."""
+        self._done[run] = self._steps[run] if ended else min(steps, self._steps[run])
+        if ended:
+            self._ended.add(run)
+        if self._bar is not None:
+            named = f"{len(self._ended)}/{len(self._steps)} runs"
+            self._bar.update(self._task, completed=sum(self._done.values()), description=named)
+            return
+        now = time.monotonic()
+        if ended or now - self._last_line >= _LINE_EVERY_S:
+            self._last_line = now
+            self._console.print(self._line(run, ended, now - self._began), soft_wrap=True)
+
+    def _line(self, run: str, ended: bool, elapsed: float) -> str:
+        """How far it all is, and how long it takes yet."""
+        done, total = sum(self._done.values()), sum(self._steps.values())
+        state = "ended" if ended else "at work"
+        line = (
+            f"{run} {state}; {len(self._ended)} of {len(self._steps)} runs, "
+            f"{100 * done // total} % of the steps"
+        )
+        # The first steps wait for everything to be loaded, and say nothing of the rest.
+        if done < _ENOUGH_TO_TELL * total:
+            return line
+        return f"{line}, about {elapsed * (total - done) / done:.0f} s left"
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user stopped long work; the message says how to go on with it."""

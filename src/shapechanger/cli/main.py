@@ -26,12 +26,12 @@ try:
     except ImportError:  # pragma: no cover  # Seen by a process of its own in the tests.
         sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
 
+    from shapechanger.cli.console import Interrupted
     from shapechanger.cli.demos import Demos
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
     from shapechanger.cli.play import Play
     from shapechanger.cli.robot import Robot
-    from shapechanger.cli.stopping import Interrupted
     from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
     from shapechanger.cli.transfer import Transfer

@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
 from shapechanger.cli.env_arguments import driven, env_ref, require_seed
-from shapechanger.cli.progress import StudyProgress
-from shapechanger.cli.stopping import Interrupted
 from shapechanger.cli.transfer import run_steps, write_study_report
 
 if TYPE_CHECKING:

@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
 from shapechanger.cli.env_arguments import default_learner, driven, env_ref, opened, require_seed
-from shapechanger.cli.progress import StudyProgress
-from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import MissingExtra, OutputError
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import msgspec
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
 from shapechanger.cli.env_arguments import (
     default_learner,
     driven,
@@ -23,8 +23,6 @@ from shapechanger.cli.env_arguments import (
     options_of,
     require_seed,
 )
-from shapechanger.cli.progress import StudyProgress
-from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
 

@@ -238,7 +238,7 @@ def register_all() -> None:
     if REMOTE_VEHICLE not in gym.registry:
         gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
             REMOTE_VEHICLE,
-            "shapechanger.remote.vehicle:RemoteVehicleEnv",
+            "shapechanger.envs.remote.vehicle:RemoteVehicleEnv",
             nondeterministic=True,  # A seed cannot tell a real robot where to stand.
         )
 

@@ -128,7 +128,7 @@ class Hello(_Message, frozen=True):
 
     Attributes:
         version: Version of the messages that the client speaks.
-        proof: Answer to the challenge, see `shapechanger.link.proof`.
+        proof: Answer to the challenge, see `shapechanger.link.authentication`.
         name: Who it is, for people to read.
         role: Who drives.
         pace: Who keeps the time.

@@ -26,12 +26,11 @@ from typing import Any, Final, Self
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.link import messages
 from shapechanger.link.address import parse_address
+from shapechanger.link.authentication import parse_key
 from shapechanger.link.messages import ClientMessage, Event, RobotMessage, Welcome
-from shapechanger.link.proof import parse_key
-from shapechanger.remote.connection import Access, Connection, connection
+from shapechanger.remote.connection import Access, RobotConnection, open_connection
 from shapechanger.remote.inbox import Inbox, Received
-from shapechanger.remote.known import KnownRobot
-from shapechanger.remote.trust import parse_trust, untrusted
+from shapechanger.remote.known_robots import KnownRobot, parse_trust, untrusted
 
 __all__ = ["RobotClient"]
 
@@ -102,7 +101,7 @@ class RobotClient:
         self._ready: Future[Welcome] = Future()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop = asyncio.Event()
-        self._connection: Connection | None = None
+        self._connection: RobotConnection | None = None
         self._thread = threading.Thread(
             target=self._keep, name=f"robot {access.address}", daemon=True
         )
@@ -133,7 +132,7 @@ class RobotClient:
         """Connect to a robot.
 
         Args:
-            robot: One that is remembered, see `shapechanger.remote.known.recall`; or an address,
+            robot: One that is remembered, see `shapechanger.remote.known_robots.recall`; or an address,
                 as HOST or HOST:PORT.
             key: The robot's key, for an address.
             fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
@@ -543,7 +542,7 @@ class RobotClient:
 
     async def _live(self) -> None:
         self._loop = asyncio.get_running_loop()
-        async with connection(self._access) as made:
+        async with open_connection(self._access) as made:
             self._connection = made
             self._ready.set_result(made.welcome)
             await made.run(self._handle, self._stop)

@@ -13,16 +13,15 @@ from typing import Any, Final
 from shapechanger.errors import LinkError, MissingExtra, RobotRefused
 from shapechanger.link import messages
 from shapechanger.link.address import Address
-from shapechanger.link.fingerprint import fingerprint_hex
+from shapechanger.link.authentication import fingerprint_hex, make_proof
 from shapechanger.link.messages import Challenge, ClientMessage, Hello, Ping, RobotMessage, Welcome
-from shapechanger.link.proof import make_proof
 
 try:
     import aiohttp
 except ImportError as error:
     raise MissingExtra("aiohttp", "remote") from error
 
-__all__ = ["PATH", "Access", "Connection", "connection"]
+__all__ = ["PATH", "Access", "RobotConnection", "open_connection"]
 
 PATH: Final = "/link"
 """Where on the robot's server the WebSocket is."""
@@ -65,8 +64,8 @@ class Access:
     timeout_s: float
 
 
-class Connection:
-    """A robot that has said welcome; made by `connection`.
+class RobotConnection:
+    """A robot that has said welcome; made by `open_connection`.
 
     Attributes:
         welcome: What the robot is.
@@ -155,7 +154,7 @@ class Connection:
 
 
 @asynccontextmanager
-async def connection(access: Access) -> AsyncGenerator[Connection]:
+async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
     """Connect, prove that we hold the key, and be welcomed.
 
     Raises:
@@ -183,7 +182,7 @@ async def connection(access: Access) -> AsyncGenerator[Connection]:
             )
             welcome = await _welcomed(line, access)
             limit.reschedule(None)
-            yield Connection(line, welcome, access)
+            yield RobotConnection(line, welcome, access)
     # What went wrong below is in our words: a program sees one error, and no chain of them.
     except TimeoutError:
         raise LinkError(

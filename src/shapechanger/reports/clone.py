@@ -221,7 +221,7 @@ def _worst(policy: CameraPolicy, data: Dataset, judgement: Judgement) -> Html:
 
 
 def _did(policy: CameraPolicy, data: Dataset, step: int) -> str:
-    from shapechanger.demos.cloning.goal import named
+    from shapechanger.demos.cloning.judge import named
 
     if policy.card.classes:
         return named(data.actions[step], data.action_layout)

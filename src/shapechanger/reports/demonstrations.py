@@ -12,12 +12,11 @@ from typing import Final
 import numpy as np
 import simplejpeg
 
-from shapechanger.cli.demos.listing import shares, told_length
+from shapechanger.cli.demos.show import shares, told_length
 from shapechanger.demos.dataset import decode_picture
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
 from shapechanger.demos.overlay import COLOURS
-from shapechanger.demos.statistics import EpisodeSummary, Spread, spread, summary
-from shapechanger.demos.statistics.episodes import gaps_s
+from shapechanger.demos.statistics import Distribution, EpisodeStatistics, gaps_s, spread, summary
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from shapechanger.reports.page import (
@@ -60,7 +59,7 @@ def colour_of(driver: Driver) -> str:
     return "#{:02x}{:02x}{:02x}".format(*COLOURS[driver])
 
 
-def histogram(name: str, unit: str, found: Spread) -> Html:
+def histogram(name: str, unit: str, found: Distribution) -> Html:
     """How some numbers are spread: a bar for each bin, the ends of the range below."""
     most = max(found.counts)
     step = _WIDE / len(found.counts)
@@ -197,7 +196,7 @@ def _label(words: str, x: float, anchor: str) -> Html:
     )  # fmt: skip
 
 
-def _bin(found: Spread, place: int, count: int, unit: str) -> str:
+def _bin(found: Distribution, place: int, count: int, unit: str) -> str:
     width = (found.high - found.low) / len(found.counts)
     low = found.low + place * width
     share = 100.0 * count / found.total
@@ -290,7 +289,7 @@ _MS: Final = 1e3
 _MOST_ACTIONS: Final = 12
 
 
-def distributions(episodes: Sequence[Episode]) -> list[tuple[str, str, Spread]]:
+def distributions(episodes: Sequence[Episode]) -> list[tuple[str, str, Distribution]]:
     """Name, unit and spread of the actions, of what was sensed, and of the time between steps.
 
     Numbers of the same name and unit are taken together, whatever episode they are of.
@@ -369,7 +368,7 @@ def _section(name: str, heading: str, content: Html) -> Html:
     return element("section", element("h2", text(heading)), content, id=name)
 
 
-def _cards(told: Sequence[EpisodeSummary]) -> Html:
+def _cards(told: Sequence[EpisodeStatistics]) -> Html:
     kept, steps = sum(one.kept for one in told), sum(one.steps for one in told)
     rewards = [one.reward for one in told if one.reward is not None]
     cards = [
@@ -396,7 +395,7 @@ def _cards(told: Sequence[EpisodeSummary]) -> Html:
     )
 
 
-def _drivers(told: Sequence[EpisodeSummary]) -> Html:
+def _drivers(told: Sequence[EpisodeStatistics]) -> Html:
     counts = {driver: sum(one.drivers.get(driver, 0) for one in told) for driver in DRIVERS}
     total = sum(counts.values())
     if not total:
@@ -436,7 +435,7 @@ def _histograms(episodes: Sequence[Episode]) -> Html:
     return joined((element("div", *drawn, class_="charts"), paragraph(note, class_="note")))
 
 
-def _table(told: Sequence[EpisodeSummary]) -> Html:
+def _table(told: Sequence[EpisodeStatistics]) -> Html:
     header = ("Episode", "Of", "Steps", "Length", "Drivers", "Marks", "Reward", "Outcome")
     rows = [
         (
@@ -455,7 +454,7 @@ def _table(told: Sequence[EpisodeSummary]) -> Html:
     return table(many, header, rows)
 
 
-def _episode(episode: Episode, one: EpisodeSummary, most: int, *, is_open: bool) -> Html:
+def _episode(episode: Episode, one: EpisodeStatistics, most: int, *, is_open: bool) -> Html:
     header = episode.header
     if not episode.steps:
         content: tuple[Html, ...] = (paragraph("It has no steps.", class_="note"),)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from shapechanger.errors import RobotError
 
 if TYPE_CHECKING:  # They need the SDK, and only a rig has it.
-    from shapechanger.robot.drivers.dynamixel.port import Port
+    from shapechanger.robot.drivers.dynamixel.protocol import Port
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
 __all__ = [
@@ -199,13 +199,13 @@ class RealHardware:
 
     def servo_pins(self) -> ServoPins:
         """Pulses over lgpio."""
-        from shapechanger.robot.drivers.lgpio_servo import LgpioServoPins
+        from shapechanger.robot.drivers.lgpio_pins import LgpioServoPins
 
         return LgpioServoPins()
 
     def servo_port(self, settings: BusSettings) -> Port:
         """A serial port over `dynamixel_sdk`."""
-        from shapechanger.robot.drivers.dynamixel.port import open_serial_port
+        from shapechanger.robot.drivers.dynamixel.protocol import open_serial_port
 
         return open_serial_port(settings)
 

@@ -11,7 +11,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 import simplejpeg
 
-from shapechanger.robot.cameras.barcode import draw_barcode
+from shapechanger.robot.cameras.pattern import draw_barcode
 from shapechanger.worlds.world import World
 
 __all__ = ["CAMERA_FAULTS", "CameraFault", "FrontCameraPipe", "with_capture_time"]

@@ -8,8 +8,8 @@ import time
 from collections.abc import Sequence
 
 from shapechanger.errors import RobotError
-from shapechanger.twin import wire
-from shapechanger.twin.link import Link
+from shapechanger.twin import messages as wire
+from shapechanger.twin.board_client import Link
 
 __all__ = ["GrantedClock", "SteadyClock"]
 

@@ -9,14 +9,13 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from shapechanger.twin.ledger import Transition
-from shapechanger.twin.levels import Levels
-from shapechanger.twin.wiring import WiredOutput, Wiring
+from shapechanger.twin.signals import Levels, Transition
+from shapechanger.twin.wiring import TwinWiring, WiredOutput
 
-__all__ = ["Command", "Interval", "propelled", "time_to_rest", "unauthorised"]
+__all__ = ["ExpectedCommand", "Interval", "propelled", "time_to_rest", "unauthorised"]
 
 
-class Command(NamedTuple):
+class ExpectedCommand(NamedTuple):
     """A command that the robot had reason to obey.
 
     Attributes:
@@ -44,7 +43,7 @@ class Interval(NamedTuple):
     value: float
 
 
-def propelled(ledger: Iterable[Transition], wiring: Wiring) -> list[Interval]:
+def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
     """When each output that propels was not at rest.
 
     A pin between the edges of its PWM counts by its duty. The last levels last for ever, except
@@ -70,8 +69,8 @@ def propelled(ledger: Iterable[Transition], wiring: Wiring) -> list[Interval]:
 
 def unauthorised(
     ledger: Iterable[Transition],
-    wiring: Wiring,
-    commands: Iterable[Command | tuple[int, float]],
+    wiring: TwinWiring,
+    commands: Iterable[ExpectedCommand | tuple[int, float]],
     deadline_ms: float,
     slack_ms: float = 0.0,
 ) -> list[Interval]:
@@ -104,7 +103,7 @@ def unauthorised(
     return found
 
 
-def time_to_rest(ledger: Iterable[Transition], wiring: Wiring, fault_ns: int) -> float:
+def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int) -> float:
     """Seconds from a fault until all outputs that propel are at rest for good.
 
     Returns:
@@ -115,7 +114,7 @@ def time_to_rest(ledger: Iterable[Transition], wiring: Wiring, fault_ns: int) ->
 
 
 def _moments(
-    ledger: Iterable[Transition], wiring: Wiring
+    ledger: Iterable[Transition], wiring: TwinWiring
 ) -> Iterator[tuple[int, dict[str, WiredOutput]]]:
     """What the outputs do after each transition, and when the one-shot ends."""
     levels = Levels()

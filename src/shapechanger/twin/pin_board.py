@@ -6,24 +6,66 @@ import errno
 import random
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Final, Literal, Protocol, runtime_checkable
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.settings import whole
-from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.chips.as5600 import As5600
-from shapechanger.twin.chips.chip import Chip
-from shapechanger.twin.chips.ina219 import Ina219
-from shapechanger.twin.chips.mpu6050 import Mpu6050
-from shapechanger.twin.chips.pca9685 import Pca9685
-from shapechanger.twin.chips.tca9548a import Tca9548a
-from shapechanger.twin.joints import joint_chips
-from shapechanger.twin.ledger import Ledger
-from shapechanger.twin.levels import Channel, Levels, Pulse
-from shapechanger.twin.wiring import Wiring
+from shapechanger.robot.drivers.settings import texts, whole, wholes
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.twin.chips import (
+    Behind,
+    Chip,
+    SimulatedAs5600,
+    SimulatedIna219,
+    SimulatedMpu6050,
+    SimulatedPca9685,
+    Tca9548a,
+)
+from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
+from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
-__all__ = ["Owner", "PinBoard", "chips_of"]
+__all__ = ["JointWorld", "Owner", "PinBoard", "chips_of", "joint_chips"]
+
+_AS5600: Final = 0x36
+
+
+@runtime_checkable
+class JointWorld(Protocol):
+    """A world with joints that somebody measures."""
+
+    def measured_angle(self, joint: str) -> float:
+        """One reading of the angle of a joint, rad, with the noise of its sensor.
+
+        Raises:
+            RobotError: If there is no such joint.
+        """
+        ...
+
+
+def joint_chips(plan: SensorPlan, world: World) -> dict[tuple[int, int], Chip]:
+    """The multiplexer and what is behind it, by bus and address.
+
+    Args:
+        plan: The encoders of some joints.
+        world: What they measure; where it has no joints they stand at their zero.
+
+    Raises:
+        RobotError: If the world has other joints.
+    """
+    measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
+    columns = (wholes(plan.settings, key) for key in ("channels", "zeros", "directions"))
+    behind: dict[int, Chip] = {}
+    for joint, *row in zip(texts(plan.settings, "joints"), *columns, strict=True):
+        measured(joint)  # Says in words what it does not know.
+        channel, zero, direction = row
+        behind[channel] = SimulatedAs5600(joint, partial(measured, joint), zero, direction)
+    bus, mux = whole(plan.settings, "bus"), Tca9548a(behind)
+    return {(bus, whole(plan.settings, "mux")): mux, (bus, _AS5600): Behind(mux)}
+
+
+def _at_zero(joint: str) -> float:
+    return 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +109,7 @@ class PinBoard:
 
     def __init__(
         self,
-        wiring: Wiring,
+        wiring: TwinWiring,
         chips: Mapping[tuple[int, int], Chip],
         ledger: Ledger,
         seed: int,
@@ -81,7 +123,7 @@ class PinBoard:
         self.on_output: Callable[[int, int, float], None] | None = None
         self.dead_chips: set[tuple[int, int]] = set()
         for address, chip in self._chips.items():
-            if isinstance(chip, Pca9685):
+            if isinstance(chip, SimulatedPca9685):
                 self._take_channels(address, chip)
 
     def owner(self, pin: int) -> Owner | None:
@@ -195,7 +237,7 @@ class PinBoard:
         self._ledger.write(
             t, "i2c", bus=bus, address=address, register=register, data=data, pid=pid
         )
-        if isinstance(chip, Pca9685):
+        if isinstance(chip, SimulatedPca9685):
             for channel, pulse in self._take_channels((bus, address), chip):
                 self._ledger.write(
                     t,
@@ -208,7 +250,7 @@ class PinBoard:
                     pid=pid,
                 )
 
-    def encoder(self, joint: str) -> As5600:
+    def encoder(self, joint: str) -> SimulatedAs5600:
         """The encoder of a joint.
 
         Raises:
@@ -216,16 +258,18 @@ class PinBoard:
         """
         muxes = [chip for chip in self._chips.values() if isinstance(chip, Tca9548a)]
         behind = [chip for mux in muxes for chip in mux.channels.values()]
-        encoders = {chip.joint: chip for chip in behind if isinstance(chip, As5600)}
+        encoders = {chip.joint: chip for chip in behind if isinstance(chip, SimulatedAs5600)}
         if joint not in encoders:
             raise UnknownName("joint with an encoder", joint, encoders)
         return encoders[joint]
 
-    def _take_channels(self, at: tuple[int, int], chip: Pca9685) -> list[tuple[int, Pulse]]:
+    def _take_channels(
+        self, at: tuple[int, int], chip: SimulatedPca9685
+    ) -> list[tuple[int, Pulse]]:
         """Follow a chip's channels; those that changed."""
         changed: list[tuple[int, Pulse]] = []
         for number, pulse in enumerate(chip.channels):
-            channel = Channel(*at, number)
+            channel = PwmChannel(*at, number)
             before = self.levels.channels.get(channel, Pulse(0.0, 0.0))
             if pulse.us != before.us or (pulse.us and pulse.hz != before.hz):
                 changed.append((number, pulse))
@@ -270,11 +314,15 @@ def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
     for output in plan.outputs:
         if output.settings.get("over") == "pca9685":
             at = whole(output.settings, "bus"), whole(output.settings, "address")
-            chips.setdefault(at, Pca9685())
+            chips.setdefault(at, SimulatedPca9685())
     for sensor in plan.sensors:
         if sensor.driver in ("mpu6050", "ina219"):
             at = whole(sensor.settings, "bus"), whole(sensor.settings, "address")
-            chips[at] = Mpu6050(readings) if sensor.driver == "mpu6050" else Ina219(readings)
+            chips[at] = (
+                SimulatedMpu6050(readings)
+                if sensor.driver == "mpu6050"
+                else SimulatedIna219(readings)
+            )
         elif sensor.driver == "as5600":
             chips |= joint_chips(sensor, world)
     return chips

@@ -9,10 +9,9 @@ from typing import Final, Literal, Protocol, get_args, runtime_checkable
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.servos.line import Line
-from shapechanger.twin.servos.load import EndStops, Load
-from shapechanger.twin.servos.motor import Tendon
-from shapechanger.twin.servos.servo import Servo, ServoPlan
+from shapechanger.twin.servos.bus import SimulatedBus
+from shapechanger.twin.servos.motor import EndStops, Load, Tendon
+from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
 __all__ = ["Rig", "ServoFault", "TendonWorld", "rig_of"]
@@ -82,7 +81,7 @@ class Rig:
         load: Load = EndStops(len(plans))
         if self._world is not None:
             load = self._world.connect(self._names, self)
-        self.line = Line(plans, load, whole(settings[0], "baud"))
+        self.line = SimulatedBus(plans, load, whole(settings[0], "baud"))
         self._servos = dict(zip(self._names, self.line.servos.values(), strict=True))
         self.settle()
 
@@ -95,7 +94,7 @@ class Rig:
         if device != self._device:
             raise RobotError(f"There is no {device} at this twin, only {self._device}.")
 
-    def servo(self, tendon: str) -> Servo:
+    def servo(self, tendon: str) -> SimulatedServo:
         """The servo of a tendon.
 
         Raises:

@@ -7,10 +7,13 @@ import math
 from typing import Final, NamedTuple, Protocol
 
 from shapechanger.robot.drivers.settings import number, text, whole, wholes
-from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
+from shapechanger.twin.rig import rig_of
+from shapechanger.twin.signals import Levels
+from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import Readings, World
 
-__all__ = ["Edge", "PinSensors"]
+__all__ = ["Edge", "PinSensors", "SpeedController", "Surroundings"]
 
 # HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
 # as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
@@ -188,3 +191,110 @@ class PinSensors:
         """Let distance sensors say this instead of the truth, or nothing at all."""
         for sensor in self._distances:
             sensor.said, sensor.dead = distance_m, dead
+
+
+# It is content with a little less than what a driver waits.
+_ARM_SHARE: Final = 0.8
+
+
+class SpeedController:
+    """What a controller makes of the value of its pulses.
+
+    With `reverse` "double" the first pulses backward after going forward brake; only those that
+    follow another neutral go backward.
+
+    Args:
+        plan: The output.
+    """
+
+    def __init__(self, plan: OutputPlan) -> None:
+        self._reverse = text(plan.settings, "reverse")
+        self._arm_ns = number(plan.settings, "arm_s") * 1e9 * _ARM_SHARE
+        self._neutral_since_ns: int | None = None
+        self._armed = False
+        self._braked = False
+        self._reverses = False
+
+    def obey(self, value: float, pulses: bool, now_ns: int) -> float:
+        """What the motor gets.
+
+        Args:
+            value: What the pulses say, -1 to 1.
+            pulses: Whether there are any; without, it stops and wants to see neutral again.
+            now_ns: The time.
+        """
+        if not pulses:
+            self._neutral_since_ns = None
+            self._armed = self._braked = self._reverses = False
+            return 0.0
+        if value == 0.0:
+            if self._neutral_since_ns is None:
+                self._neutral_since_ns = now_ns
+            self._armed = self._armed or now_ns - self._neutral_since_ns >= self._arm_ns
+            self._reverses = self._reverses or self._braked
+            return 0.0
+        self._neutral_since_ns = None
+        if not self._armed:
+            return 0.0
+        if value > 0.0:
+            self._braked = self._reverses = False
+            return value
+        if self._reverse == "direct" or (self._reverse == "double" and self._reverses):
+            return value
+        self._braked = True
+        return 0.0
+
+
+# A board that a busy machine kept waiting for longer does not count that time for its servos: they
+# would take its silence for the guard's, and their watchdogs would let go.
+_MOST_STILL_NS: Final = 40_000_000
+
+
+class Surroundings:
+    """The world behind the board's pins.
+
+    Args:
+        wiring: What is attached.
+        world: Where the vehicle is.
+        now_ns: The time.
+
+    Attributes:
+        sensors: What is on the input pins.
+        rig: The servos on a bus; None without any.
+        now_ns: How far the world has gone.
+    """
+
+    def __init__(self, wiring: TwinWiring, world: World, now_ns: int) -> None:
+        self._wiring = wiring
+        self._world = world
+        self.sensors = PinSensors(wiring.plan, world)
+        self.rig = rig_of(wiring.plan, world)
+        self.now_ns = now_ns
+        self._controllers = {
+            name: SpeedController(plan)
+            for name, plan in wiring.outputs.items()
+            if plan.driver == "esc"
+        }
+
+    def advance(self, now_ns: int, levels: Levels) -> list[Edge]:
+        """Let the world go on until now; the edges of inputs on the way."""
+        start_ns = self.now_ns
+        if now_ns > start_ns:
+            if self.rig is not None:
+                self.rig.line.advance(min(now_ns - start_ns, _MOST_STILL_NS))
+            self._world.advance((now_ns - start_ns) / 1e9, self.parts(levels))
+            self.now_ns = now_ns
+        return self.sensors.advance(start_ns, self.now_ns, self._world.inputs())
+
+    def parts(self, levels: Levels) -> dict[str, float | None]:
+        """What each part of the vehicle gets; the mean where several outputs move one part."""
+        values: dict[str, list[float]] = {}
+        for name, (value, _) in self._wiring.read(levels, self.now_ns).items():
+            part = self._wiring.outputs[name].part
+            shares = values.setdefault(part, [])
+            if name in self._controllers:
+                pulses = self._wiring.has_pulses(name, levels, self.now_ns)
+                value = self._controllers[name].obey(value or 0.0, pulses, self.now_ns)
+            if value is not None:
+                shares.append(value)
+        return {part: sum(got) / len(got) if got else None for part, got in values.items()}

@@ -14,9 +14,9 @@ from typing import Final, Literal
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.link import Link
-from shapechanger.twin.place import Place
-from shapechanger.twin.wiring import ONE_SHOT_MS, Wiring
+from shapechanger.twin.board_client import Link
+from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
+from shapechanger.twin.world.place import Place
 
 __all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
 
@@ -136,7 +136,7 @@ def start_board(
     Raises:
         RobotError: If it does not start, or the folder is not as it must be.
     """
-    Wiring(wiring, one_shot_ms)  # Says in words what it does not know.
+    TwinWiring(wiring, one_shot_ms)  # Says in words what it does not know.
     folder = Path(folder).absolute()
     socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
     if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:

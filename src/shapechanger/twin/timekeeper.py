@@ -8,8 +8,7 @@ from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
 from shapechanger.twin.camera import FrontCameraPipe
-from shapechanger.twin.connection import Connection
-from shapechanger.twin.switchboard import Switchboard
+from shapechanger.twin.server import BoardConnection, Switchboard
 
 __all__ = ["START_NS", "MachineTime", "TwinTime"]
 
@@ -34,7 +33,7 @@ class _Sleeper(NamedTuple):
 
     until_ns: int
     number: int
-    connection: Connection
+    connection: BoardConnection
     question: int
 
 
@@ -48,11 +47,11 @@ class MachineTime:
         """The time."""
         return time.monotonic_ns()
 
-    def sleep(self, connection: Connection, question: int, ns: int) -> None:
+    def sleep(self, connection: BoardConnection, question: int, ns: int) -> None:
         """Nobody can ask for time here."""
         raise RobotError("This board runs in real time, which goes by itself.")
 
-    def wait(self, connection: Connection, until_ns: int) -> None:
+    def wait(self, connection: BoardConnection, until_ns: int) -> None:
         """Nobody is granted time here."""
         raise RobotError("This board runs in real time, which nobody is granted.")
 
@@ -95,12 +94,12 @@ class TwinTime:
         """The time."""
         return self._now_ns
 
-    def sleep(self, connection: Connection, question: int, ns: int) -> None:
+    def sleep(self, connection: BoardConnection, question: int, ns: int) -> None:
         """Somebody asks for time."""
         self._asked += 1
         self._sleepers.append(_Sleeper(self._now_ns + ns, self._asked, connection, question))
 
-    def wait(self, connection: Connection, until_ns: int) -> None:
+    def wait(self, connection: BoardConnection, until_ns: int) -> None:
         """Somebody takes part, and is done with what was granted."""
         connection.takes_part = True
         connection.works = False

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.duty import Duty
+from shapechanger.robot.drivers.gpio import Duty
 from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
-from shapechanger.twin.levels import Channel, Levels, Pulse
+from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 
-__all__ = ["ESC_DEAD_BAND_US", "ONE_SHOT_MS", "WiredOutput", "Wiring"]
+__all__ = ["ESC_DEAD_BAND_US", "ONE_SHOT_MS", "TwinWiring", "WiredOutput"]
 
 ONE_SHOT_MS: Final = 100.0
 """How long the one-shot of the enable line holds the motors' power after an edge."""
@@ -50,7 +50,7 @@ class _Output:
     propels: bool
 
 
-class Wiring:
+class TwinWiring:
     """What is attached.
 
     Args:
@@ -180,7 +180,9 @@ class Wiring:
                 enable = _output_enable(output.plan)
                 if enable >= 0 and self._duty(levels, enable) > 0.0:
                     return 0.0
-                channel = Channel(*(whole(settings, key) for key in ("bus", "address", "channel")))
+                channel = PwmChannel(
+                    *(whole(settings, key) for key in ("bus", "address", "channel"))
+                )
                 return levels.channels.get(channel, Pulse(0.0, 0.0)).us
             case over:
                 raise RobotError(

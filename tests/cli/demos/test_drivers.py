@@ -9,12 +9,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.cli.demos.drivers import pilot_of
-from shapechanger.demos.cloning.card import Card
-from shapechanger.demos.cloning.errors import PolicyError
-from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.cli.demos.record import pilot_of
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.pilots import CorrectedPilot
+from shapechanger.demos.drivers import CorrectedPilot
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 from tests.demos.corridor_env import CorridorEnv, Shows
@@ -23,7 +22,7 @@ from tests.demos.corridor_env import CorridorEnv, Shows
 def clone(path: Path, **changes: Any) -> str:
     """A policy that has learned nothing, for the state of the corridor."""
     env = CorridorEnv("state")
-    card = Card(
+    card = CloneCard(
         framing=Framing(),
         channels=(4,),
         features=8,

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.cli.demos.evaluate import Evaluate
-from shapechanger.cli.demos.train import Train
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.cli.demos.train import Evaluate, Train
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import DemosError, OutputError

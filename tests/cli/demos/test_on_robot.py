@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.remote.known import KnownRobot, remember
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.remote.known_robots import KnownRobot, remember
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shapechanger.cli.robot.checks import Check, check_robot
-from shapechanger.twin.running import run_robot
+from shapechanger.cli.robot.selftest import Check, check_robot
+from shapechanger.twin.robot import run_robot
 from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
 
 

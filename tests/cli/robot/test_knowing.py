@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.knowing import can_be_known, make_known
-from shapechanger.link.proof import new_key
-from shapechanger.remote.known import KnownRobot, known_folder, recall, remember
+from shapechanger.cli.robot.serve import can_be_known, make_known
+from shapechanger.link.authentication import new_key
+from shapechanger.remote.known_robots import KnownRobot, known_folder, recall, remember
 
 _MINE = KnownRobot("rover", "127.0.0.1", new_key(), "ab" * 32)
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot import opening
-from shapechanger.cli.robot.opening import can_open, open_console
+from shapechanger.cli.robot import key as opening
+from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError
-from shapechanger.link.proof import new_key
-from shapechanger.remote.known import KnownRobot, remember
-from shapechanger.twin.running import run_robot
+from shapechanger.link.authentication import new_key
+from shapechanger.remote.known_robots import KnownRobot, remember
+from shapechanger.twin.robot import run_robot
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
 # Stands in for a browser: keeps what it was given, and who may read it.

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
-from shapechanger.cli.robot import serving
-from shapechanger.cli.robot.serving import TwinOptions, finger_of, place_of, start_twin
+from shapechanger.cli.robot import serve as serving
+from shapechanger.cli.robot.serve import TwinOptions, finger_of, place_of, start_twin
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.place import Place
+from shapechanger.twin.robot import Operator
+from shapechanger.twin.world.place import Place
 from tests.robots import CAR, changed, write_profile
 
 

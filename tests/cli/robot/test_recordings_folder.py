@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.serving import recordings_folder
+from shapechanger.cli.robot.serve import recordings_folder
 from shapechanger.errors import RobotError
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.fetching import fetch_episode
+from shapechanger.cli.robot.fetch import fetch_episode
 from shapechanger.demos.episodes import (
     EpisodeHeader,
     EpisodeWriter,
@@ -20,7 +20,7 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.errors import DemosError
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot, remember
+from shapechanger.remote.known_robots import KnownRobot, remember
 from tests.remote.test_real_daemon import Served
 from tests.robot.daemon.plans import ACTIONS, picture
 
@@ -41,7 +41,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture
 def robot(there: Path) -> Iterator[RobotClient]:
     """A connection to it."""
-    from shapechanger.remote.known import recall
+    from shapechanger.remote.known_robots import recall
 
     with RobotClient.connect(recall("car"), frames=False) as client:
         yield client
@@ -179,7 +179,7 @@ def test_what_is_being_recorded_comes_later(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It says so."""
-    from shapechanger.remote.known import recall
+    from shapechanger.remote.known_robots import recall
 
     with RobotClient.connect(recall("car"), role="person") as person:
         began = person.record()

@@ -20,7 +20,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.link.address import Address
-from shapechanger.remote.discover import FoundRobot
+from shapechanger.remote.discovery import FoundRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 from tests.twin.robots import until
@@ -349,7 +349,7 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 ) -> None:
     """The others are found all the same."""
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
-    monkeypatch.setattr("shapechanger.remote.discover.find", lambda _: [found])
+    monkeypatch.setattr("shapechanger.remote.discovery.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     assert run("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)[0] == 0
     broken = home / "config" / "shapechanger" / "known" / "broken.toml"

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.recorded import recorded
+from shapechanger.cli.robot.fetch import recorded
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.link.messages import Observation
-from shapechanger.remote.known import KnownRobot, remember
-from shapechanger.twin.running import run_robot
+from shapechanger.remote.known_robots import KnownRobot, remember
+from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.remote.known import KnownRobot, remember
-from shapechanger.remote.vehicle import RemoteVehicleEnv
-from shapechanger.twin.running import run_robot
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+from shapechanger.remote.known_robots import KnownRobot, remember
+from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile

@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from shapechanger.demos.cloning.augment import augmented, plain
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.mirror import STEERING
+from shapechanger.demos.cloning.batches import augmented, plain
+from shapechanger.demos.cloning.demonstrations import STEERING
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.settings import Augmentation
 
 _NOTHING = {"mirror": 0.0, "shift": 0, "gain": 1.0, "colour": 1.0, "offset": 0.0, "noise": 0.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from shapechanger.demos.cloning.edges import DIRECTIONS, EdgeEyes, edges
+from shapechanger.demos.cloning.network import DIRECTIONS, EdgeEyes, edges
 from shapechanger.demos.cloning.pictures import Framing
 
 

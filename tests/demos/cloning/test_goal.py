@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.goal import class_numbers, goal_of
+from shapechanger.demos.cloning.judge import class_numbers, goal_of
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.layout import Feature, Layout
 
 _KEYS = Layout(

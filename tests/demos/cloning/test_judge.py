@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.judge import judge, macro_f1
-from shapechanger.demos.cloning.learn import learn
+from shapechanger.demos.cloning.judge import in_thirds, judge, macro_f1
+from shapechanger.demos.cloning.learn import best_temperature, learn
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.temperature import best_temperature
-from shapechanger.demos.cloning.thirds import in_thirds
 from tests.demos.cloning.data import QUICK, STEERS, stripes
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
 from shapechanger.demos.cloning.judge import judge
 from shapechanger.demos.cloning.learn import Inputs, Training, learn
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.mirror import STEERING, mirror_of
+from shapechanger.demos.cloning.demonstrations import STEERING, mirror_of
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.layout import Feature, Layout
 
 

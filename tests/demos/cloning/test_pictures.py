@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.pictures import Framing, prepare
+from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 
 _FRAMING = Framing()
 

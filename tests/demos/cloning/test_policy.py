@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import OutputError

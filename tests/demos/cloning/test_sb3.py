@@ -11,7 +11,7 @@ import pytest
 import torch
 from stable_baselines3 import SAC
 
-from shapechanger.demos.cloning.errors import PolicyError
+from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.sb3 import NormedReLU, SeenByPolicy, from_sb3, to_sb3
 from tests.demos.cloning.small import SIZE, SMALL

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO, SAC
 
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
 from shapechanger.demos.cloning.learn import Inputs, learn
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.replay import keep_demonstrations
-from shapechanger.demos.cloning.sb3_file import ChosenActions, as_ppo, as_sac
+from shapechanger.demos.cloning.sb3 import ChosenActions, as_ppo, as_sac
 from shapechanger.layout import Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.split import judged_steps, stretch
+from shapechanger.demos.cloning.demonstrations import judged_steps, stretch
+from shapechanger.demos.cloning.pictures import CloningError
 
 
 def test_by_time_the_last_steps_judge() -> None:

@@ -10,10 +10,10 @@ import pytest
 import torch
 
 from shapechanger.demos.cloning.demonstrations import held_out
-from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.demos.cloning.train import Check, History, clone
+from shapechanger.demos.cloning.train import History, ValidationScore, clone
 from tests.demos.cloning.small import SMALL, error, shown
 
 _QUICK = msgspec.structs.replace(SMALL, fewest_steps=4, most_steps=4, checks=2, warm_up=1)
@@ -134,7 +134,7 @@ def test_it_stops_when_it_gets_no_better() -> None:
     settings = msgspec.structs.replace(
         SMALL, fewest_steps=60, most_steps=60, checks=30, patience=3, held_out=0.5
     )
-    checks: list[Check] = []
+    checks: list[ValidationScore] = []
     _, history = clone(noise.pictures, actions, settings=settings, seed=0, on_check=checks.append)
     assert history.steps < 60
     assert history.best.step == history.steps - 6

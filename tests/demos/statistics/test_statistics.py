@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeWriter, drop, mark, read_episode
-from shapechanger.demos.statistics import spread, summary
-from shapechanger.demos.statistics.episodes import gaps_s
+from shapechanger.demos.statistics import gaps_s, spread, summary
 from tests.demos.episodes.making import header, recorded, step
 
 

@@ -7,10 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.barcode import barcode_rows, draw_barcode, read_barcode
-from shapechanger.robot.cameras.checked import FreezeDetector, check_jpeg
-from shapechanger.robot.cameras.jpeg_stream import JpegSplitter, captured_ns_of
-from shapechanger.robot.cameras.turned import turned
+from shapechanger.robot.cameras.jpeg import (
+    FreezeDetector,
+    JpegSplitter,
+    captured_ns_of,
+    check_jpeg,
+    turned,
+)
+from shapechanger.robot.cameras.pattern import barcode_rows, draw_barcode, read_barcode
 
 _RNG = np.random.default_rng(20171121)
 

@@ -10,10 +10,10 @@ from typing import Any, Final, Self
 from playwright.sync_api import Browser, Page, TimeoutError
 
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.twin.ledger import Transition
 from shapechanger.twin.oracle import propelled
-from shapechanger.twin.running import RunningRobot
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.robot import RunningRobot
+from shapechanger.twin.signals import Transition
+from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import until
 
 __all__ = ["CHROMIUM_ARGUMENTS", "DESK", "PHONE", "PHONE_ON_ITS_SIDE", "Console", "Pins"]
@@ -165,7 +165,7 @@ class Pins:
     def __init__(self, robot: RunningRobot) -> None:
         profile = next(robot.folder.glob("*.toml"))
         self._path = robot.ledger_path
-        self._wiring = Wiring(load_profile(profile).guard_plan())
+        self._wiring = TwinWiring(load_profile(profile).guard_plan())
         with robot.operator() as operator:
             self._levels = operator.levels()
         self._read = max(0, self._path.stat().st_size - _RECENT)

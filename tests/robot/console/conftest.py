@@ -11,7 +11,7 @@ from typing import Literal
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.drawing import missing
 from tests.robot.console.browser import CHROMIUM_ARGUMENTS, Console
 from tests.robots import CAR, IN_A_ROOM, write_profile

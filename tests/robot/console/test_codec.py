@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 
 from shapechanger.link import messages as m
-from shapechanger.link.proof import make_proof, new_key, parse_key
-from shapechanger.twin.running import RunningRobot
+from shapechanger.link.authentication import make_proof, new_key, parse_key
+from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import Console
 
 Visit = Callable[..., Console]

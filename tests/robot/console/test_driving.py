@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Error
 
-from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import PHONE, Console, Pins
 from tests.twin.robots import until
 

@@ -17,7 +17,7 @@ from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.profile import load
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.robot.console.browser import Console, Pins
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 from tests.twin.robots import until

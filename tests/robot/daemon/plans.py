@@ -10,7 +10,7 @@ import simplejpeg
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.guard.messages import GuardState
 
 SIZE = (160, 120)
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import aiohttp
 import pytest
 
-from shapechanger.link.fingerprint import fingerprint_of
+from shapechanger.link.authentication import fingerprint_of, make_proof
 from shapechanger.link.messages import (
     VERSION,
     Acknowledge,
@@ -33,10 +33,9 @@ from shapechanger.link.messages import (
     decode_robot_message,
     encode,
 )
-from shapechanger.link.proof import make_proof
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon import process
-from shapechanger.robot.daemon.frames import FrameReader
+from shapechanger.robot.daemon.camera import FrameReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.hardware import Clock, RealClock
 from tests.robot.daemon.fakes import FakeCamera, FakeGuard

@@ -12,7 +12,7 @@ import pytest
 from cryptography import x509
 
 from shapechanger.errors import OutputError, RobotError
-from shapechanger.link.fingerprint import fingerprint_of
+from shapechanger.link.authentication import fingerprint_of
 from shapechanger.robot.daemon.credentials import (
     check_exposure,
     credentials_folder,

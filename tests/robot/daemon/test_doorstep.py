@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.doorstep import Doorstep
+from shapechanger.robot.daemon.pre_auth import PreAuthConnections
 
 
 @dataclass
@@ -28,7 +28,7 @@ def test_the_oldest_of_an_address_with_too_many_makes_room() -> None:
     """And nobody of another address."""
 
     async def play() -> None:
-        doorstep = Doorstep(most=10, most_of_one=2)
+        doorstep = PreAuthConnections(most=10, most_of_one=2)
         friend, crowd = Fake("a"), [Fake("b") for _ in range(5)]
         for number, visitor in enumerate([friend, *crowd]):
             doorstep.enter(number, visitor)
@@ -42,7 +42,7 @@ def test_a_crowd_of_one_address_costs_only_itself() -> None:
     """However late the others come."""
 
     async def play() -> None:
-        doorstep = Doorstep(most=4, most_of_one=4)
+        doorstep = PreAuthConnections(most=4, most_of_one=4)
         crowd, friend = [Fake("b") for _ in range(4)], Fake("a")
         for number, visitor in enumerate([*crowd, friend]):
             doorstep.enter(number, visitor)
@@ -58,7 +58,7 @@ def test_who_was_given_something_waits_anew() -> None:
     """A page comes in many parts, and its sockets must not be dropped between two of them."""
 
     async def play() -> None:
-        doorstep = Doorstep(most=2, most_of_one=2, patience_s=0.05)
+        doorstep = PreAuthConnections(most=2, most_of_one=2, patience_s=0.05)
         page, silent = Fake("a"), Fake("a")
         for visitor in (page, silent):
             doorstep.enter(id(visitor), visitor)
@@ -82,7 +82,7 @@ def test_who_asks_for_nothing_is_dropped_in_time() -> None:
     """And who asked, or has shown the key, or has gone, is not."""
 
     async def play() -> None:
-        doorstep = Doorstep(patience_s=0.01)
+        doorstep = PreAuthConnections(patience_s=0.01)
         silent, asks, known = Fake("a"), Fake("a"), Fake("a")
         for visitor in (silent, asks, known):
             doorstep.enter(id(visitor), visitor)
@@ -109,7 +109,7 @@ def test_there_is_always_a_place_and_never_too_many(
     """Whoever comes stays until somebody else comes; who is gone costs nobody a place."""
 
     async def play() -> None:
-        doorstep = Doorstep(most, most_of_one)
+        doorstep = PreAuthConnections(most, most_of_one)
         visitors: list[Fake] = []
         for number, (address, goes) in enumerate(arrivals):
             here = [v for v in visitors if not v.dropped and not v.is_gone]

@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.frames import FrameChecks, FrameReader
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from tests.robot.daemon.fakes import FakeCamera
 from tests.robot.daemon.plans import SIZE, picture
 

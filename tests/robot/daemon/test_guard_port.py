@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from shapechanger.robot.daemon.guard_port import GuardPort
-from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.daemon.guard_link import GuardLink
+from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 from tests.robot.daemon.plans import guard_state
 from tests.robot.daemon.running import until
 
@@ -22,7 +22,7 @@ class Ends:
         self.guard.setblocking(False)
         self.states: list[GuardState] = []
         self.lost: list[bool] = []
-        self.port = GuardPort(daemon.detach(), self.states.append, lambda: self.lost.append(True))
+        self.port = GuardLink(daemon.detach(), self.states.append, lambda: self.lost.append(True))
 
     def heard(self) -> list[Order]:
         """All orders that the guard can read now."""

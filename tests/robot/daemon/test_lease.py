@@ -6,18 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.lease import Holder, LeaseDesk
+from shapechanger.robot.daemon.control import ClientIdentity, ControlLease
 
-ANN = Holder(1, "Ann", "person")
-BOB = Holder(2, "Bob", "person")
-SAC = Holder(3, "sac", "program")
-PPO = Holder(4, "ppo", "program")
+ANN = ClientIdentity(1, "Ann", "person")
+BOB = ClientIdentity(2, "Bob", "person")
+SAC = ClientIdentity(3, "sac", "program")
+PPO = ClientIdentity(4, "ppo", "program")
 ALL = (ANN, BOB, SAC, PPO)
 
 
-def held_by(who: Holder) -> LeaseDesk:
+def held_by(who: ClientIdentity) -> ControlLease:
     """A desk whose lease is taken."""
-    desk = LeaseDesk()
+    desk = ControlLease()
     assert desk.refusal(who) == ""
     assert desk.take(who) is None
     return desk
@@ -35,7 +35,7 @@ def test_a_person_takes_the_command_from_a_program_at_once() -> None:
 @pytest.mark.parametrize(
     ("holder", "other"), [(ANN, SAC), (ANN, BOB), (SAC, PPO)], ids=lambda who: who.name
 )
-def test_nobody_else_takes_it(holder: Holder, other: Holder) -> None:
+def test_nobody_else_takes_it(holder: ClientIdentity, other: ClientIdentity) -> None:
     """Not a program from a person, and not one from its equal; in words."""
     refusal = held_by(holder).refusal(other)
     assert refusal.startswith(f"{holder.name} commands")
@@ -54,11 +54,11 @@ def test_taking_it_twice_changes_nothing() -> None:
         st.tuples(st.sampled_from(("take", "give up")), st.sampled_from(ALL)), max_size=50
     )
 )
-def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, Holder]]) -> None:
+def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, ClientIdentity]]) -> None:
     """A model: a number stands for one holder's time, and a person is never pushed aside."""
-    desk = LeaseDesk()
-    holder: Holder | None = None
-    of_number: dict[int, Holder] = {}
+    desk = ControlLease()
+    holder: ClientIdentity | None = None
+    of_number: dict[int, ClientIdentity] = {}
     for move, who in moves:
         before = desk.number
         if move == "give up":

@@ -21,8 +21,7 @@ from shapechanger.link.messages import (
     Recordings,
     Refused,
 )
-from shapechanger.robot.daemon.library import Answer, Library, Question
-from shapechanger.robot.daemon.summaries import Summaries
+from shapechanger.robot.daemon.library import Answer, Question, RecordingLibrary, Summaries
 from tests.robot.daemon.plans import ACTIONS, picture
 
 HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
@@ -32,7 +31,7 @@ Ask = Callable[[Question], Answer]
 @pytest.fixture
 def ask(tmp_path: Path) -> Iterator[Ask]:
     """Ask about the recordings of a folder, and wait for the answer."""
-    library = Library(tmp_path, lambda work: work())
+    library = RecordingLibrary(tmp_path, lambda work: work())
 
     def asked(question: Question) -> Answer:
         answers: list[Answer] = []

@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.line_index import LineIndex
+from shapechanger.robot.daemon.library import LineIndex
 
 _parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_000)), max_size=12)
 

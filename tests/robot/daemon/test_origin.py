@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.robot.daemon.origin import origin_refusal
+from shapechanger.robot.daemon.server import origin_refusal
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.errors import LinkError
 from shapechanger.link.messages import Event, Lease, Pong
-from shapechanger.robot.daemon.outbox import Outbox
+from shapechanger.robot.daemon.limits import Outbox
 
 
 def drained(outbox: Outbox) -> list[object]:

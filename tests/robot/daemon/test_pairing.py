@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from shapechanger.link.messages import Observation
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.lease import Holder
+from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
-from shapechanger.robot.daemon.pairing import Pairing, SeenStep
+from shapechanger.robot.daemon.recorder import StepBuilder, StepWithFrame
 
-ADA, NET = Holder(1, "Ada", "person"), Holder(2, "net", "program")
+ADA, NET = ClientIdentity(1, "Ada", "person"), ClientIdentity(2, "net", "program")
 
 
 def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
@@ -48,7 +48,7 @@ def frame(seq: int) -> NumberedFrame:
 
 def test_what_the_outputs_did_comes_with_the_next_observation() -> None:
     """And why they did not do what they were told."""
-    pairing = Pairing(lambda: 7)
+    pairing = StepBuilder(lambda: 7)
     assert pairing.observed(1, seen(1, 100, suggested=(0.9,)), frame(1)) is None
     assert pairing.decided(ADA, 1, (0.5,), 110) is None
     done = pairing.observed(1, seen(2, 120, stop_reason="A bump."), frame(2))
@@ -63,7 +63,7 @@ def test_what_the_outputs_did_comes_with_the_next_observation() -> None:
 
 def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
     """A key that is let go at once."""
-    pairing = Pairing()
+    pairing = StepBuilder()
     pairing.observed(1, seen(1, 100), None)
     pairing.decided(ADA, 1, (0.5,), 110)
     assert pairing.decided(ADA, 1, (0.0,), 115) is None
@@ -74,7 +74,7 @@ def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
 
 def test_what_answers_nothing_that_was_seen_is_no_step() -> None:
     """Such as something that was seen before recording began, or by somebody else."""
-    pairing = Pairing()
+    pairing = StepBuilder()
     pairing.observed(1, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
         pairing.decided(who, answers, (0.5,), 110)
@@ -85,7 +85,7 @@ def test_what_answers_nothing_that_was_seen_is_no_step() -> None:
 
 def test_who_lost_the_command_does_not_tell_what_its_command_did() -> None:
     """By then the outputs follow somebody else."""
-    pairing = Pairing()
+    pairing = StepBuilder()
     pairing.observed(2, seen(1, 100), None)
     pairing.decided(NET, 1, (0.5,), 110)
     done = pairing.observed(2, seen(2, 120, mine=False), None)
@@ -99,11 +99,11 @@ def test_who_lost_the_command_does_not_tell_what_its_command_did() -> None:
     )
 )
 def test_time_never_runs_backwards_and_no_picture_is_given_twice(
-    said: list[tuple[bool, Holder, int]],
+    said: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
     """Whatever is answered, by whom, and however late."""
-    pairing = Pairing()
-    steps: list[SeenStep | None] = []
+    pairing = StepBuilder()
+    steps: list[StepWithFrame | None] = []
     newest = {ADA.session: 0, NET.session: 0}
     for now_ns, (looks, who, back) in enumerate(said):
         if looks:

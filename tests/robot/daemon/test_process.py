@@ -16,10 +16,10 @@ from typing import BinaryIO
 
 import pytest
 
-from shapechanger.robot.daemon.life import LIFE, show_life
+from shapechanger.robot.daemon.guard_link import LIFELINE, send_lifeline
+from shapechanger.robot.guard.messages import encode
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
-from shapechanger.robot.guard.wire import encode
 from tests.robot.daemon.plans import car_plan, guard_state
 
 
@@ -72,7 +72,7 @@ def begun() -> Iterator[Started]:
     heart_end.close()
     heart.settimeout(20.0)
     said, (life,), _, _ = socket.recv_fds(guard, 16, 2)
-    assert said == LIFE
+    assert said == LIFELINE
     with os.fdopen(ready, "rb") as told:
         yield Started(process, guard, heart, told, life)
     for end in (guard, heart):
@@ -130,7 +130,7 @@ def test_a_guard_that_is_gone_before_is_no_crash() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
     with theirs:
-        assert show_life(theirs.fileno())
+        assert send_lifeline(theirs.fileno())
 
 
 def test_nobody_is_let_in_before_the_guard_has_spoken(begun: Started) -> None:

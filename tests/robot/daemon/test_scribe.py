@@ -13,17 +13,16 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, Step, episodes_of, read_episode, repair
-from shapechanger.robot.daemon.pairing import SeenStep
-from shapechanger.robot.daemon.scribe import TOO_SLOW, Scribe
+from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, EpisodeThread, StepWithFrame
 from tests.robot.daemon.plans import ACTIONS, picture
 
 HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
 WITHIN_S = 20.0
 
 
-def step(number: int) -> SeenStep:
+def step(number: int) -> StepWithFrame:
     """A step that tells its number."""
-    return SeenStep(
+    return StepWithFrame(
         Step(action=(0.0, number / 1e6), driver="person", captured_ns=number * 50_000_000),
         picture(number % 5),
     )
@@ -33,7 +32,7 @@ def test_everything_is_written_in_the_order_in_which_it_was_told(tmp_path: Path)
     """And the episode is closed with its outcome."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
-    scribe = Scribe(tmp_path, HEADER, lambda *said: reports.append(said))
+    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
     scribe.mark("too early", answers.append)
     scribe.undo(5.0, answers.append)
     assert all(scribe.add(step(number)) for number in range(40))
@@ -61,19 +60,19 @@ def test_a_disk_that_is_too_slow_ends_the_episode_and_keeps_what_it_took(
     tmp_path: Path, bytes_each: int
 ) -> None:
     """Neither steps nor bytes of pictures pile up without end; here the disk is busy elsewhere."""
-    busy = Scribe(tmp_path, HEADER, lambda *_: None)
+    busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
-    scribe = Scribe(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
+    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
     taken = 0
     large = b"\xff\xd8" + bytes(bytes_each)
-    while scribe.add(SeenStep(step(taken).step, large)):
+    while scribe.add(StepWithFrame(step(taken).step, large)):
         taken += 1
         assert taken < 10_000
     busy.end()
     assert scribe.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
     episode = read_episode(tmp_path / scribe.progress.episode)
-    assert episode.outcome == TOO_SLOW
+    assert episode.outcome == DISK_TOO_SLOW
     assert len(episode.steps) == taken == (15 if bytes_each else 256)
 
 
@@ -81,7 +80,7 @@ def test_what_the_disk_says_is_reported(tmp_path: Path) -> None:
     """Once, and it does not begin."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
-    scribe = Scribe(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
+    scribe = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
     assert scribe.join(WITHIN_S)
     ((what, trouble),) = reports
     assert (what, scribe.progress.episode) == ("ended", "")
@@ -92,7 +91,7 @@ _WRITES_FOR_EVER = """
 import sys
 from pathlib import Path
 from tests.robot.daemon.test_scribe import HEADER, step
-from shapechanger.robot.daemon.scribe import Scribe
+from shapechanger.robot.daemon.recorder import Scribe
 
 scribe, number = Scribe(Path(sys.argv[1]), HEADER, lambda *_: None), 0
 while True:

@@ -14,6 +14,7 @@ import aiohttp
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.link.authentication import make_proof
 from shapechanger.link.messages import (
     MAX_CLIENT_MESSAGE,
     VERSION,
@@ -34,11 +35,10 @@ from shapechanger.link.messages import (
     Take,
     encode,
 )
-from shapechanger.link.proof import make_proof
 from shapechanger.robot.daemon import connection, server
 from shapechanger.robot.daemon.credentials import make_credentials, read_key
-from shapechanger.robot.daemon.doorstep import Doorstep
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.pre_auth import PreAuthConnections
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Client, Running, running, until
 
@@ -228,7 +228,7 @@ def test_a_huge_message_ends_the_connection_before_it_is_whole(play: Any) -> Non
 
 def test_who_says_nothing_is_sent_away(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A place at the door is not for ever."""
-    monkeypatch.setattr(connection, "HELLO_S", 0.05)
+    monkeypatch.setattr(connection, "HELLO_TIMEOUT_S", 0.05)
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
@@ -409,7 +409,7 @@ def test_who_does_not_ask_for_the_link_is_dropped(
 ) -> None:
     """In its handshake or behind it; a client that is known stays."""
     plan, key = secured if secure else (car_plan(), b"")
-    monkeypatch.setattr(server, "Doorstep", lambda: Doorstep(patience_s=0.2))
+    monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(patience_s=0.2))
 
     async def script(robot: Running) -> None:
         async with robot.client(key) as client:

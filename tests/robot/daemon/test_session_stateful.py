@@ -29,9 +29,9 @@ from shapechanger.link.messages import (
     encode,
 )
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.cockpit import Cockpit
-from shapechanger.robot.daemon.session import Door, Session
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.guard.messages import Order
 from tests.robot.daemon.plans import car_plan, guard_state
 
 MAX_AGE_NS = 400 * 1_000_000
@@ -58,7 +58,7 @@ class Robot(RuleBasedStateMachine):
         self.now_ns = 1_000_000_000
         self.orders: list[Order] = []
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
-        self.cockpit = Cockpit(car_plan(), lambda: self.now_ns, self.orders.append)
+        self.cockpit = SessionHub(car_plan(), lambda: self.now_ns, self.orders.append)
         self.sessions: dict[int, Session] = {}
         self.told: dict[int, Told] = {}
         self.holder: int | None = None
@@ -79,7 +79,7 @@ class Robot(RuleBasedStateMachine):
         if place in self.sessions:
             return
         self.numbers += 1
-        session = Session(self.numbers, self.cockpit, Door())
+        session = Session(self.numbers, self.cockpit, Authenticator())
         session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
         self.sessions[place], self.told[place] = session, Told(role)
 

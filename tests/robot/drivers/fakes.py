@@ -9,7 +9,7 @@ from typing import Any
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.port import Port
+from shapechanger.robot.drivers.dynamixel.protocol import Port
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.drivers.output import OutputDriver, open_output
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor

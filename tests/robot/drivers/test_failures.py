@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS, OutputDriver
-from shapechanger.robot.drivers.sysfs_pwm import SysfsPwm
+from shapechanger.robot.drivers.pulse import SysfsPwm
 from tests.robot.drivers.fakes import FakeHardware
 
 _DUTY = {"pwm_hz": 50, "start": 0.0, "full": 1.0}
@@ -65,7 +65,7 @@ class _Bench:
             def _write(self, file: str, number: int) -> None:
                 fault.during(lambda: super(Pwm, self)._write(file, number))
 
-        monkeypatch.setattr("shapechanger.robot.drivers.sysfs_pwm.SysfsPwm", Pwm)
+        monkeypatch.setattr("shapechanger.robot.drivers.pulse.SysfsPwm", Pwm)
 
     def open(self) -> OutputDriver:
         """Open the driver."""

@@ -77,7 +77,7 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
     """A Raspberry Pi 4 with this lgpio."""
     fake = _Lgpio()
     ours = ("gpiozero.pins.lgpio", "shapechanger.robot.drivers.lgpio_pins")
-    for name in (*ours, "shapechanger.robot.drivers.lgpio_servo"):
+    for name in (*ours, "shapechanger.robot.drivers.lgpio_pins"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "lgpio", fake)
     monkeypatch.setattr("gpiozero.pins.local.get_pi_revision", lambda: 0xC03115)
@@ -87,7 +87,7 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
         "gpiozero.pins.local.LocalPiFactory._reservations", collections.defaultdict(list)
     )
     yield fake
-    for name in (*ours, "shapechanger.robot.drivers.lgpio_servo"):
+    for name in (*ours, "shapechanger.robot.drivers.lgpio_pins"):
         sys.modules.pop(name, None)
 
 
@@ -169,7 +169,7 @@ def test_servo_pins_let_go_also_when_a_pin_fails(
     lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whoever tries again would find them busy; and the other pins end as well."""
-    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_servo").LgpioServoPins()
+    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
     for pin in (17, 18, 19):
         pins.pulse(pin, 1500, 50)
     send = lgpio.tx_servo
@@ -187,7 +187,7 @@ def test_servo_pins_let_go_also_when_a_pin_fails(
 
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
     """Lgpio forgets a pin at the level of that moment; ours is low."""
-    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_servo").LgpioServoPins()
+    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
     pins.pulse(17, 1503, 50)
     assert lgpio.pulses[17] == 1503
     pins.close()

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.pca9685 import prescale_for
-from shapechanger.robot.drivers.pulse import PulseRange
-from shapechanger.robot.drivers.sysfs_pwm import SysfsPwm
+from shapechanger.robot.drivers.pulse import PulseRange, SysfsPwm
 from tests.robot.drivers.fakes import MS, FakeHardware
 
 _AT = {"over": "lgpio", "pin": 12, "hz": 50}

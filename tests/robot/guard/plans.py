@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.guard.plan import (
     ActionPlan,
     GuardPlan,
@@ -10,7 +11,6 @@ from shapechanger.robot.guard.plan import (
     SensorPlan,
     StopPlan,
 )
-from shapechanger.robot.guard.wire import Order
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""

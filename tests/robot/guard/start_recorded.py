@@ -28,12 +28,12 @@ def main(program: str, arguments: list[str]) -> None:
 
     python = sys.executable
     here = Path(__file__)
-    commands = supervisor.Commands(
+    commands = supervisor.ProcessCommands(
         guard=(python, "-I", str(here), "guard"),
         daemon=(python, "-I", str(here.with_name("stand_in.py"))),
     )
     # The plan is the real one; what is run is told here.
-    supervisor.Commands.of = classmethod(lambda cls, plan: commands)
+    supervisor.ProcessCommands.of = classmethod(lambda cls, plan: commands)
     supervisor.main(arguments)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from shapechanger.robot.guard.channel import DaemonChannel
-from shapechanger.robot.guard.wire import Order, encode
+from shapechanger.robot.guard.messages import Order, encode
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from shapechanger.robot.guard.merging import merge
+from shapechanger.robot.guard.sensors import merge
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard import sensors
 from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
+from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
 from shapechanger.robot.guard.plan import GuardPlan, LimitPlan, SensorPlan
 from shapechanger.robot.guard.process import Guard, main
-from shapechanger.robot.guard.wire import GuardState, Order, decode_state, encode
 from tests.robot.guard.plans import MS, arm, command, quick_car
 
 _T0 = 1_000 * MS

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.guard.plan import (
     ActionPlan,
     GuardPlan,
@@ -13,8 +14,7 @@ from shapechanger.robot.guard.plan import (
     StopPlan,
 )
 from shapechanger.robot.guard.rules import Rules
-from shapechanger.robot.guard.senses import Sensing
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.guard.sensors import Sensing
 from tests.robot.guard.plans import MS, arm, car, command, quick_car
 
 _T0 = 5_000 * MS

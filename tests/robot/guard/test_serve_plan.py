@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.guard import safe_pins, start, supervisor
-from shapechanger.robot.guard.arguments import descriptors
-from shapechanger.robot.guard.mix import output_values
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
-from shapechanger.robot.guard.restarts import Restarts
+from shapechanger.robot.guard import outputs as safe_pins
+from shapechanger.robot.guard import start, supervisor
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan, output_values
 from shapechanger.robot.guard.serve_plan import (
     ServePlan,
+    descriptors,
     plan_fd,
     read_plan_fd,
     supervisor_command,
 )
+from shapechanger.robot.guard.supervisor import Restarts
 from tests.robot.guard.plans import car
 from tests.robot.guard.recording import Record, connect
 
@@ -110,7 +110,7 @@ def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
 
 def test_the_daemon_cannot_be_hidden_by_the_folder_it_is_started_in() -> None:
     """And the guard takes nothing from its environment."""
-    commands = supervisor.Commands.of(_PLAN)
+    commands = supervisor.ProcessCommands.of(_PLAN)
     assert commands.guard == (sys.executable, "-I", start.__file__, "guard")
     assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
     assert commands.daemon == (sys.executable, "-P", "-m", "shapechanger.robot.daemon")

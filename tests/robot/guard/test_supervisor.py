@@ -19,7 +19,7 @@ import pytest
 from shapechanger.robot.guard import supervisor
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
-from shapechanger.robot.guard.supervisor import Commands, Supervisor
+from shapechanger.robot.guard.supervisor import ProcessCommands, Supervisor
 from tests.robot.guard.plans import MS, quick_car
 from tests.robot.guard.running import running
 from tests.robot.guard.waiting import until
@@ -237,7 +237,7 @@ class _Daemon(_Stuck):
 def _supervisor(told: str) -> Iterator[Supervisor]:
     """One without processes."""
     log = logging.getLogger("test")
-    one = Supervisor(ServePlan(quick_car(), {}), -1, Commands((), ()), log)
+    one = Supervisor(ServePlan(quick_car(), {}), -1, ProcessCommands((), ()), log)
     one._told = told
     with one._woken, one._waker:
         yield one

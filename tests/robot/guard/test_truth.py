@@ -2,8 +2,8 @@
 
 import pytest
 
+from shapechanger.robot.guard.outputs import Truth
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
-from shapechanger.robot.guard.truth import Truth
 
 _CAR = GuardPlan(
     "car",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.guard.wire import (
+from shapechanger.robot.guard.messages import (
     MAX_DATAGRAM,
     GuardState,
     Order,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.profile import schema, shipped_profiles
-from shapechanger.robot.profile.keys import Key
+from shapechanger.robot.profile.schema import ProfileKey
 from tests.robot.profile.texts import read
 
 GUIDE = (Path(__file__).parents[3] / "docs" / "profiles.md").read_text()
@@ -24,7 +24,9 @@ def test_vehicle_of_the_guide_is_a_profile() -> None:
 def test_every_key_is_in_the_guide(name: str) -> None:
     """A key, the names it may be and its default are told."""
     table = getattr(schema, name)
-    keys: list[Key] = [k for ks in table.values() for k in ks] if "SETTINGS" in name else [*table]
+    keys: list[ProfileKey] = (
+        [k for ks in table.values() for k in ks] if "SETTINGS" in name else [*table]
+    )
     for key in keys:
         assert f"`{key.name}`" in GUIDE
         assert [n for n in key.names if n and f'"{n}"' not in GUIDE and f"`{n}`" not in GUIDE] == []

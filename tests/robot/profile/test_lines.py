@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.profile.lines import Place, lines_of
+from shapechanger.robot.profile.mistakes import Place, lines_of
 
 TEXT = '''\
 # [not.a.table]

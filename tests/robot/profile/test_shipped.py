@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import ProfileError
-from shapechanger.robot.guard.mix import output_values
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import HOVERCRAFT, changed, read
 

@@ -6,12 +6,12 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.pulse import PulseRange
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.setup.calibration import (
-    Jogging,
+    JogResult,
     motor_changes,
     pulse_changes,
     reading,
     wheel_changes,
-    widened,
+    with_widest_pulses,
 )
 
 _SERVO = OutputPlan(
@@ -27,8 +27,8 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 def test_what_was_seen_is_the_pulse_that_was_sent_then(left_us: int, right_us: int) -> None:
     """Also for a servo that is mounted the other way round."""
     settings = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
-    wide = widened(OutputPlan("steer", "servo", settings=settings))
-    seen = Jogging(-0.5, 0.1, 0.4)
+    wide = with_widest_pulses(OutputPlan("steer", "servo", settings=settings))
+    seen = JogResult(-0.5, 0.1, 0.4)
     changes = pulse_changes(wide, seen)
     low_us, high_us = (float(str(wide.settings[k])) for k in ("left_us", "right_us"))
     pulses = PulseRange(low_us, 1500.0, high_us)
@@ -43,13 +43,13 @@ def test_what_was_seen_is_the_pulse_that_was_sent_then(left_us: int, right_us: i
 def test_a_middle_outside_the_ends_is_refused() -> None:
     """Whoever pressed Enter three times in one place starts again."""
     with pytest.raises(RobotError, match="must lie between"):
-        pulse_changes(_SERVO, Jogging(0.2, 0.2, 0.2))
+        pulse_changes(_SERVO, JogResult(0.2, 0.2, 0.2))
 
 
 def test_a_motor_has_no_pulses() -> None:
     """Only servos and controllers are jogged by width."""
     with pytest.raises(RobotError, match="sends no pulses"):
-        widened(_MOTOR)
+        with_widest_pulses(_MOTOR)
 
 
 def test_a_motor_that_went_backward_is_turned_round_by_its_mix() -> None:

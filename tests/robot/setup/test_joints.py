@@ -13,11 +13,11 @@ from shapechanger.robot.drivers.as5600 import As5600, connect_encoders
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import examine_robot
-from shapechanger.robot.setup.joints import find_joint_zeros
-from shapechanger.twin.chips.as5600 import Magnet
-from shapechanger.twin.local import LocalBoard
-from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.robot.setup.zeros import find_joint_zeros
+from shapechanger.twin.chips import Magnet
+from shapechanger.twin.in_process import LocalBoard
+from shapechanger.twin.wiring import TwinWiring
+from shapechanger.twin.world.vehicle import DrivingWorld
 
 _PLAN = load_profile(find_profile("finger")).guard_plan()
 _ZEROS = [1234, 4095, 0, 2]
@@ -41,7 +41,7 @@ def _board(tremble: float = 0.0) -> LocalBoard:
         replace(s, settings={**s.settings, "zeros": _ZEROS}) if s.driver == "as5600" else s
         for s in _PLAN.sensors
     )
-    return LocalBoard(Wiring(replace(_PLAN, sensors=sensors)), _Straight(tremble))
+    return LocalBoard(TwinWiring(replace(_PLAN, sensors=sensors)), _Straight(tremble))
 
 
 @pytest.mark.parametrize("tremble", [0.0, 0.02])

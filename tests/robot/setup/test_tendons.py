@@ -9,15 +9,15 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.tendons import find_zeros
-from shapechanger.twin.local import LocalBoard
-from shapechanger.twin.wiring import Wiring
-from shapechanger.twin.world.driving import DrivingWorld
+from shapechanger.robot.setup.zeros import find_zeros
+from shapechanger.twin.in_process import LocalBoard
+from shapechanger.twin.wiring import TwinWiring
+from shapechanger.twin.world.vehicle import DrivingWorld
 
 
 def _board(plan: GuardPlan) -> LocalBoard:
     # Springs in place of a finger that somebody holds.
-    return LocalBoard(Wiring(plan), DrivingWorld({"tendon"}, (160, 120), seed=0))
+    return LocalBoard(TwinWiring(plan), DrivingWorld({"tendon"}, (160, 120), seed=0))
 
 
 def _plan(zero: int) -> GuardPlan:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from shapechanger.robot.setup.doctor import Finding, examine_robot
-from shapechanger.robot.setup.unit import unit_text, write_unit
+from shapechanger.robot.setup.systemd import unit_text, write_unit
 from tests.robot.setup.test_doctor import CAR
 
 

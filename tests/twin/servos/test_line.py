@@ -3,35 +3,35 @@
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.twin.servos.line import Line
-from shapechanger.twin.servos.packets import packed, status
+from shapechanger.twin.servos.bus import SimulatedBus
+from shapechanger.twin.servos.protocol import packed, status
 from shapechanger.twin.servos.servo import ServoPlan
 
 MS = 1_000_000
 
 
-def _line(count: int = 1) -> Line:
-    return Line([ServoPlan(i + 1, "XL330-M077") for i in range(count)])
+def _line(count: int = 1) -> SimulatedBus:
+    return SimulatedBus([ServoPlan(i + 1, "XL330-M077") for i in range(count)])
 
 
-def _ask(line: Line, servo_id: int, code: int, body: bytes = b"") -> bytes:
+def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> bytes:
     line.receive(packed(servo_id, code, body))
     return line.send()
 
 
-def _write(line: Line, at: int, value: int, size: int = 1) -> int:
+def _write(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
     """The error of a write to servo 1."""
     data = at.to_bytes(2, "little") + value.to_bytes(size, "little", signed=value < 0)
     return _ask(line, 1, 3, data)[8]
 
 
-def _read(line: Line, at: int, size: int) -> tuple[int, bytes]:
+def _read(line: SimulatedBus, at: int, size: int) -> tuple[int, bytes]:
     """Error and data of a read from servo 1."""
     answer = _ask(line, 1, 2, at.to_bytes(2, "little") + size.to_bytes(2, "little"))
     return answer[8], answer[9:-2]
 
 
-def _pull(line: Line, counts: int = 200) -> None:
+def _pull(line: SimulatedBus, counts: int = 200) -> None:
     """Let servo 1 pull."""
     errors = [_write(line, 11, 0), _write(line, 102, counts, 2), _write(line, 64, 1)]
     assert errors == [0, 0, 0]
@@ -152,7 +152,7 @@ def test_an_error_of_the_hardware_takes_torque_until_a_reboot() -> None:
 
 def test_a_reboot_keeps_the_eeprom_and_forgets_turns() -> None:
     """Mode and limits stay; torque, watchdog and the count of turns do not."""
-    line = Line([ServoPlan(1, "XL330-M077", angle=100.0)])
+    line = SimulatedBus([ServoPlan(1, "XL330-M077", angle=100.0)])
     assert _write(line, 38, 123, 2) == 0
     assert _write(line, 98, 5) == 0
     before = line.servos[1].register(132)
@@ -193,8 +193,8 @@ def test_bytes_take_their_time_on_the_wire() -> None:
 def test_lines_that_cannot_be_are_refused() -> None:
     """Two servos of one id, a baud rate or a model that does not exist."""
     with pytest.raises(RobotError, match="same id"):
-        Line([ServoPlan(1), ServoPlan(1)])
+        SimulatedBus([ServoPlan(1), ServoPlan(1)])
     with pytest.raises(RobotError, match="No servo has 12345 baud"):
-        Line([ServoPlan(1)], baud=12345)
+        SimulatedBus([ServoPlan(1)], baud=12345)
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
-        Line([ServoPlan(1, "XL330-M28")])
+        SimulatedBus([ServoPlan(1, "XL330-M28")])

@@ -5,7 +5,7 @@ from dynamixel_sdk import PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.twin.servos.packets import Packet, Parser, crc16, packed, status
+from shapechanger.twin.servos.protocol import Packet, Parser, crc16, packed, status
 
 _EXAMPLES = {
     "ping": ("FF FF FD 00 01 03 00 01 19 4E", packed(1, 1, b"")),

@@ -7,17 +7,12 @@ from typing import Annotated
 
 import tyro
 
-from shapechanger.cli.demos.evaluate import Evaluate
-from shapechanger.cli.demos.export import Export
-from shapechanger.cli.demos.import_ import Import
-from shapechanger.cli.demos.judging import Bad, Cut, Good, MarkStep
-from shapechanger.cli.demos.listing import ListEpisodes
-from shapechanger.cli.demos.merging import Merge
+from shapechanger.cli.demos.edit import Bad, Cut, Good, MarkStep, Merge, RepairEpisodes
+from shapechanger.cli.demos.exchange import Export, Import
 from shapechanger.cli.demos.record import Record
-from shapechanger.cli.demos.repairing import RepairEpisodes
-from shapechanger.cli.demos.replaying import Replay
-from shapechanger.cli.demos.showing import Show
-from shapechanger.cli.demos.train import Train
+from shapechanger.cli.demos.replay import Replay
+from shapechanger.cli.demos.show import ListEpisodes, Show
+from shapechanger.cli.demos.train import Evaluate, Train
 
 __all__ = ["Demos"]
 

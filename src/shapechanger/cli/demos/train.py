@@ -10,12 +10,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
 from shapechanger.cli.env_arguments import require_seed
-from shapechanger.cli.progress import StudyProgress
-from shapechanger.cli.stopping import Interrupted
 from shapechanger.errors import OutputError
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Shrinking", "Train", "print_judgement"]
+__all__ = ["Evaluate", "Shrinking", "Train", "print_judgement"]
 
 
 @dataclass(frozen=True)
@@ -59,9 +58,9 @@ class Train:
         self._require_files()
         # The report comes last; if what draws it is missing, say so before the work.
         import_module("shapechanger.reports.clone")
+        from shapechanger.demos.cloning.demonstrations import judged_steps
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
-        from shapechanger.demos.cloning.split import judged_steps
         from shapechanger.demos.dataset import count_steps, load_dataset
         from shapechanger.reports.clone import write_clone_report, write_numbers
         from shapechanger.transfer.learners.ppo import use_one_thread
@@ -136,7 +135,7 @@ class Train:
         written: list[Path] = []
         if self.sac is None and self.ppo is None:
             return written
-        from shapechanger.demos.cloning.sb3_file import as_ppo, as_sac
+        from shapechanger.demos.cloning.sb3 import as_ppo, as_sac
         from shapechanger.transfer.files import write_atomic
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
@@ -220,3 +219,46 @@ def print_judgement(console: Console, judgement: Judgement) -> None:
         )
     console.print(f"macro-F1 {judgement.macro_f1:.3f}")
     console.print(f"accuracy {judgement.accuracy:.3f}")
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Compare what a policy does with what a driver did; the last line is the accuracy."""
+
+    policy: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
+    """A policy that `demos train` or `train` wrote."""
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """A recording, one episode of it, or anything that `demos import` reads."""
+    report: Path | None = None
+    """A page to write, with the worst frames as pictures; the numbers come beside it as JSON."""
+
+    def run(self) -> None:
+        """Judge, and print."""
+        from shapechanger.demos.cloning.judge import judge
+        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.demos.dataset import load_dataset
+
+        policy = CameraPolicy.load(self.policy)
+        shrinking = Shrinking(policy.card.framing)
+        data = load_dataset(self.data, shrink=shrinking)
+        console = plain_console()
+        judgement = judge(policy, data)
+        told = f"These are the {len(data)} steps of {self.data}."
+        learned = policy.card.data.get("learned", 0)
+        if policy.card.data.get("digest") == shrinking.digest(data.actions):
+            told = f"The policy learned from the first {learned} of these {len(data)} steps."
+            if learned < len(data):
+                unseen = judge(policy, data, np.arange(len(data)) >= learned)
+                told += f" On the others its accuracy is {unseen.accuracy:.3f}."
+            console.print(told, soft_wrap=True)
+        if self.report is not None:
+            from shapechanger.reports.clone import write_clone_report, write_numbers
+            from shapechanger.transfer.files import make_folder
+
+            make_folder(self.report.parent)
+            name = self.policy.name
+            write_clone_report(self.report, name, policy, data, judgement, None, told)
+            numbers = self.report.with_suffix(".json")
+            write_numbers(numbers, policy, judgement, None)
+            console.print(f"wrote {self.report} and {numbers}", soft_wrap=True)
+        print_judgement(console, judgement)

@@ -12,8 +12,7 @@ from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.fetch import Fetch
 from shapechanger.cli.robot.find import Find, Forget, Remember
-from shapechanger.cli.robot.home import Home
-from shapechanger.cli.robot.init import Init
+from shapechanger.cli.robot.init import Home, Init
 from shapechanger.cli.robot.key import Key
 from shapechanger.cli.robot.safe_pins import SafePins
 from shapechanger.cli.robot.selftest import Selftest

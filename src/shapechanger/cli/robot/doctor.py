@@ -30,7 +30,7 @@ class Doctor:
 
     def run(self) -> None:
         """Print what was found, and exit with 1 if something is missing."""
-        from shapechanger.cli.robot.serving import credentials_of
+        from shapechanger.cli.robot.serve import credentials_of
         from shapechanger.robot.profile.load import find_profile, load_profile
         from shapechanger.robot.setup.doctor import Finding, examine_robot
 

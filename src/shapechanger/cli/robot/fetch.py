@@ -2,17 +2,39 @@
 
 from __future__ import annotations
 
+import binascii
+import contextlib
+import os
 import sys
+import time
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import tyro
 
 from shapechanger.cli.console import plain_console
-from shapechanger.errors import DemosError, RobotRefused
+from shapechanger.demos.episodes.files import (
+    FRAMES,
+    HEADER,
+    STEPS,
+    cannot_write,
+    is_episode,
+    lock,
+    write_all,
+)
+from shapechanger.demos.episodes.reader import read_header
+from shapechanger.demos.episodes.records import Step, decode_line, split_lines
+from shapechanger.errors import DemosError, RobotRefused, UnknownName
+from shapechanger.link.messages import EpisodeSummary, Piece
+from shapechanger.remote.client import RobotClient
 
-__all__ = ["Fetch"]
+if TYPE_CHECKING:
+    from shapechanger.link.messages import EpisodeSummary
+    from shapechanger.remote.client import RobotClient
+
+__all__ = ["Fetch", "episodes_there", "fetch_episode", "recorded"]
 
 
 @dataclass(frozen=True)
@@ -28,9 +50,8 @@ class Fetch:
 
     def run(self) -> None:
         """Fetch; exits with 1 where an episode could not be fetched."""
-        from shapechanger.cli.robot.fetching import episodes_there, fetch_episode
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known import recall
+        from shapechanger.remote.known_robots import recall
 
         console, failed = plain_console(), 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
@@ -60,3 +81,217 @@ class Fetch:
                     )
         if failed:
             sys.exit(1)
+
+
+_PART: Final = ".fetching"
+_LINES: Final = 1_000
+
+
+def episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSummary]:
+    """The episodes on a robot, oldest first.
+
+    Args:
+        robot: The robot.
+        wanted: Ids of those that are wanted; empty for all.
+
+    Raises:
+        UnknownName: If one is not there.
+        LinkError: If the robot does not answer.
+    """
+    found: list[EpisodeSummary] = []
+    more = True
+    while more:
+        page = robot.browse(found[-1].id if found else "")
+        found += page.episodes
+        more = page.more and bool(page.episodes)
+    found.reverse()
+    ids = [episode.id for episode in found]
+    for name in wanted:
+        if name not in ids:
+            raise UnknownName("episode", name, ids)
+    return [episode for episode in found if not wanted or episode.id in wanted]
+
+
+def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
+    """Bring one episode, or what is new of it.
+
+    Until it is all here it lies in a folder that no reader of recordings looks at.
+
+    Args:
+        robot: The robot.
+        name: Id of the episode.
+        data: Folder of the recording to put it into.
+
+    Returns:
+        How many lines came.
+
+    Raises:
+        DemosError: If what came is damaged, or what is here is not the beginning of it.
+        OutputError: If it cannot be written; what came before stays.
+        LinkError: If the robot does not answer, or refuses.
+    """
+    here, part = data / name, data / f".{name}{_PART}"
+    folder = here if is_episode(here) else part
+    try:
+        (folder / FRAMES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    fd = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
+    try:
+        have = _complete_lines(folder, fd)
+        begin = len(have)
+        piece = robot.fetch(name, max(begin - 1, 0), _LINES)
+        if piece.total < begin or (have and not _goes_on(piece, have[-1])):
+            raise DemosError(
+                f"{folder} is not the beginning of what the robot has: it was changed here. Move "
+                "it away, and fetch it again."
+            )
+        written = max(begin - 1, 0)
+        while piece.lines:
+            lines = _checked(piece, folder)
+            write_all(fd, b"".join(lines[max(begin - piece.first, 0) :]))
+            written = piece.first + len(lines)
+            piece = robot.fetch(name, written, _LINES)
+        os.fsync(fd)
+        _write_header(folder, piece.header)
+        read_header(folder)
+        if folder is part:
+            part.rename(here)
+    except OSError as error:
+        if isinstance(error, ConnectionError):  # The link, and not the disk.
+            raise
+        raise cannot_write(folder, error) from error
+    finally:
+        os.close(fd)
+    return max(written - begin, 0)
+
+
+def _complete_lines(folder: Path, fd: int) -> list[bytes]:
+    """The lines that are here; one that was cut off while it came is taken away.
+
+    Raises:
+        DemosError: If a line of an episode that was here whole is cut off.
+    """
+    lines = split_lines((folder / STEPS).read_bytes())
+    if lines and not lines[-1].endswith(b"\n"):
+        if (folder / HEADER).is_file():
+            raise DemosError(f"{folder} is not whole: `shapechanger demos repair {folder}` first.")
+        os.ftruncate(fd, sum(map(len, lines[:-1])))
+        lines.pop()
+    return lines
+
+
+def _goes_on(piece: Piece, last: bytes) -> bool:
+    """Whether a piece begins with the last line that is here."""
+    return bool(piece.lines) and piece.lines[0].encode() + b"\n" == last
+
+
+def _checked(piece: Piece, folder: Path) -> list[bytes]:
+    """The lines of a piece, each whole and with its picture on the disk.
+
+    Raises:
+        DemosError: If one is not, or what came is no part of an episode.
+        OSError: If a picture cannot be written.
+    """
+    lines = [line.encode() + b"\n" for line in piece.lines]
+    if len(piece.frames) != len(lines):
+        raise DemosError(f"The robot sent {len(piece.frames)} pictures for {len(lines)} lines.")
+    for number, (line, jpeg) in enumerate(zip(lines, piece.frames, strict=True), piece.first + 1):
+        try:
+            fields = decode_line(line)
+            step = Step.from_json(fields) if fields.get("kind") == "step" else None
+        except ValueError as error:
+            raise DemosError(
+                f"Line {number} of {piece.episode} is damaged on the robot, because {error}; "
+                "repair it there."
+            ) from error
+        if step is not None and step.frame:
+            _keep_picture(folder / FRAMES, step, jpeg)
+    return lines
+
+
+def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
+    """Write the picture of a step, unless it is here.
+
+    Raises:
+        DemosError: If it is not the one that the step names.
+        OSError: If it cannot be written.
+    """
+    # What a robot says must not write anywhere else.
+    if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
+        raise DemosError(f"A step names the picture {step.frame!r}.")
+    file = frames / step.frame
+    if jpeg is None:
+        is_here = file.is_file() and file.stat().st_size == step.frame_bytes
+    else:
+        is_here = len(jpeg) == step.frame_bytes and binascii.crc32(jpeg) == step.frame_crc
+    if not is_here:
+        raise DemosError(f"The picture {step.frame} of step {step.index} is damaged on the robot.")
+    if jpeg is not None:
+        with contextlib.suppress(FileNotFoundError):
+            if file.stat().st_size == len(jpeg) and file.read_bytes() == jpeg:
+                return
+        file.write_bytes(jpeg)
+
+
+def _write_header(folder: Path, text: str) -> None:
+    """Write the header as it is on the robot, whole or not at all."""
+    part = folder / f".{HEADER}.part"
+    part.write_bytes(text.encode())
+    part.replace(folder / HEADER)
+
+
+# s. A memory card may take so long for the last steps.
+_CLOSED_WITHIN_S: Final = 10.0
+_LOOK_EVERY_S: Final = 0.1
+
+
+@contextlib.contextmanager
+def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None]:
+    """Record on the robot until the end of the block.
+
+    What was recorded stays on the robot, whatever happens here; where the block fails it is said
+    how to bring it.
+
+    Args:
+        robot: The robot, connected to as a person.
+        name: What it is known as here.
+        data: Where to bring it; None for not to record.
+
+    Raises:
+        RobotRefused: If the robot does not record.
+        DemosError: If what came is damaged.
+        OutputError: If it cannot be written here.
+    """
+    if data is None:
+        yield
+        return
+
+    before = {episode.id for episode in episodes_there(robot, ())}
+    robot.record(on=True)
+    try:
+        yield
+        state = robot.recorder
+        if state is not None and state.recording:
+            robot.record(on=False)
+        console = plain_console()
+        for episode in _closed(robot, before):
+            fetch_episode(robot, episode.id, data)
+            console.print(f"recorded {episode.kept} steps in {data / episode.id}", soft_wrap=True)
+    except BaseException:
+        plain_console(stderr=True).print(
+            f"What was recorded is on the robot: `shapechanger robot fetch {name} --out {data}` "
+            "brings it.",
+            soft_wrap=True,
+        )
+        raise
+
+
+def _closed(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
+    """The new episodes, once the robot has written their last steps, or does not in time."""
+    until_s = time.monotonic() + _CLOSED_WITHIN_S
+    while True:
+        new = [episode for episode in episodes_there(robot, ()) if episode.id not in before]
+        if all(episode.closed for episode in new) or time.monotonic() > until_s:
+            return new
+        time.sleep(_LOOK_EVERY_S)

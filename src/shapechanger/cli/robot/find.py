@@ -29,7 +29,7 @@ class Find:
     def run(self) -> None:
         """Print a table, with the names under which robots are known here."""
         from shapechanger.link.messages import VERSION
-        from shapechanger.remote.discover import find
+        from shapechanger.remote.discovery import find
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
@@ -64,7 +64,7 @@ class Remember:
 
     def run(self) -> None:
         """Ask for the key, which does not belong on a command line, and write it all down."""
-        from shapechanger.remote.known import KnownRobot, remember
+        from shapechanger.remote.known_robots import KnownRobot, remember
 
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
@@ -80,14 +80,14 @@ class Forget:
 
     def run(self) -> None:
         """Remove its file."""
-        from shapechanger.remote.known import forget
+        from shapechanger.remote.known_robots import forget
 
         forget(self.name)
 
 
 def _known_here() -> dict[str, str]:
     """The names of the robots that are known here, by fingerprint; a broken file is skipped."""
-    from shapechanger.remote.known import known_names, recall
+    from shapechanger.remote.known_robots import known_names, recall
 
     known: dict[str, str] = {}
     for name in known_names():

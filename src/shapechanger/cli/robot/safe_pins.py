@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.setup.doctor import uses_pins
 
-__all__ = ["SafePins"]
+__all__ = ["SafePins", "require_pins"]
 
 
 @dataclass(frozen=True)
@@ -22,8 +25,7 @@ class SafePins:
 
     def run(self) -> None:
         """Do it, and say what could not be done."""
-        from shapechanger.cli.robot.pins_here import require_pins
-        from shapechanger.robot.guard.safe_pins import make_safe
+        from shapechanger.robot.guard.outputs import make_safe
         from shapechanger.robot.hardware import REAL, connect
         from shapechanger.robot.profile.load import find_profile, load_profile
 
@@ -39,3 +41,20 @@ class SafePins:
                 "Not everything is at rest: take the battery off. " + " ".join(failures)
             )
         plain_console().print(f"All {len(plan.outputs)} outputs of {plan.name} are at rest.")
+
+
+def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
+    """Refuse a machine without pins, before anything starts that would fail again and again.
+
+    Args:
+        plan: The robot.
+        root: Root of the file system, for tests.
+
+    Raises:
+        RobotError: If an output needs a pin and there is none.
+    """
+    if any(map(uses_pins, plan.outputs)) and not any((root / "dev").glob("gpiochip*")):
+        raise RobotError(
+            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
+            "`shapechanger robot serve --twin` runs it on simulated ones."
+        )

@@ -30,7 +30,7 @@ class Stop:
     def run(self) -> None:
         """Stop it and say what happened; exits with 1 where the robot did not confirm it."""
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known import recall
+        from shapechanger.remote.known_robots import recall
 
         known = recall(self.robot)
         try:

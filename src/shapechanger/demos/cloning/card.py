@@ -7,12 +7,11 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
-from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Layout
 
-__all__ = ["FORMATS", "Card", "Head"]
+__all__ = ["FORMATS", "CloneCard", "Head"]
 
 FORMATS: Final = (1, 2)
 """Versions of the file that are read: the first holds steering and throttle from a picture only."""
@@ -25,7 +24,7 @@ _MOST_MEMBERS: Final = 32
 _STEERS: Final = ("steering", "throttle")
 
 
-class Card(msgspec.Struct, frozen=True, kw_only=True):
+class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     """Where a policy comes from.
 
     Attributes:

@@ -10,18 +10,32 @@ from typing import TYPE_CHECKING, Final, Literal, cast
 
 import msgspec
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
 
-from shapechanger.demos.cloning.card import Card
-from shapechanger.demos.cloning.demonstrations import Examples
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.goal import AskedHead, Goal, goal_of
-from shapechanger.demos.cloning.mirror import Mirror, mirror_of
-from shapechanger.demos.cloning.pictures import Framing, prepare
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.demonstrations import Examples, Mirror, mirror_of, stretch
+from shapechanger.demos.cloning.judge import AskedHead, Goal, goal_of
+from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
-from shapechanger.demos.cloning.split import stretch
 from shapechanger.errors import MissingExtra
+
+if TYPE_CHECKING:
+    from shapechanger.demos.dataset import Dataset
+
+__all__ = [
+    "DEMOS",
+    "MANY",
+    "Inputs",
+    "MemberCheck",
+    "Training",
+    "best_temperature",
+    "learn",
+    "settings_for",
+]
 
 try:
     import torch
@@ -29,17 +43,11 @@ try:
     from torch.nn import functional
 
     from shapechanger.demos.cloning.batches import Batch, Batches
-    from shapechanger.demos.cloning.fit import fit
     from shapechanger.demos.cloning.network import CameraNetwork, joined
-    from shapechanger.demos.cloning.temperature import best_temperature
-    from shapechanger.demos.cloning.train import HUBER_BETA
+    from shapechanger.demos.cloning.train import HUBER_BETA, fit
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-if TYPE_CHECKING:
-    from shapechanger.demos.dataset import Dataset
-
-__all__ = ["DEMOS", "MANY", "Inputs", "MemberCheck", "Training", "learn", "settings_for"]
 
 Inputs = Literal["auto", "picture", "state", "both"]
 """What a policy perceives: "auto" takes pictures where there are any, and states elsewhere."""
@@ -269,9 +277,9 @@ def _card(
     sees: bool,
     feels: bool,
     unseen: tuple[str, ...],
-) -> Card:
+) -> CloneCard:
     """The card of one member."""
-    return Card(
+    return CloneCard(
         framing=settings.framing,
         channels=settings.channels,
         features=settings.features,
@@ -291,7 +299,7 @@ def _card(
 
 def _one(
     shown: Examples,
-    card: Card,
+    card: CloneCard,
     goal: Goal,
     settings: CloneSettings,
     seed: int,
@@ -337,7 +345,7 @@ def _one(
     return policy.network, checks, checks[best].step, left_out
 
 
-def _outputs(network: CameraNetwork, card: Card, exam: Examples) -> Tensor:
+def _outputs(network: CameraNetwork, card: CloneCard, exam: Examples) -> Tensor:
     """What comes out of a network, shape (n, outputs)."""
     policy = CameraPolicy(network, card)
     found = torch.as_tensor(policy.features(exam.pictures, exam.states))
@@ -384,3 +392,24 @@ def _calibrate(network: CameraNetwork, sure: list[tuple[Tensor, Tensor]]) -> Non
     with torch.no_grad():
         network.hands.weight.div_(temperature)
         network.hands.bias.div_(temperature)
+
+
+# From twice as sure as the network was to a fifth.
+_TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)
+_FEWEST: Final = 20
+
+
+def best_temperature(logits: Tensor, wanted: Tensor) -> float:
+    """The temperature at which what was not learned from is the least surprise.
+
+    Args:
+        logits: Shape (n, classes).
+        wanted: Numbers of the classes, shape (n,).
+
+    Returns:
+        1 where fewer than 20 steps say anything.
+    """
+    if len(wanted) < _FEWEST:
+        return 1.0
+    losses = [float(functional.cross_entropy(logits / t, wanted)) for t in _TEMPERATURES]
+    return float(_TEMPERATURES[int(torch.tensor(losses).argmin())])

@@ -2,23 +2,93 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, cast
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
-from shapechanger.demos.cloning.card import Card
-from shapechanger.demos.cloning.edges import EdgeEyes
+from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CHANNELS, Framing
 
-__all__ = ["ACTIONS", "CameraNetwork", "Eyes", "Nerves", "joined"]
+__all__ = [
+    "ACTIONS",
+    "DIRECTIONS",
+    "CameraNetwork",
+    "EdgeEyes",
+    "Eyes",
+    "Nerves",
+    "edges",
+    "joined",
+]
+
+DIRECTIONS: Final = 6
+"""Directions of edges that are told apart, over half a turn: 30 degrees each."""
+
+# Pixels of a cell, along each side.
+_CELL: Final = 4
+# Added before the logarithm, as a share of full brightness: about a camera's noise in the dark.
+_DARK: Final = 8.0 / 255.0
+# Keeps an even picture from being blown up: the mean strength of an edge that is noise.
+_EVEN: Final = 1e-4
+
+
+class EdgeEyes(nn.Module):
+    """From a picture to features, by way of its edges.
+
+    Args:
+        framing: Size of the pictures.
+        channels: Filters of each layer that follows the edges; each halves rows and columns.
+        features: How many features.
+    """
+
+    def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
+        super().__init__()
+        height, width = max(framing.height // _CELL, 1), max(framing.width // _CELL, 1)
+        self._cells = height, width
+        layers: list[nn.Module] = []
+        before = DIRECTIONS
+        for after in channels:
+            layers += [nn.Conv2d(before, after, 3, stride=2, padding=1), nn.ReLU()]
+            height, width, before = (height + 1) // 2, (width + 1) // 2, after
+        self.filters = nn.Sequential(*layers)
+        self.boiled_down = nn.Linear(before * height * width, features)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """Features, shape (n, features), of pictures in [0, 1], shape (n, 3, height, width)."""
+        found = self.filters(edges(pictures, self._cells) - 1.0)
+        return torch.relu(self.boiled_down(found.flatten(1)))
+
+
+def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
+    """How strong the edges of each direction are in each cell, 1 where they are as in the mean.
+
+    Args:
+        pictures: In [0, 1], shape (n, 3, height, width).
+        cells: Rows and columns of cells.
+
+    Returns:
+        At least 0, shape (n, DIRECTIONS, rows, columns).
+    """
+    light = torch.log(pictures.mean(dim=1, keepdim=True) + _DARK)
+    across = functional.pad(light[..., 2:] - light[..., :-2], (1, 1, 0, 0))
+    down = functional.pad(light[..., 2:, :] - light[..., :-2, :], (0, 0, 1, 1))
+    strength = torch.hypot(across, down)
+    # A direction and its opposite are the same edge, seen from the other side.
+    turn = torch.remainder(torch.atan2(down, across), math.pi) * (DIRECTIONS / math.pi)
+    apart = (turn - torch.arange(DIRECTIONS, device=turn.device).view(1, -1, 1, 1)).abs()
+    share = (1.0 - torch.minimum(apart, DIRECTIONS - apart)).clamp(min=0.0)
+    pooled = functional.adaptive_avg_pool2d(strength * share, cells)
+    return torch.sqrt(pooled / (pooled.mean(dim=(1, 2, 3), keepdim=True) + _EVEN))
+
 
 ACTIONS: Final = 2
 """Steering and throttle."""
 
 # Keeps an even picture, such as a covered lens, from being blown up into its own noise: about the
 # noise of a camera, as a share of full brightness.
-_EVEN: Final = 0.02
+_NETWORK_EVEN: Final = 0.02
 # A number of a state that lies farther out, in standard deviations, says no more than this.
 _FARTHEST: Final = 5.0
 
@@ -54,7 +124,7 @@ class Eyes(nn.Module):
         # three dimensions.
         rows = pictures.permute(0, 2, 3, 1).flatten(1)
         spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
-        found = self.filters((pictures - mean) / (spread + _EVEN))
+        found = self.filters((pictures - mean) / (spread + _NETWORK_EVEN))
         return torch.relu(self.boiled_down(found.flatten(1)))
 
 
@@ -103,7 +173,7 @@ class CameraNetwork(nn.Module):
         card: What the policy is like.
     """
 
-    def __init__(self, card: Card) -> None:
+    def __init__(self, card: CloneCard) -> None:
         super().__init__()
         eyes = [_eyes(card) for _ in range(card.members if card.eyes != "none" else 0)]
         nerves = [
@@ -135,7 +205,7 @@ class CameraNetwork(nn.Module):
         return self.hands(self.perceive(pictures, states))
 
 
-def joined(card: Card, members: list[CameraNetwork]) -> CameraNetwork:
+def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
     """One network whose output is the mean of the outputs of several.
 
     Args:
@@ -160,7 +230,7 @@ def joined(card: Card, members: list[CameraNetwork]) -> CameraNetwork:
     return network
 
 
-def _eyes(card: Card) -> nn.Module:
+def _eyes(card: CloneCard) -> nn.Module:
     if card.eyes == "edges":
         return EdgeEyes(card.framing, card.channels, card.features)
     return Eyes(card.framing, card.channels, card.features)

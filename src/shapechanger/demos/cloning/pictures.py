@@ -8,9 +8,18 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.errors import ShapechangerError
 
-__all__ = ["CHANNELS", "Framing", "area_shares", "prepare"]
+__all__ = ["CHANNELS", "CloningError", "Framing", "PolicyError", "area_shares", "prepare"]
+
+
+class CloningError(ShapechangerError, ValueError):
+    """Pictures, actions or settings that nothing can be learned from."""
+
+
+class PolicyError(ShapechangerError, ValueError):
+    """A file that holds no policy, or a policy that does not fit the env it is to act in."""
+
 
 CHANNELS: Final = 3
 """Red, green and blue."""

@@ -18,9 +18,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import FORMATS, Card
-from shapechanger.demos.cloning.errors import CloningError, PolicyError
-from shapechanger.demos.cloning.pictures import prepare
+from shapechanger.demos.cloning.card import FORMATS, CloneCard
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, OutputError
 
@@ -28,12 +27,12 @@ try:
     import torch
     from torch import Tensor
 
-    from shapechanger.demos.cloning.augment import plain
+    from shapechanger.demos.cloning.batches import plain
     from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["WEIGHTS", "CameraPolicy", "Card"]
+__all__ = ["WEIGHTS", "CameraPolicy", "CloneCard"]
 
 _CARD: Final = "card.json"
 WEIGHTS: Final = "weights.pt"
@@ -66,7 +65,7 @@ class CameraPolicy:
         card: Where it comes from.
     """
 
-    def __init__(self, network: CameraNetwork, card: Card) -> None:
+    def __init__(self, network: CameraNetwork, card: CloneCard) -> None:
         self.network = network.eval()
         self.card = card
 
@@ -74,7 +73,7 @@ class CameraPolicy:
     def fresh(cls, settings: CloneSettings, seed: int) -> CameraPolicy:
         """A policy for steering and throttle from a picture that has learned nothing."""
         return cls.blank(
-            Card(
+            CloneCard(
                 framing=settings.framing,
                 channels=settings.channels,
                 features=settings.features,
@@ -85,7 +84,7 @@ class CameraPolicy:
         )
 
     @classmethod
-    def blank(cls, card: Card, seed: int) -> CameraPolicy:
+    def blank(cls, card: CloneCard, seed: int) -> CameraPolicy:
         """The policy that a card describes, before it has learned anything."""
         with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
             torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
@@ -253,7 +252,7 @@ class CameraPolicy:
         """
         try:
             with zipfile.ZipFile(path) as archive:
-                card = msgspec.json.decode(_entry(archive, _CARD), type=Card)
+                card = msgspec.json.decode(_entry(archive, _CARD), type=CloneCard)
                 weights = _entry(archive, WEIGHTS)
             _require_format(card)
             return cls(_network(card, weights), card)
@@ -274,7 +273,7 @@ def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
     return archive.read(name)
 
 
-def _require_format(card: Card) -> None:
+def _require_format(card: CloneCard) -> None:
     if card.format not in FORMATS:
         raise ValueError(
             f"it has format {card.format} of Shapechanger {card.version}; this one reads "
@@ -282,7 +281,7 @@ def _require_format(card: Card) -> None:
         )
 
 
-def _network(card: Card, weights: bytes) -> CameraNetwork:
+def _network(card: CloneCard, weights: bytes) -> CameraNetwork:
     """The network that a card describes, with these weights."""
     if not zipfile.is_zipfile(io.BytesIO(weights)):  # Torch would try older formats, and warn.
         raise ValueError("its weights are cut off or something else.")

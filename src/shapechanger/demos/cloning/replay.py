@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.errors import CloningError
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.errors import MissingExtra
 
 try:

@@ -6,8 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from shapechanger.demos.cloning.errors import CloningError
-from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.pictures import CloningError, Framing
 
 __all__ = ["Augmentation", "CloneSettings"]
 

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, TypeVar
 
 import msgspec
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
+from shapechanger.demos.cloning.batches import Batch, Batches
 from shapechanger.demos.cloning.demonstrations import Examples, held_out, steering_examples
+from shapechanger.demos.cloning.network import CameraNetwork
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra
+
+__all__ = ["HUBER_BETA", "History", "Judged", "ValidationScore", "clone", "fit"]
 
 try:
     import torch
@@ -23,12 +30,10 @@ try:
     from torch.nn import functional
 
     from shapechanger.demos.cloning.batches import Batch, Batches
-    from shapechanger.demos.cloning.fit import fit
     from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["HUBER_BETA", "Check", "History", "clone"]
 
 # Where the loss turns from a square into a straight line: an error of a tenth of the steering's
 # range is a mistake, and one mistake of the driver should not count as much as ten small ones.
@@ -36,7 +41,7 @@ HUBER_BETA: Final = 0.1
 _MOST_CERTAIN: Final = 0.95
 
 
-class Check(msgspec.Struct, frozen=True):
+class ValidationScore(msgspec.Struct, frozen=True):
     """How good the policy was at some step.
 
     Attributes:
@@ -72,8 +77,8 @@ class History:
         seconds: How long it took.
     """
 
-    checks: tuple[Check, ...]
-    best: Check
+    checks: tuple[ValidationScore, ...]
+    best: ValidationScore
     steps: int
     learned: int
     held_out: int
@@ -90,7 +95,7 @@ def clone(
     episodes: Sequence[int] = (),
     start: CameraPolicy | None = None,
     rehearsal: tuple[NDArray[np.uint8], NDArray[np.floating]] | None = None,
-    on_check: Callable[[Check], None] = lambda check: None,
+    on_check: Callable[[ValidationScore], None] = lambda check: None,
 ) -> tuple[CameraPolicy, History]:
     """Learn to do on seeing a picture what a driver did.
 
@@ -135,7 +140,7 @@ def clone(
         errors = functional.smooth_l1_loss(done, batch.targets, reduction="none", beta=HUBER_BETA)
         return (errors * weights).mean()
 
-    def judge(network: CameraNetwork, step: int, loss: float) -> Check:
+    def judge(network: CameraNetwork, step: int, loss: float) -> ValidationScore:
         return _check(CameraPolicy(network, policy.card), exam, step, loss)
 
     checks, place, taken = fit(policy.network, batches, loss, judge, settings, rate, on_check)
@@ -164,8 +169,8 @@ def _begin_with(policy: CameraPolicy, mean: NDArray[np.float32]) -> None:
         policy.network.hands.bias.copy_(torch.atanh(certain))
 
 
-def _check(policy: CameraPolicy, exam: Examples, step: int, loss: float) -> Check:
-    return Check(step, loss, *_errors(policy.predict_many(exam.pictures), exam.targets))
+def _check(policy: CameraPolicy, exam: Examples, step: int, loss: float) -> ValidationScore:
+    return ValidationScore(step, loss, *_errors(policy.predict_many(exam.pictures), exam.targets))
 
 
 def _errors(done: NDArray[np.floating], wanted: NDArray[np.float32]) -> tuple[float, float]:
@@ -174,3 +179,98 @@ def _errors(done: NDArray[np.floating], wanted: NDArray[np.float32]) -> tuple[fl
         return math.nan, math.nan
     steering, throttle = np.abs(done - wanted).mean(axis=0).tolist()
     return steering, throttle
+
+
+_LARGEST_GRADIENT: Final = 1.0
+# Early steps are averaged over fewer of them: this many more at least than there have been.
+_AVERAGE_FROM: Final = 10.0
+
+
+class Judged(Protocol):
+    """How good a network is at some step."""
+
+    @property
+    def error(self) -> float:
+        """The smaller the better; NaN where nothing can be said."""
+        ...
+
+
+_Check = TypeVar("_Check", bound=Judged)
+
+
+def fit(
+    network: CameraNetwork,
+    batches: Batches,
+    loss: Callable[[CameraNetwork, Batch], Tensor],
+    judge: Callable[[CameraNetwork, int, float], _Check],
+    settings: CloneSettings,
+    rate: float,
+    on_check: Callable[[_Check], None],
+) -> tuple[list[_Check], int, int]:
+    """Train a network in place, and leave it as it was at its best.
+
+    Args:
+        network: What learns.
+        batches: What it learns from.
+        loss: What is made small.
+        judge: Says how good a network is, given the step and the mean loss since the last time.
+        settings: How many steps, how often to judge, when to give up.
+        rate: Largest learning rate.
+        on_check: Called with each judgement as soon as it is there.
+
+    Returns:
+        The judgements in order, the place of the best one, and the steps that were taken.
+    """
+    optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
+    total = settings.steps(batches.size)
+    every = max(total // settings.checks, 1)
+    # What is judged and kept: the network itself, or the average of what it was.
+    kept = copy.deepcopy(network) if settings.averaging else network
+
+    checks = [judge(kept.eval(), 0, math.nan)]
+    on_check(checks[0])
+    best, best_state = 0, _copied(kept)
+    losses: list[float] = []
+    step = worse = 0
+    while step < total and worse < settings.patience:
+        for group in optimizer.param_groups:
+            group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
+        network.train()
+        now = loss(network, batches.draw())
+        optimizer.zero_grad()
+        now.backward()  # pyright: ignore[reportUnknownMemberType]
+        torch.nn.utils.clip_grad_norm_(network.parameters(), _LARGEST_GRADIENT)
+        optimizer.step()  # pyright: ignore[reportUnknownMemberType]
+        losses.append(now.item())
+        step += 1
+        if settings.averaging:
+            _average(kept, network, min(settings.averaging, step / (step + _AVERAGE_FROM)))
+        if step % every and step < total:
+            continue
+        check = judge(kept.eval(), step, sum(losses) / len(losses))
+        on_check(check)
+        checks.append(check)
+        losses.clear()
+        worse += 1
+        if not check.error >= checks[best].error:  # Without held-out data the last is the best.
+            best, worse, best_state = len(checks) - 1, 0, _copied(kept)
+    network.load_state_dict(best_state)
+    network.eval()
+    return checks, best, step
+
+
+def _average(average: CameraNetwork, network: CameraNetwork, share: float) -> None:
+    """Take in the newest weights, and keep a share of what was there."""
+    with torch.no_grad():
+        for old, new in zip(average.parameters(), network.parameters(), strict=True):
+            old.lerp_(new, 1.0 - share)
+
+
+def _share_of_rate(step: int, total: int, warm_up: int) -> float:
+    """Up along a line, down along half a cosine."""
+    rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
+    return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
+
+
+def _copied(network: CameraNetwork) -> dict[str, Tensor]:
+    return {name: value.clone() for name, value in network.state_dict().items()}

@@ -17,11 +17,18 @@ that is needed, because robots record, too.
 
 from __future__ import annotations
 
-from shapechanger.demos.episodes.edits import drop, keep, mark
-from shapechanger.demos.episodes.header import EpisodeHeader
-from shapechanger.demos.episodes.reader import Episode, Mark, episodes_of, read_episode
-from shapechanger.demos.episodes.repair import Repair, repair
-from shapechanger.demos.episodes.step import DRIVERS, Driver, Step
+from shapechanger.demos.episodes.reader import (
+    Episode,
+    EpisodeMark,
+    Repair,
+    drop,
+    episodes_of,
+    keep,
+    mark,
+    read_episode,
+    repair,
+)
+from shapechanger.demos.episodes.records import DRIVERS, Driver, EpisodeHeader, Step
 from shapechanger.demos.episodes.writer import EpisodeWriter
 
 __all__ = [
@@ -29,8 +36,8 @@ __all__ = [
     "Driver",
     "Episode",
     "EpisodeHeader",
+    "EpisodeMark",
     "EpisodeWriter",
-    "Mark",
     "Repair",
     "Step",
     "drop",

@@ -4,22 +4,131 @@ from __future__ import annotations
 
 import binascii
 import json
+import os
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
-from shapechanger.demos.episodes.files import FRAMES, HEADER, is_episode
-from shapechanger.demos.episodes.header import EpisodeHeader
-from shapechanger.demos.episodes.scan import Line, scan
-from shapechanger.demos.episodes.step import Step
+from shapechanger.demos.episodes.files import (
+    FRAMES,
+    HEADER,
+    LOST,
+    STEPS,
+    cannot_write,
+    is_episode,
+    lock,
+    write_all,
+    write_header,
+)
+from shapechanger.demos.episodes.records import (
+    EpisodeHeader,
+    Step,
+    decode_line,
+    encode_line,
+    split_lines,
+)
 from shapechanger.errors import BrokenEpisode, DemosError
 
-__all__ = ["Drop", "Episode", "Mark", "episodes_of", "read_episode", "read_header"]
+__all__ = [
+    "CUT_OFF",
+    "Drop",
+    "Episode",
+    "EpisodeMark",
+    "Repair",
+    "StepLine",
+    "drop",
+    "episodes_of",
+    "keep",
+    "mark",
+    "read_episode",
+    "read_header",
+    "repair",
+    "scan",
+]
+
+# A name that leads nowhere else.
+_FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class StepLine:
+    """One line of the file of steps.
+
+    Attributes:
+        raw: Its bytes.
+        fields: What it says; nothing if it is not whole.
+        step: The step, if it is one.
+        wrong: Why it does not count, in words; "" if it does.
+    """
+
+    raw: bytes
+    fields: dict[str, Any]
+    step: Step | None
+    wrong: str
+
+
+def scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
+    """Look at every line, and at the picture that it names.
+
+    Args:
+        path: Folder of the episode.
+        header: Its header.
+        thorough: Whether to read each picture, and not only look at its size.
+
+    Raises:
+        DemosError: If the file cannot be read.
+    """
+    try:
+        content = (path / STEPS).read_bytes()
+    except OSError as error:
+        raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
+    sizes = header.action_size, header.state_size
+    lines: list[StepLine] = []
+    seen: dict[tuple[str, int, int], str] = {}
+    newest = -1
+    for raw in split_lines(content):
+        try:
+            fields = decode_line(raw)
+            step = Step.from_json(fields) if fields.get("kind") == "step" else None
+        except ValueError as error:
+            lines.append(StepLine(raw, {}, None, str(error)))
+            continue
+        wrong = ""
+        if step is not None:
+            wrong = step.refusal(*sizes)
+            if not wrong and step.index <= newest:
+                wrong = f"it comes after step {newest}"
+            if not wrong and step.frame:
+                picture = (step.frame, step.frame_bytes, step.frame_crc)
+                if picture not in seen:
+                    seen[picture] = _wrong_with(path / FRAMES, step, thorough=thorough)
+                wrong = seen[picture]
+            newest = max(newest, step.index)
+        lines.append(StepLine(raw, fields, step, wrong))
+    return lines
+
+
+def _wrong_with(frames: Path, step: Step, *, thorough: bool) -> str:
+    """What is wrong with the picture of a step, in words; empty for nothing."""
+    if not _FRAME_NAME.fullmatch(step.frame):
+        return f"its picture is called {step.frame!r}"
+    try:
+        size = (frames / step.frame).stat().st_size
+        if size != step.frame_bytes:
+            return f"its picture {step.frame} has {size} bytes in place of {step.frame_bytes}"
+        if thorough and binascii.crc32((frames / step.frame).read_bytes()) != step.frame_crc:
+            return f"its picture {step.frame} was changed"
+    except FileNotFoundError:
+        return f"its picture {step.frame} is missing"
+    except OSError as error:
+        return f"its picture {step.frame} cannot be read ({error.strerror})"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeMark:
     """Something that somebody wanted to find again.
 
     Attributes:
@@ -65,7 +174,7 @@ class Episode:
     path: Path
     header: EpisodeHeader
     steps: tuple[Step, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[EpisodeMark, ...]
     drops: tuple[Drop, ...]
     closed: bool
     outcome: str
@@ -163,16 +272,16 @@ def episodes_of(data: Path) -> tuple[Path, ...]:
 
 
 def _put_together(
-    path: Path, header: EpisodeHeader, closed: dict[str, Any] | None, lines: list[Line]
+    path: Path, header: EpisodeHeader, closed: dict[str, Any] | None, lines: list[StepLine]
 ) -> Episode:
-    marks: list[Mark] = []
+    marks: list[EpisodeMark] = []
     drops: list[Drop] = []
     for line in lines:
         said = line.fields
         try:
             match said.get("kind"):
                 case "mark":
-                    marks.append(Mark(int(said["step"]), str(said.get("text", ""))))
+                    marks.append(EpisodeMark(int(said["step"]), str(said.get("text", ""))))
                 case "drop" | "keep":
                     first, last = int(said["first"]), int(said["last"])
                     drops.append(
@@ -197,3 +306,146 @@ def _broken(path: Path, why: str) -> BrokenEpisode:
     return BrokenEpisode(
         f"{path} is not whole: {why}. `shapechanger demos repair {path}` keeps every step that is."
     )
+
+
+CUT_OFF: Final = "cut off"
+"""Outcome of an episode that nobody closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """What was done.
+
+    Attributes:
+        kept: How many steps there are.
+        lost: Why each line that does not count any more does not, in words.
+        pictures: How many pictures belong to no step.
+        was_closed: Whether it had been closed.
+    """
+
+    kept: int
+    lost: tuple[str, ...]
+    pictures: int
+    was_closed: bool
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything was wrong."""
+        return bool(self.lost or self.pictures or not self.was_closed)
+
+
+def repair(path: Path) -> Repair:
+    """Keep every complete step of an episode, and close it.
+
+    What does not count is not deleted: lines and pictures are moved to the folder `lost`.
+
+    Args:
+        path: Folder of the episode.
+
+    Raises:
+        DemosError: If it is no episode, or is being recorded now.
+        OutputError: If it cannot be written to; it is as it was then.
+    """
+    header, closed = read_header(path)
+    fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
+    try:
+        lines = scan(path, header, thorough=True)
+        good = [line for line in lines if not line.wrong]
+        bad = [line for line in lines if line.wrong]
+        strays = _strays(path, good)
+        try:
+            if bad or strays:
+                (path / LOST).mkdir(exist_ok=True)
+            if bad:
+                _move_lines(path, good, bad)
+            for stray in strays:
+                stray.rename(_free_name(path / LOST, stray.name))
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        kept = sum(line.step is not None for line in good)
+        if closed is None:
+            ending = {"steps": kept, "outcome": CUT_OFF}
+            write_header(path, header.to_json() | {"closed": ending})
+    finally:
+        os.close(fd)
+    return Repair(kept, tuple(line.wrong for line in bad), len(strays), closed is not None)
+
+
+def _strays(path: Path, good: list[StepLine]) -> list[Path]:
+    """Pictures that no good step names."""
+    named = {line.step.frame for line in good if line.step is not None}
+    return sorted(p for p in (path / FRAMES).glob("*") if p.name not in named)
+
+
+def _move_lines(path: Path, good: list[StepLine], bad: list[StepLine]) -> None:
+    """Leave the good lines only; the bad ones are on the disk before they are taken out."""
+    _write(_free_name(path / LOST, STEPS), b"".join(line.raw for line in bad))
+    part = path / f".{STEPS}.part"
+    _write(part, b"".join(line.raw for line in good))
+    part.replace(path / STEPS)
+
+
+def _write(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _free_name(folder: Path, name: str) -> Path:
+    """A name in a folder that nothing has yet."""
+    stem, dot, ending = name.partition(".")
+    path, number = folder / name, 1
+    while path.exists():
+        number += 1
+        path = folder / f"{stem}-{number}{dot}{ending}"
+    return path
+
+
+def drop(path: Path, first: int, last: int, why: str) -> None:
+    """Let steps of an episode no longer count.
+
+    Args:
+        path: Folder of the episode.
+        first: Index of the first step.
+        last: Index of the last step, which is dropped, too.
+        why: Such as "cut" or "bad".
+
+    Raises:
+        DemosError: If there are no such steps, or the episode is being recorded.
+        BrokenEpisode: If it is not whole.
+        OutputError: If it cannot be written.
+    """
+    _append(path, {"kind": "drop", "first": first, "last": last, "why": why}, first, last)
+
+
+def keep(path: Path, first: int, last: int, why: str = "") -> None:
+    """Let steps of an episode count again; arguments and errors as those of `drop`."""
+    _append(path, {"kind": "keep", "first": first, "last": last, "why": why}, first, last)
+
+
+def mark(path: Path, step: int, text: str = "") -> None:
+    """Mark a step of an episode with a few words; errors as those of `drop`."""
+    _append(path, {"kind": "mark", "step": step, "text": text}, step, step)
+
+
+def _append(path: Path, fields: dict[str, Any], first: int, last: int) -> None:
+    episode = read_episode(path)
+    fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
+    try:
+        _require_steps(episode, first, last)
+        write_all(fd, encode_line(fields))
+    except OSError as error:
+        raise cannot_write(path / STEPS, error) from error
+    finally:
+        os.close(fd)
+
+
+def _require_steps(episode: Episode, first: int, last: int) -> None:
+    if not episode.steps:
+        raise DemosError(f"{episode.path} has no steps.")
+    least, most = episode.steps[0].index, episode.steps[-1].index
+    if not least <= first <= last <= most:
+        raise DemosError(
+            f"{episode.path} has the steps {least} to {most}, and not {first} to {last}."
+        )

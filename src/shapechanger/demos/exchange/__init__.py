@@ -12,9 +12,14 @@ What is read is never changed, and what is written appears whole or not at all.
 
 from __future__ import annotations
 
-from shapechanger.demos.exchange.exports import Exported, export_recording
+from shapechanger.demos.exchange.convert import (
+    Exported,
+    Imported,
+    export_recording,
+    import_episodes,
+    import_recording,
+)
 from shapechanger.demos.exchange.formats import FORMATS, Format, find_format
-from shapechanger.demos.exchange.imports import Imported, import_episodes, import_recording
 
 __all__ = [
     "FORMATS",

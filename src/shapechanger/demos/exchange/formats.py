@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Final, Literal
 
 from shapechanger.demos.episodes.files import is_episode
-from shapechanger.demos.exchange import csv_out, minari_files
-from shapechanger.demos.exchange.csv_in import tables_of
+from shapechanger.demos.exchange import csv_files as csv_out
+from shapechanger.demos.exchange import minari_format as minari_files
+from shapechanger.demos.exchange.csv_files import tables_of
 from shapechanger.demos.exchange.keys_2017 import LABELS
 from shapechanger.demos.exchange.places import cannot_read
-from shapechanger.demos.exchange.tub_files import MANIFEST, RECORD_NAME
+from shapechanger.demos.exchange.tub import MANIFEST, RECORD_NAME
 from shapechanger.errors import DemosError, UnknownName
 
 __all__ = ["FORMATS", "Format", "find_format", "require_format"]

@@ -2,17 +2,39 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.libraries import library
 from shapechanger.demos.exchange.places import cannot_read
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, MissingExtra
 
-__all__ = ["MAX_BYTES", "MAX_PIXELS", "Pictures", "decode", "encode", "is_grey", "size_of"]
+__all__ = [
+    "MAX_BYTES",
+    "MAX_PIXELS",
+    "Pictures",
+    "decode",
+    "encode",
+    "is_grey",
+    "library",
+    "size_of",
+]
+
+
+def library(name: str) -> Any:
+    """A module of h5py, Minari or simplejpeg.
+
+    Raises:
+        MissingExtra: If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtra(name.split(".")[0], "data") from error
+
 
 MAX_BYTES: Final = 16 << 20
 """Bytes of the largest JPEG that is read; as the writer of episodes."""

@@ -23,15 +23,14 @@ from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.envs.remote.finger_rig import RigSenses, StartApproach
+from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
-from shapechanger.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.tasks.finger import FingerSenses
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.robot import Operator, RunningRobot
 
 if TYPE_CHECKING:
-    from shapechanger.twin.running import RunningRobot
+    from shapechanger.twin.robot import RunningRobot
 
 __all__ = ["NOMINAL_TWIN", "RemoteFingerEnv", "serve_twin"]
 
@@ -54,7 +53,7 @@ def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
         RobotError: If it does not start.
     """
     from shapechanger.robot.profile.load import find_profile
-    from shapechanger.twin.running import run_robot
+    from shapechanger.twin.robot import run_robot
 
     if twin not in ("", NOMINAL_TWIN, *GAPS):
         raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))

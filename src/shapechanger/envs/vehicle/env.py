@@ -29,8 +29,7 @@ from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldErr
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.inbox import Received
-from shapechanger.remote.judge import Judge
-from shapechanger.remote.senses import Senses, View
+from shapechanger.remote.observations import RobotSpaces, StepScorer, View
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
@@ -182,11 +181,11 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         require_fit(vehicle, self.parts)
         self._robot = InProcessRobot(profile, self._world, pictures=image)
         welcome = self._robot.welcome
-        self._senses = Senses(welcome, (wide, high), image, state)
+        self._senses = RobotSpaces(welcome, (wide, high), image, state)
         self._puts_back = put_back
         ends = {"collision_ends_episode": 0.0} if put_back else {}
         weights = DriveReward.from_weights({**welcome.reward, **(reward or {}), **ends})
-        self._judge = Judge(self._senses, weights)
+        self._judge = StepScorer(self._senses, weights)
         self.observation_space = self._senses.observation_space
         self.action_space = self._senses.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.cameras.checked import check_jpeg
-from shapechanger.robot.cameras.pace import Pace
-from shapechanger.robot.cameras.turned import turned
+from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
+from shapechanger.robot.cameras.jpeg import check_jpeg, turned
 
 __all__ = ["Folder", "open_driver"]
 

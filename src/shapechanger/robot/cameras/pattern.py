@@ -2,16 +2,80 @@
 
 from __future__ import annotations
 
+import binascii
+from typing import Final
+
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.barcode import barcode_rows, draw_barcode
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.cameras.pace import Pace
+from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
 
-__all__ = ["Pattern", "open_driver"]
+__all__ = ["BARCODE_BITS", "Pattern", "barcode_rows", "draw_barcode", "open_driver", "read_barcode"]
+
+BARCODE_BITS: Final = 48
+"""Bits of the number. In nanoseconds they count 78 hours, and then start again."""
+
+_BYTES: Final = BARCODE_BITS // 8
+_COLUMNS: Final = 32
+_ROWS: Final = 2
+_LEAST_WIDTH: Final = 96  # Pixels: a cell of 3 by 4 is the smallest that JPEG leaves readable.
+_LEAST_CELL_HEIGHT: Final = 4  # Pixels: two rows are then one row of JPEG's blocks of 8.
+
+# Black or white pictures are no barcode: the check does not start with 0.
+_CHECK_START: Final = 0xFFFF
+
+
+def barcode_rows(width: int) -> int:
+    """How many rows of pixels a barcode takes in a picture of this width."""
+    return _ROWS * max(_LEAST_CELL_HEIGHT, width // 40)
+
+
+def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
+    """Draw the lowest 48 bits of a number over the first rows of a picture.
+
+    Args:
+        image: The picture, shape (height, width, 3), at least 96 pixels wide. It is changed.
+        number: At least 0.
+
+    Raises:
+        ValueError: If the picture is too small, or the number is negative.
+    """
+    height, width = image.shape[:2]
+    rows = barcode_rows(width)
+    if width < _LEAST_WIDTH or height < rows or number < 0:
+        raise ValueError(
+            f"A barcode needs a number of at least 0, not {number}, and a picture of at least "
+            f"{_LEAST_WIDTH} by {rows} pixels, not {width} by {height}."
+        )
+    data = (number % 2**BARCODE_BITS).to_bytes(_BYTES, "big")
+    data += binascii.crc_hqx(data, _CHECK_START).to_bytes(2, "big")
+    cells = np.unpackbits(np.frombuffer(data, np.uint8)).reshape(_ROWS, _COLUMNS) * np.uint8(255)
+    cell_height, cell_width = rows // _ROWS, width // _COLUMNS
+    drawn = cells.repeat(cell_height, axis=0).repeat(cell_width, axis=1)
+    image[:rows, : drawn.shape[1]] = drawn[..., np.newaxis]
+
+
+def read_barcode(image: NDArray[np.uint8]) -> int | None:
+    """The number that `draw_barcode` drew; None where there is none.
+
+    Args:
+        image: The picture, shape (height, width, 3).
+    """
+    height, width = image.shape[:2]
+    rows = barcode_rows(width)
+    if width < _LEAST_WIDTH or height < rows:
+        return None
+    cell_height, cell_width = rows // _ROWS, width // _COLUMNS
+    cells = image[:rows, : _COLUMNS * cell_width].reshape(
+        _ROWS, cell_height, _COLUMNS, cell_width, -1
+    )
+    bits = cells.mean(axis=(1, 3, 4)) > 127.5  # (2, 32)
+    data = np.packbits(bits).tobytes()
+    if binascii.crc_hqx(data[:_BYTES], _CHECK_START) != int.from_bytes(data[_BYTES:], "big"):
+        return None
+    return int.from_bytes(data[:_BYTES], "big")
 
 
 class Pattern:

@@ -16,11 +16,8 @@ import time
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.cameras.checked import check_jpeg
-from shapechanger.robot.cameras.interruption import Interruption
-from shapechanger.robot.cameras.jpeg_stream import JpegSplitter, captured_ns_of
-from shapechanger.robot.cameras.turned import turned
+from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
+from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, check_jpeg, turned
 
 __all__ = ["Pipe", "open_driver"]
 

@@ -11,16 +11,130 @@ import os
 import struct
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras import v4l2_api as api
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.cameras.checked import check_jpeg
-from shapechanger.robot.cameras.interruption import Interruption
-from shapechanger.robot.cameras.turned import turned
+from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
+from shapechanger.robot.cameras.jpeg import check_jpeg, turned
 
-__all__ = ["V4l2", "open_driver"]
+__all__ = [
+    "BUFFER_FLAG_ERROR",
+    "BUFFER_FLAG_MONOTONIC",
+    "BUFFER_FLAG_TIMESTAMP_MASK",
+    "CAPTURE",
+    "DEQUEUE",
+    "MJPEG",
+    "QUERY_BUFFER",
+    "QUEUE",
+    "REQUEST_BUFFERS",
+    "SET_FORMAT",
+    "SET_PARAMETERS",
+    "STREAM_OFF",
+    "STREAM_ON",
+    "Buffer",
+    "V4l2",
+    "frame_rate",
+    "image_size",
+    "open_driver",
+    "pixel_format",
+    "request",
+]
+
+SET_FORMAT: Final = 0xC0D05605  # VIDIOC_S_FMT
+SET_PARAMETERS: Final = 0xC0CC5616  # VIDIOC_S_PARM
+REQUEST_BUFFERS: Final = 0xC0145608  # VIDIOC_REQBUFS
+QUERY_BUFFER: Final = 0xC0585609  # VIDIOC_QUERYBUF
+QUEUE: Final = 0xC058560F  # VIDIOC_QBUF
+DEQUEUE: Final = 0xC0585611  # VIDIOC_DQBUF
+STREAM_ON: Final = 0x40045612  # VIDIOC_STREAMON
+STREAM_OFF: Final = 0x40045613  # VIDIOC_STREAMOFF
+
+CAPTURE: Final = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
+MJPEG: Final = 0x47504A4D  # V4L2_PIX_FMT_MJPEG
+BUFFER_FLAG_ERROR: Final = 0x40
+BUFFER_FLAG_TIMESTAMP_MASK: Final = 0xE000
+BUFFER_FLAG_MONOTONIC: Final = 0x2000
+
+_MEMORY_MMAP: Final = 1
+_FIELD_NONE: Final = 1
+_BUFFER: Final = struct.Struct("=IIIII4xqq16xIIQIIi4x")  # struct v4l2_buffer, 88 bytes.
+_FORMAT: Final = struct.Struct("=I4xIIII184x")  # struct v4l2_format, 208 bytes.
+_PARAMETERS: Final = struct.Struct("=I8xII184x")  # struct v4l2_streamparm, 204 bytes.
+_REQUEST: Final = struct.Struct("=III8x")  # struct v4l2_requestbuffers, 20 bytes.
+
+
+@dataclass(frozen=True, slots=True)
+class Buffer:
+    """What the kernel says of a buffer.
+
+    Attributes:
+        index: Its number.
+        used: Bytes of the picture in it.
+        flags: What it says of its time and of errors.
+        at_ns: When the picture was taken.
+        offset: Where it is, for mmap.
+        length: Its size in bytes.
+    """
+
+    index: int
+    used: int = 0
+    flags: int = 0
+    at_ns: int = 0
+    offset: int = 0
+    length: int = 0
+
+    def pack(self) -> bytearray:
+        """As the kernel takes it."""
+        seconds, rest_ns = divmod(self.at_ns, 1_000_000_000)
+        return bytearray(
+            _BUFFER.pack(
+                self.index,
+                CAPTURE,
+                self.used,
+                self.flags,
+                _FIELD_NONE,
+                seconds,
+                rest_ns // 1000,
+                0,
+                _MEMORY_MMAP,
+                self.offset,
+                self.length,
+                0,
+                0,
+            )
+        )
+
+    @classmethod
+    def unpack(cls, data: bytes | bytearray) -> Buffer:
+        """As the kernel gives it."""
+        index, _, used, flags, _, seconds, microseconds, _, _, offset, length, _, _ = (
+            _BUFFER.unpack(data)
+        )
+        at_ns = seconds * 1_000_000_000 + microseconds * 1000
+        return cls(index, used, flags, at_ns, offset & 0xFFFFFFFF, length)
+
+
+def pixel_format(width: int, height: int) -> bytearray:
+    """JPEG pictures of a size."""
+    return bytearray(_FORMAT.pack(CAPTURE, width, height, MJPEG, _FIELD_NONE))
+
+
+def image_size(data: bytes | bytearray) -> tuple[int, int, int]:
+    """Width, height and pixel format that the camera has taken."""
+    _, width, height, kind, _ = _FORMAT.unpack(data)
+    return width, height, kind
+
+
+def frame_rate(fps: float) -> bytearray:
+    """So many pictures a second."""
+    return bytearray(_PARAMETERS.pack(CAPTURE, 1000, round(fps * 1000)))
+
+
+def request(buffers: int) -> bytearray:
+    """So many buffers."""
+    return bytearray(_REQUEST.pack(buffers, CAPTURE, _MEMORY_MMAP))
+
 
 _BUFFERS: Final = 3
 _SILENT_S: Final = 5.0  # A camera that gives nothing for so long hangs.
@@ -71,20 +185,20 @@ class V4l2:
             os.close(self._fd)  # The kernel stops the camera then.
 
     def _start(self) -> None:
-        wanted = api.pixel_format(*self._plan.size)
-        self._ioctl(self._fd, api.SET_FORMAT, wanted)
-        width, height, kind = api.image_size(wanted)
-        if (width, height, kind) != (*self._plan.size, api.MJPEG):
+        wanted = pixel_format(*self._plan.size)
+        self._ioctl(self._fd, SET_FORMAT, wanted)
+        width, height, kind = image_size(wanted)
+        if (width, height, kind) != (*self._plan.size, MJPEG):
             raise RobotError(
                 f"The camera {self._device} has no JPEG pictures of {self._plan.size[0]} by "
                 f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it has."
             )
-        self._ioctl(self._fd, api.SET_PARAMETERS, api.frame_rate(self._plan.fps))
-        self._ioctl(self._fd, api.REQUEST_BUFFERS, api.request(_BUFFERS))
+        self._ioctl(self._fd, SET_PARAMETERS, frame_rate(self._plan.fps))
+        self._ioctl(self._fd, REQUEST_BUFFERS, request(_BUFFERS))
         for index in range(_BUFFERS):
-            data = api.Buffer(index).pack()
-            self._ioctl(self._fd, api.QUERY_BUFFER, data)
-            buffer = api.Buffer.unpack(data)
+            data = Buffer(index).pack()
+            self._ioctl(self._fd, QUERY_BUFFER, data)
+            buffer = Buffer.unpack(data)
             self._buffers.append(
                 mmap.mmap(
                     self._fd,
@@ -94,28 +208,26 @@ class V4l2:
                     offset=buffer.offset,
                 )
             )
-            self._ioctl(self._fd, api.QUEUE, data)
-        self._ioctl(self._fd, api.STREAM_ON, struct.pack("=i", api.CAPTURE))
+            self._ioctl(self._fd, QUEUE, data)
+        self._ioctl(self._fd, STREAM_ON, struct.pack("=i", CAPTURE))
 
     def _newest(self) -> tuple[bytes, int]:
         newest: tuple[bytes, int] | None = None
         while True:
-            data = api.Buffer(0).pack()
+            data = Buffer(0).pack()
             try:
-                self._ioctl(self._fd, api.DEQUEUE, data)
+                self._ioctl(self._fd, DEQUEUE, data)
             except BlockingIOError:
                 if newest is None:
                     raise
                 return newest
-            buffer = api.Buffer.unpack(data)
-            if not buffer.flags & api.BUFFER_FLAG_ERROR:
-                monotonic = (
-                    buffer.flags & api.BUFFER_FLAG_TIMESTAMP_MASK == api.BUFFER_FLAG_MONOTONIC
-                )
+            buffer = Buffer.unpack(data)
+            if not buffer.flags & BUFFER_FLAG_ERROR:
+                monotonic = buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
                 # Cameras fill up with zeros after the end of a picture.
                 jpeg = self._buffers[buffer.index][: buffer.used].rstrip(b"\0")
                 newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()
-            self._ioctl(self._fd, api.QUEUE, data)
+            self._ioctl(self._fd, QUEUE, data)
 
 
 def open_driver(plan: CameraPlan) -> V4l2:

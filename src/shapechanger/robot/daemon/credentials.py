@@ -13,8 +13,7 @@ from typing import Final
 
 from shapechanger.errors import LinkError, OutputError, RobotError
 from shapechanger.link.address import is_loopback
-from shapechanger.link.fingerprint import fingerprint_of
-from shapechanger.link.proof import new_key, parse_key
+from shapechanger.link.authentication import fingerprint_of, new_key, parse_key
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.new_file import write_new
 

@@ -14,7 +14,7 @@ from zeroconf import (
 )
 from zeroconf.asyncio import AsyncZeroconf
 
-from shapechanger.link.fingerprint import fingerprint_hex
+from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import VERSION
 from shapechanger.robot.daemon.plan import DaemonPlan
 

@@ -9,9 +9,8 @@ from typing import Final
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.lease import Holder
-from shapechanger.robot.daemon.wishes import Wish
-from shapechanger.robot.guard.wire import GuardState
+from shapechanger.robot.daemon.control import ClientIdentity, PendingCommand
+from shapechanger.robot.guard.messages import GuardState
 
 __all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
 
@@ -74,10 +73,10 @@ def build_observation(
     frame_sent: int | None,
     lease: int,
     command_ns: int | None,
-    holder: Holder | None,
+    holder: ClientIdentity | None,
     mine: bool,
     commanded: tuple[float, ...] = (),
-    suggested: Wish | None = None,
+    suggested: PendingCommand | None = None,
 ) -> Observation:
     """Put an observation together.
 

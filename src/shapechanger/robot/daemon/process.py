@@ -8,34 +8,55 @@ import contextlib
 import json
 import logging
 import os
+import queue
 import signal
 from collections.abc import Callable, Sequence
+from logging.handlers import QueueHandler, QueueListener
 from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import ShapechangerError
 from shapechanger.link.address import Address, is_loopback
-from shapechanger.link.fingerprint import fingerprint_hex, fingerprint_short
-from shapechanger.link.mailbox import Latest
+from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.cockpit import Cockpit
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from shapechanger.robot.daemon.connection import Timekeeper
 from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
 from shapechanger.robot.daemon.discovery import Announcement
-from shapechanger.robot.daemon.frames import FrameChecks, FrameReader
-from shapechanger.robot.daemon.guard_port import GuardPort
-from shapechanger.robot.daemon.heartbeat import beat
-from shapechanger.robot.daemon.life import show_life
-from shapechanger.robot.daemon.log import start_log
+from shapechanger.robot.daemon.guard_link import GuardLink, send_heartbeats, send_lifeline
+from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
-from shapechanger.robot.daemon.session import Door
-from shapechanger.robot.daemon.timekeeper import Timekeeper
+from shapechanger.robot.daemon.session import Authenticator
+from shapechanger.robot.guard.messages import GuardState
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
-from shapechanger.robot.guard.wire import GuardState
 from shapechanger.robot.hardware import Clock, connect
 
-__all__ = ["Daemon", "main"]
+__all__ = ["Daemon", "main", "start_log"]
+
+_MOST_LINES: Final = 1000
+
+
+def start_log(program: str) -> QueueListener:
+    """Send the log to stderr, from a thread of its own; lines for which there is no room are lost.
+
+    Returns:
+        What writes the lines; stop it at the end, so that the last ones are written.
+    """
+    # A line that cannot be written must not become another line that cannot be written.
+    logging.raiseExceptions = False
+    lines: queue.Queue[logging.LogRecord] = queue.Queue(_MOST_LINES)
+    stderr = logging.StreamHandler()
+    stderr.setFormatter(logging.Formatter(f"{program}: %(message)s"))
+    root = logging.getLogger()
+    root.setLevel(logging.WARNING)
+    logging.getLogger("shapechanger").setLevel(logging.INFO)
+    root.addHandler(QueueHandler(lines))
+    listener = QueueListener(lines, stderr)
+    listener.start()
+    return listener
+
 
 _log = logging.getLogger(__name__)
 
@@ -67,13 +88,13 @@ class Daemon:
         self._ended = asyncio.Event()
         self._heard = asyncio.Event()  # The guard has said something, or never will.
         self._why = ""
-        self._port = GuardPort(
+        self._port = GuardLink(
             guard_fd,
             on_state=self._on_state,
             on_lost=lambda: self.end("The guard is gone."),
         )
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._cockpit = Cockpit(plan, clock.now_ns, self._port.send, self._call)
+        self._cockpit = SessionHub(plan, clock.now_ns, self._port.send, self._call)
         self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
 
@@ -94,7 +115,7 @@ class Daemon:
         if plan.certificate:
             tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
         time = Timekeeper(self._clock, self._cockpit, self._port.drain)
-        server = Server(self._cockpit, time, Door(key, fingerprint), tls)
+        server = Server(self._cockpit, time, Authenticator(key, fingerprint), tls)
         tasks = [asyncio.create_task(work) for work in (self._beat(), self._tell_recording())]
         self._port.attach(loop)
         camera = None if plan.camera is None else self._camera(plan.camera)
@@ -140,7 +161,7 @@ class Daemon:
     async def _beat(self) -> None:
         """Show the supervisor that the event loop turns."""
         if self._heartbeat_fd is not None:
-            await beat(self._heartbeat_fd, _BEAT_S)
+            await send_heartbeats(self._heartbeat_fd, _BEAT_S)
             self.end("The supervisor is gone.")
 
     async def _tell_recording(self) -> None:
@@ -216,7 +237,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     serve_plan = read_plan_fd(asked.plan_fd)
     os.close(asked.plan_fd)
-    show_life(asked.guard_fd)
+    send_lifeline(asked.guard_fd)
     log = start_log("daemon")
     try:
         plan = DaemonPlan.from_dict(serve_plan.daemon)

@@ -9,21 +9,102 @@ import socket
 import ssl
 from collections.abc import Awaitable, Callable
 from typing import Final
+from urllib.parse import urlsplit
 
 from aiohttp import web
 
 from shapechanger.errors import LinkError, RobotError, ShapechangerError
-from shapechanger.robot.daemon.cockpit import Cockpit
-from shapechanger.robot.daemon.connection import Connection, new_socket
-from shapechanger.robot.daemon.doorstep import Doorstep
-from shapechanger.robot.daemon.listener import Listener
-from shapechanger.robot.daemon.origin import origin_refusal
-from shapechanger.robot.daemon.pace import Pacer
-from shapechanger.robot.daemon.page import SECURITY_POLICY, add_console
-from shapechanger.robot.daemon.session import Door, Session, WrongKey
-from shapechanger.robot.daemon.timekeeper import Timekeeper
+from shapechanger.link.address import is_loopback, parse_address
+from shapechanger.link.authentication import fingerprint_hex
+from shapechanger.link.messages import VERSION
+from shapechanger.robot.console.files import ENTRY, ConsoleFile, console_files
+from shapechanger.robot.daemon.connection import (
+    ClientConnection,
+    ObservationPacer,
+    Timekeeper,
+    new_socket,
+)
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.pre_auth import Listener, PreAuthConnections
+from shapechanger.robot.daemon.session import Authenticator, Session, WrongKey
 
-__all__ = ["Server"]
+__all__ = ["SECURITY_POLICY", "Server", "add_console", "origin_refusal"]
+
+
+def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
+    """Why a connection must not be opened, in words; empty if it may.
+
+    Args:
+        origin: The header `Origin`; None from a program that is no browser.
+        host: The header `Host`.
+        is_open: Whether the robot asks for no key. Then the name must be one that no stranger's
+            name server can point at the robot (DNS rebinding).
+    """
+    if origin is None:
+        return ""
+    if urlsplit(origin).netloc.lower() != host.lower():
+        return "A page of another server must not drive this robot."
+    try:
+        name = parse_address(host).host
+    except LinkError as error:
+        return str(error)
+    if is_open and not (is_loopback(name) or name.endswith(".local") or _is_ip(name)):
+        return "Without a key, open the page of this robot by its IP address."
+    return ""
+
+
+def _is_ip(name: str) -> bool:
+    return ":" in name or name.replace(".", "").isdecimal()
+
+
+SECURITY_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'; form-action 'none'"
+)
+"""What a browser may do with a page of the robot: nothing inline, nothing from elsewhere."""
+
+_FOLDER: Final = "/console/"
+
+_Handler = Callable[[web.Request], Awaitable[web.Response]]
+
+
+def add_console(app: web.Application, cockpit: SessionHub, door: Authenticator) -> None:
+    """Serve the console.
+
+    Args:
+        app: What serves.
+        cockpit: The robot.
+        door: What a client must show.
+
+    Raises:
+        RobotError: If the files of the console cannot be read.
+    """
+    files = console_files()
+    app.router.add_get("/", _giving(files[ENTRY]))
+    for name, file in files.items():
+        app.router.add_get(f"{_FOLDER}{name}", _giving(file))
+
+    async def introduce(request: web.Request) -> web.Response:
+        # Only what somebody without the key may know. A page cannot see the certificate of its own
+        # connection, so the fingerprint that enters the proof is told; it is no secret.
+        return web.json_response(
+            {
+                "robot": cockpit.plan.robot,
+                "version": VERSION,
+                "certificate": fingerprint_hex(door.certificate),
+                "open": door.is_open,
+            }
+        )
+
+    app.router.add_get(f"{_FOLDER}robot.json", introduce)
+
+
+def _giving(file: ConsoleFile) -> _Handler:
+    async def give(request: web.Request) -> web.Response:
+        return web.Response(body=file.body, content_type=file.content_type, charset="utf-8")
+
+    return give
+
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +124,7 @@ _HEADERS: Final = {
     "X-Frame-Options": "DENY",
 }
 
-_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+_ServerHandler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
@@ -57,13 +138,13 @@ class Server:
     """
 
     def __init__(
-        self, cockpit: Cockpit, time: Timekeeper, door: Door, tls: ssl.SSLContext | None
+        self, cockpit: SessionHub, time: Timekeeper, door: Authenticator, tls: ssl.SSLContext | None
     ) -> None:
         self._cockpit = cockpit
         self._time = time
         self._door = door
         self._numbers = itertools.count(1)
-        self._doorstep = Doorstep()
+        self._doorstep = PreAuthConnections()
         self._runner = web.AppRunner(
             self._app(), access_log=None, handle_signals=False, shutdown_timeout=_GOODBYE_S
         )
@@ -103,7 +184,9 @@ class Server:
         return server()
 
     @web.middleware
-    async def _renew_patience(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+    async def _renew_patience(
+        self, request: web.Request, handler: _ServerHandler
+    ) -> web.StreamResponse:
         response = await handler(request)
         # A slow radio brings the files of the console one by one.
         self._doorstep.renew(request.protocol)
@@ -128,8 +211,8 @@ class Server:
         websocket = new_socket()
         await websocket.prepare(request)
         session = Session(next(self._numbers), self._cockpit, self._door)
-        pacer = Pacer(session, self._cockpit, self._time)
-        connection = Connection(websocket, session, pacer, self._time, _log)
+        pacer = ObservationPacer(session, self._cockpit, self._time)
+        connection = ClientConnection(websocket, session, pacer, self._time, _log)
         reason: ShapechangerError | None = None
         try:
             _tune(request.transport)
@@ -147,7 +230,9 @@ class Server:
         self._doorstep.leave(request.protocol)
         return websocket
 
-    async def _talk(self, connection: Connection, session: Session, request: web.Request) -> None:
+    async def _talk(
+        self, connection: ClientConnection, session: Session, request: web.Request
+    ) -> None:
         try:
             await connection.greet()
         except WrongKey:
@@ -161,7 +246,7 @@ class Server:
 
 
 @web.middleware
-async def _add_headers(request: web.Request, handler: _Handler) -> web.StreamResponse:
+async def _add_headers(request: web.Request, handler: _ServerHandler) -> web.StreamResponse:
     try:
         response = await handler(request)
     except web.HTTPException as error:

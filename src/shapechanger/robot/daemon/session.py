@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.link.authentication import is_proof, new_nonce
 from shapechanger.link.messages import (
     VERSION,
     Acknowledge,
@@ -22,9 +24,11 @@ from shapechanger.link.messages import (
     Mark,
     Observation,
     Pace,
+    Piece,
     Ping,
     Pong,
     Record,
+    Recordings,
     Refused,
     Release,
     RobotMessage,
@@ -34,18 +38,87 @@ from shapechanger.link.messages import (
     Welcome,
     decode_client_message,
 )
-from shapechanger.link.proof import is_proof, new_nonce
-from shapechanger.robot.daemon.cockpit import Cockpit
-from shapechanger.robot.daemon.freshness import Sent
-from shapechanger.robot.daemon.lease import Holder
-from shapechanger.robot.daemon.limits import MESSAGES_PER_S, MessageRate
+from shapechanger.robot.daemon.control import ClientIdentity, ControlLease
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.library import Answer, RecordingLibrary
+from shapechanger.robot.daemon.limits import (
+    MESSAGES_PER_S,
+    MessageRate,
+    Outbox,
+    SentObservations,
+    printable,
+)
 from shapechanger.robot.daemon.observation import build_observation
-from shapechanger.robot.daemon.outbox import Outbox
-from shapechanger.robot.daemon.printable import printable
-from shapechanger.robot.daemon.recording_desk import RecordingDesk
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.daemon.recorder import Recorder
+from shapechanger.robot.guard.messages import Order
 
-__all__ = ["Door", "Session", "WrongKey"]
+__all__ = ["Authenticator", "RecordingRequests", "Session", "WrongKey"]
+
+
+class RecordingRequests:
+    """Passes the wishes of one client on, if it may have them.
+
+    Args:
+        recorder: Records what is driven.
+        library: Knows what was recorded.
+        lease: Who commands.
+        outbox: What the client is to be told.
+        tell: Puts a message there.
+    """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        library: RecordingLibrary,
+        lease: ControlLease,
+        outbox: Outbox,
+        tell: Callable[[RobotMessage], None],
+    ) -> None:
+        self._recorder = recorder
+        self._library = library
+        self._lease = lease
+        self._outbox = outbox
+        self._tell = tell
+        self._asking = False
+
+    def hear(
+        self, message: Record | Mark | Undo | Browse | Fetch | Judge, who: ClientIdentity
+    ) -> None:
+        """Do what the client says, or tell it why not."""
+        if not isinstance(message, Browse | Fetch) and who.role != "person":
+            self._tell(Refused(reason="Only a person records on this robot, and judges that."))
+            return
+        match message:
+            case Record():
+                refusal = self._record(message, who)
+            case Mark():
+                refusal = self._recorder.mark(printable(message.text), self._tell)
+            case Undo():
+                refusal = self._recorder.undo(message.seconds, self._tell)
+            case Browse() | Fetch() | Judge():
+                refusal = self._ask(message)
+        if refusal:
+            self._tell(Refused(reason=refusal))
+
+    def _record(self, message: Record, who: ClientIdentity) -> str:
+        if not message.on:
+            return self._recorder.end()
+        held = self._lease.holder
+        driver = "" if held is None else held.name
+        return self._recorder.begin(who, printable(message.name), driver, self._tell)
+
+    def _ask(self, question: Browse | Fetch | Judge) -> str:
+        """Ask the library; an answer may be large, so the next question waits until it has left."""
+        if self._asking or self._outbox.holds(Recordings, Piece):
+            return "Ask one question about recordings at a time."
+        self._asking = True
+        self._library.ask(question, self._answered)
+        return ""
+
+    def _answered(self, answer: Answer) -> None:
+        self._asking = False
+        self._tell(answer)
+
 
 _LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps overflow out of sums.
 
@@ -54,7 +127,7 @@ class WrongKey(RobotRefused):
     """The client does not hold the key."""
 
 
-class Door:
+class Authenticator:
     """What a client must show to be let in.
 
     Args:
@@ -100,7 +173,7 @@ class Session:
     """
 
     def __init__(
-        self, number: int, cockpit: Cockpit, door: Door, rate: MessageRate | None = None
+        self, number: int, cockpit: SessionHub, door: Authenticator, rate: MessageRate | None = None
     ) -> None:
         self.outbox = Outbox()
         self.told = asyncio.Event()
@@ -112,11 +185,11 @@ class Session:
         self._rate = MessageRate() if rate is None else rate
         self._nonce = new_nonce()
         self._hello: Hello | None = None
-        self._who = Holder(number, "", "program")
-        self._sent = Sent(cockpit.plan.max_observation_age_ms)
+        self._who = ClientIdentity(number, "", "program")
+        self._sent = SentObservations(cockpit.plan.max_observation_age_ms)
         self._command_seq = -1
         self._suggestion_seq = -1
-        self._desk = RecordingDesk(
+        self._desk = RecordingRequests(
             cockpit.recorder, cockpit.library, cockpit.lease, self.outbox, self.tell
         )
         self._observation_seq = 0
@@ -124,7 +197,7 @@ class Session:
         self._overflow = ""
 
     @property
-    def who(self) -> Holder:
+    def who(self) -> ClientIdentity:
         """Who it is; without a name before it said hello."""
         return self._who
 
@@ -165,7 +238,7 @@ class Session:
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
         name = printable(hello.name) or f"{hello.role} {self._number}"
-        self._who = Holder(self._number, name, hello.role)
+        self._who = ClientIdentity(self._number, name, hello.role)
         self._cockpit.join(self)
         self._hello = hello
         if (recorded := self._cockpit.recorder.state()).episode:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import texts, whole, wholes
+from shapechanger.robot.drivers.settings import in_words, texts, whole, wholes
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 

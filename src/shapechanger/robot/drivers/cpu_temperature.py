@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import text
+from shapechanger.robot.drivers.settings import in_words, text
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 

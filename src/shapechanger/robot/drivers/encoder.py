@@ -7,9 +7,8 @@ import threading
 from collections import deque
 from typing import Any, Final
 
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 

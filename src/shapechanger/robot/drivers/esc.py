@@ -6,9 +6,8 @@ from contextlib import ExitStack
 from typing import Final, Literal
 
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.in_words import in_words
 from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
-from shapechanger.robot.drivers.settings import number, text
+from shapechanger.robot.drivers.settings import in_words, number, text
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 

@@ -11,9 +11,8 @@ from contextlib import ExitStack
 
 from gpiozero import DigitalOutputDevice, Motor
 
-from shapechanger.robot.drivers.duty import Duty
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.drivers.gpio import Duty
+from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 

@@ -13,9 +13,8 @@ from typing import Any, Final
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import number, whole
+from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 

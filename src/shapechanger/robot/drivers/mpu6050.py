@@ -11,8 +11,7 @@ import struct
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import whole
+from shapechanger.robot.drivers.settings import in_words, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 

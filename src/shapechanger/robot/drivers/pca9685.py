@@ -15,8 +15,7 @@ from typing import Final
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import whole
+from shapechanger.robot.drivers.settings import in_words, whole
 from shapechanger.robot.hardware import Hardware
 
 __all__ = ["Pca9685", "Pca9685Channel", "open_channel", "prescale_for"]

@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from shapechanger.robot.drivers.in_words import in_words
 from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
-from shapechanger.robot.drivers.settings import number
+from shapechanger.robot.drivers.settings import in_words, number
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["Servo", "open_driver"]
+__all__ = ["ServoDriver", "open_driver"]
 
 _DEG_PER_VALUE: Final = 90.0  # From end to end, a value of 2, it is taken to turn by 180 degrees.
 
 
-class Servo:
+class ServoDriver:
     """A servo; see `OutputDriver`. Until it is first told a position it gets no pulse."""
 
     def __init__(
@@ -52,7 +51,7 @@ class Servo:
             self._channel.close()
 
 
-def open_driver(plan: OutputPlan, hardware: Hardware) -> Servo:
+def open_driver(plan: OutputPlan, hardware: Hardware) -> ServoDriver:
     """Open the servo; it gets no pulse yet.
 
     The settings are those of `open_pulse_channel`, `left_us`, `centre_us` and `right_us` (at -1, 0
@@ -65,4 +64,4 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> Servo:
     speed_per_s = number(settings, "travel_deg_per_s") / _DEG_PER_VALUE
     with in_words(name):
         channel = open_pulse_channel(settings, hardware)
-    return Servo(channel, pulses, speed_per_s, name)
+    return ServoDriver(channel, pulses, speed_per_s, name)

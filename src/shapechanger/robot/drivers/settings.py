@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from typing import TypeVar, cast
+
+from gpiozero import GPIOZeroError
 
 from shapechanger.errors import RobotError
 
-__all__ = ["number", "numbers", "text", "texts", "whole", "wholes"]
+__all__ = ["in_words", "number", "numbers", "text", "texts", "whole", "wholes"]
 
 _T = TypeVar("_T")
 
@@ -52,3 +56,26 @@ def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: st
     if not isinstance(value, kind) or isinstance(value, bool):
         raise RobotError(f"The setting {key!r} must be {words}, not {value!r}.")
     return value
+
+
+@contextmanager
+def in_words(device: str) -> Generator[None]:
+    """Give the errors of gpiozero, lgpio and the kernel as `RobotError`.
+
+    Args:
+        device: What it is, such as "The motor on GPIO22 and GPIO27".
+
+    Raises:
+        RobotError: If the device does not answer.
+    """
+    try:
+        yield
+    except _errors() as error:
+        raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
+
+
+def _errors() -> tuple[type[BaseException], ...]:
+    # lgpio has an exception of its own, and is not everywhere; what was never loaded never raises.
+    lgpio = sys.modules.get("lgpio")
+    own: tuple[type[BaseException], ...] = () if lgpio is None else (lgpio.error,)
+    return (GPIOZeroError, OSError, ImportError, *own)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any, Final, Literal
 
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.in_words import in_words
-from shapechanger.robot.drivers.settings import text, wholes
+from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.settings import in_words, text, wholes
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 

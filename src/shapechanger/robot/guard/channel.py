@@ -10,9 +10,9 @@ import sys
 import time
 from typing import Protocol
 
-from shapechanger.robot.guard.wire import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 
-__all__ = ["Channel", "DaemonChannel", "Heartbeat"]
+__all__ = ["DaemonChannel", "GuardChannel", "Heartbeat"]
 
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
@@ -21,7 +21,7 @@ _FD_BYTES = 4  # A descriptor in an ancillary message is an int of C.
 _DESCRIPTOR = socket.CMSG_SPACE(_FD_BYTES)
 
 
-class Channel(Protocol):
+class GuardChannel(Protocol):
     """Orders in, states out."""
 
     @property

@@ -12,8 +12,7 @@ import select
 import sys
 from typing import Final
 
-__all__ = ["log_to_stderr"]
-
+__all__ = ["log_to_stderr", "shortened"]
 
 _STDERR: Final = 2
 
@@ -64,3 +63,11 @@ def log_to_stderr(program: str) -> logging.Logger:
     log.setLevel(logging.INFO)
     log.propagate = False
     return log
+
+
+def shortened(text: str, most_bytes: int = 200) -> str:
+    """The beginning of a text, as far as it fits into so many bytes of UTF-8."""
+    data = text.encode(errors="replace")
+    if len(data) <= most_bytes:
+        return data.decode()
+    return f"{data[:most_bytes].decode(errors='ignore')}..."

@@ -18,19 +18,15 @@ from dataclasses import replace
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.arguments import AFTER_FAILURE, descriptors
-from shapechanger.robot.guard.channel import Channel, DaemonChannel, Heartbeat
-from shapechanger.robot.guard.log import log_to_stderr
-from shapechanger.robot.guard.outputs import Outputs
+from shapechanger.robot.guard.channel import DaemonChannel, GuardChannel, Heartbeat
+from shapechanger.robot.guard.log import log_to_stderr, shortened
+from shapechanger.robot.guard.messages import GuardState
+from shapechanger.robot.guard.outputs import Done, OutputBank, Switches
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import GUARD, run_promptly
-from shapechanger.robot.guard.rules import Decision, Rules
+from shapechanger.robot.guard.rules import OutputDecision, Rules
 from shapechanger.robot.guard.sensors import Sensors
-from shapechanger.robot.guard.serve_plan import read_plan_fd
-from shapechanger.robot.guard.switches import Switches
-from shapechanger.robot.guard.truth import Done
-from shapechanger.robot.guard.wire import GuardState
-from shapechanger.robot.guard.words import shortened
+from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, descriptors, read_plan_fd
 from shapechanger.robot.hardware import Hardware, connect
 
 __all__ = ["BEAT_S", "Guard", "main"]
@@ -59,7 +55,7 @@ class Guard:
         self,
         plan: GuardPlan,
         hardware: Hardware,
-        daemon: Channel,
+        daemon: GuardChannel,
         log: logging.Logger,
         *,
         after_failure: bool = False,
@@ -71,7 +67,7 @@ class Guard:
         now_ns = self._clock.now_ns()
         with contextlib.ExitStack() as undo:
             # Outputs first: until they are open, whatever their pins did goes on.
-            self._outputs = Outputs(plan, hardware)
+            self._outputs = OutputBank(plan, hardware)
             undo.callback(self._close_outputs)
             self._switches = Switches(plan, hardware)
             undo.callback(self._switches.close)
@@ -173,7 +169,7 @@ class Guard:
             self._log.info("Sensor %s answers again.", name)
         self._failures = dict(sensing.failures)
 
-    def _apply(self, now_ns: int) -> Decision:
+    def _apply(self, now_ns: int) -> OutputDecision:
         decision = self._rules.tick(now_ns)
         if not self._healthy:
             return self._recover(decision, now_ns)
@@ -191,7 +187,7 @@ class Guard:
             self._applied_ns = None if decision.seq is None else self._clock.now_ns()
         return decision
 
-    def _truly(self, decision: Decision, done: Done) -> Decision:
+    def _truly(self, decision: OutputDecision, done: Done) -> OutputDecision:
         """The decision as the outputs carry it out."""
         self._rules.learn(done.actions)
         reason = decision.stop_reason
@@ -199,7 +195,7 @@ class Guard:
             reason = f"{reason} {done.reason}".strip()
         return replace(decision, actions=done.actions, stop_reason=reason)
 
-    def _recover(self, decision: Decision, now_ns: int) -> Decision:
+    def _recover(self, decision: OutputDecision, now_ns: int) -> OutputDecision:
         """Put all outputs to rest, again and again until each of them obeys."""
         failures = self._outputs.rest(now_ns)
         self._healthy = not failures
@@ -213,7 +209,7 @@ class Guard:
         words = shortened(" ".join(failures))
         return replace(decision, stop_reason=f"NOT at rest: {words} {decision.stop_reason}")
 
-    def _report(self, decision: Decision, now_ns: int) -> None:
+    def _report(self, decision: OutputDecision, now_ns: int) -> None:
         arming, senses = self._rules.arming, self._rules.senses
         refused, refused_seq = self._refused
         session, seq = self._applied

@@ -2,13 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from shapechanger.robot.guard.persistence import Persistence
-from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.guard.senses import Sensing
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
+from shapechanger.robot.guard.sensors import Sensing
 
-__all__ = ["STANDS_M_PER_S", "Bump", "Health", "Stall"]
+__all__ = [
+    "STANDS_M_PER_S",
+    "STEERING",
+    "Bump",
+    "Persistence",
+    "Propulsion",
+    "RobotHealth",
+    "Stall",
+]
+
+
+class Persistence:
+    """A condition that counts once it has held without a break.
+
+    Args:
+        for_s: How long it must hold, s.
+    """
+
+    def __init__(self, for_s: float) -> None:
+        self._for_ns = round(for_s * 1e9)
+        self._since_ns: int | None = None
+
+    def holds(self, condition: bool, now_ns: int) -> bool:
+        """Whether the condition, which is so now, has been so for long enough."""
+        if not condition:
+            self._since_ns = None
+            return False
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        return now_ns - self._since_ns >= self._for_ns
+
 
 STANDS_M_PER_S = 0.01
 """Speed below which a robot stands still, m/s; one count of a coarse wheel encoder a second."""
@@ -85,7 +114,7 @@ class Stall:
             self.way = 0
 
 
-class Health:
+class RobotHealth:
     """Says why the robot must not move at all: a sensor that fails, battery, temperature.
 
     A low battery recovers as soon as nothing is moved; so it keeps the robot at rest until it is
@@ -146,3 +175,42 @@ class Health:
         """Forget that the battery was low, unless it still is."""
         if not self._is_low:
             self._battery = ""
+
+
+STEERING = "steering"
+"""Name of the action that turns. It may propel, as that of a tank does, but never forward."""
+
+
+class Propulsion:
+    """What of the actions goes forward; a positive value is forward.
+
+    Attributes:
+        forward: Which actions push the robot forward or backward, by index.
+
+    Args:
+        actions: The actions of the robot.
+    """
+
+    def __init__(self, actions: Sequence[ActionPlan]) -> None:
+        self._actions = actions
+        self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != STEERING)
+        # Actions whose profile says how fast they make the robot.
+        self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
+
+    def push(self, values: Sequence[float]) -> float:
+        """How hard the robot is pushed forward, -1 to 1; negative is backward."""
+        return self._mean(self.forward, [value - a.rest for value, a in self._pairs(values)])
+
+    def speed(self, values: Sequence[float]) -> float | None:
+        """Speed that this push gives by the profile, m/s; None where the profile has none."""
+        if not self._known:
+            return None
+        speeds = [a.gain * (value - a.rest) for value, a in self._pairs(values)]
+        return self._mean(self._known, speeds)
+
+    def _pairs(self, values: Sequence[float]) -> zip[tuple[float, ActionPlan]]:
+        return zip(values, self._actions, strict=True)
+
+    @staticmethod
+    def _mean(which: Sequence[int], numbers: Sequence[float]) -> float:
+        return sum(numbers[i] for i in which) / len(which) if which else 0.0

@@ -7,20 +7,123 @@ writes what `Rules.tick` decides.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.arming import Arming
-from shapechanger.robot.guard.freshness import FUTURE_NS, Freshness
-from shapechanger.robot.guard.plan import GuardPlan, StopPlan
-from shapechanger.robot.guard.propulsion import Propulsion
-from shapechanger.robot.guard.reflexes import Bump, Health, Stall
-from shapechanger.robot.guard.senses import Senses, Sensing
-from shapechanger.robot.guard.shaping import aimed, clipped, slewed
-from shapechanger.robot.guard.stopping import Stopping
-from shapechanger.robot.guard.wire import Order
+from shapechanger.robot.guard.commands import FUTURE_NS, Freshness, aimed, clipped, slewed
+from shapechanger.robot.guard.log import shortened
+from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
+from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Stall
+from shapechanger.robot.guard.sensors import SensedState, Sensing
 
-__all__ = ["ARM_WITHIN_NS", "Decision", "Rules"]
+__all__ = ["ARM_WITHIN_NS", "Arming", "OutputDecision", "Rules", "Stopping"]
+
+
+class Arming:
+    """Starts disarmed. An emergency stop latches until a person who knows of it arms again.
+
+    Attributes:
+        armed: Whether commands move anything.
+        emergency: Whether an emergency stop is in force.
+        emergencies: How many there were.
+        reason: Why nothing may move, in words; empty while armed.
+    """
+
+    def __init__(self) -> None:
+        self.armed = False
+        self.emergency = False
+        self.emergencies = 0
+        self.reason = "Not armed."
+
+    def arm(self, seen: int, *, person: bool) -> str:
+        """Let commands move, and end an emergency stop.
+
+        Args:
+            seen: How many emergency stops whoever arms has seen.
+            person: Whether a person arms.
+
+        Returns:
+            Why not, in words; empty when it is armed now.
+        """
+        if self.emergency and not person:
+            return "Not armed: only a person ends an emergency stop."
+        if self.emergency and seen != self.emergencies:
+            return (
+                f"Not armed: there were {self.emergencies} emergency stops, and whoever armed "
+                f"has seen {seen}."
+            )
+        self.armed, self.emergency, self.reason = True, False, ""
+        return ""
+
+    def disarm(self, reason: str) -> None:
+        """Let nothing move; the reason of an emergency stop stays."""
+        self.armed, reason = False, shortened(reason)
+        if not self.emergency:
+            self.reason = f"Disarmed: {reason}" if reason else "Disarmed."
+
+    def stop(self, reason: str) -> None:
+        """Stop at once, until armed again; each call counts, and the first reason stays."""
+        reason = shortened(reason)
+        if not self.emergency:
+            self.reason = f"Emergency stop: {reason}" if reason else "Emergency stop."
+        self.armed, self.emergency = False, True
+        self.emergencies += 1
+
+
+_NS_PER_MS = 1_000_000
+
+
+class Stopping:
+    """One stop: what propels rests at once, the other actions hold, ramp to rest, and let go.
+
+    Args:
+        plan: How long they hold and ramp.
+        actions: The actions.
+        values: What they are when the stop begins.
+        since_ns: When it begins.
+    """
+
+    def __init__(
+        self,
+        plan: StopPlan,
+        actions: Sequence[ActionPlan],
+        values: Sequence[float],
+        since_ns: int,
+    ) -> None:
+        self._actions = actions
+        self._values = values
+        self._then = plan.then
+        self._hold_end_ns = since_ns + plan.hold_ms * _NS_PER_MS
+        self._ramp_ns = plan.ramp_ms * _NS_PER_MS
+        self.end_ns = self._hold_end_ns + self._ramp_ns
+        """When all of them rest."""
+
+    def values(self, now_ns: int) -> tuple[float, ...]:
+        """What the actions are now."""
+        left = self._left(now_ns)
+        return tuple(
+            action.rest if action.propels else action.rest + left * (value - action.rest)
+            for action, value in zip(self._actions, self._values, strict=True)
+        )
+
+    def releases(self, now_ns: int) -> bool:
+        """Whether the outputs let go."""
+        return self._then == "release" and now_ns >= self.end_ns
+
+    def next_ns(self, now_ns: int) -> int | None:
+        """When the next thing happens; None when nothing does, or something all the time."""
+        return next((t for t in (self._hold_end_ns, self.end_ns) if t > now_ns), None)
+
+    def _left(self, now_ns: int) -> float:
+        """How much of the way to rest is left, 1 to 0."""
+        if now_ns < self._hold_end_ns:
+            return 1.0
+        if now_ns >= self.end_ns:
+            return 0.0
+        return (self.end_ns - now_ns) / self._ramp_ns
+
 
 ARM_WITHIN_NS = 1_000_000_000
 """Age from which on an order to arm is refused, ns: nobody looks at the robot any more."""
@@ -31,7 +134,7 @@ _CLIPPED = "Clipped by the robot's caps."
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
+class OutputDecision:
     """What the outputs do from now on.
 
     Attributes:
@@ -72,7 +175,7 @@ class Rules:
                     f"{action.low:g} to {action.high:g}."
                 )
         self.arming = Arming()
-        self.senses = Senses()
+        self.senses = SensedState()
         self._plan = plan
         self._period_ns = round(1e9 / plan.tick_hz)
         self._stale_ns = plan.limits.camera_stale_ms * 1_000_000
@@ -80,7 +183,7 @@ class Rules:
         self._propulsion = Propulsion(plan.actions)
         self._bump = Bump(plan.limits.bump_hold_ms)
         self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
-        self._health = Health(plan)
+        self._health = RobotHealth(plan)
         self._disarming = tuple(s.name for s in plan.sensors if s.measures in _DISARMING)
         self._is_near = False
         self._is_far = True
@@ -180,7 +283,7 @@ class Rules:
             watches_stall=self._stall.watches,
         )
 
-    def tick(self, now_ns: int) -> Decision:
+    def tick(self, now_ns: int) -> OutputDecision:
         """Decide what the outputs do from now on."""
         # A pause of the process is no leave to jump.
         elapsed_ns = min(now_ns - self._ticked_ns, 2 * self._period_ns)
@@ -265,15 +368,15 @@ class Rules:
             return f"Blind: no picture for {self._plan.limits.camera_stale_ms} ms."
         return ""
 
-    def _stand(self, reason: str, now_ns: int) -> Decision:
+    def _stand(self, reason: str, now_ns: int) -> OutputDecision:
         if self._stopping is None:
             plan = self._plan
             self._stopping = Stopping(plan.stop, plan.actions, self._applied, now_ns)
         self._stall.ask(0.0)
         self._applied = self._stopping.values(now_ns)
-        return Decision(self._applied, self._stopping.releases(now_ns), reason, 0, None)
+        return OutputDecision(self._applied, self._stopping.releases(now_ns), reason, 0, None)
 
-    def _follow(self, command: Order, elapsed_s: float, now_ns: int) -> Decision:
+    def _follow(self, command: Order, elapsed_s: float, now_ns: int) -> OutputDecision:
         self._stopping = None
         actions = self._plan.actions
         aims = [aimed(a, value) for a, value in zip(actions, command.values, strict=True)]
@@ -286,7 +389,7 @@ class Rules:
             slewed(a, now, aim, elapsed_s)
             for a, now, aim in zip(actions, self._applied, aims, strict=True)
         )
-        return Decision(self._applied, False, reason, command.session, command.seq)
+        return OutputDecision(self._applied, False, reason, command.session, command.seq)
 
     def _hold_back(self, aims: list[float], now_ns: int) -> str:
         """Drop from what is aimed at what a reflex does not allow, and say why."""

@@ -3,16 +3,130 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
-from shapechanger.robot.guard.merging import merge
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.guard.senses import Sensing
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["MOST_READ_NS", "Sensors"]
+__all__ = ["ESTIMATED", "MOST_READ_NS", "SensedState", "Sensing", "Sensors", "merge"]
+
+
+def _larger(new: float, old: float) -> bool:
+    return new > old
+
+
+def _smaller(new: float, old: float) -> bool:
+    return new < old
+
+
+def _slower(new: float, old: float) -> bool:
+    return abs(new) < abs(old)
+
+
+# The one that calls for more care counts. Of two speeds it is the smaller one, so that a track that
+# turns does not hide one that is stalled. Of other quantities the last one counts.
+_COUNTS_MORE: Final[dict[str, Callable[[float, float], bool]]] = {
+    "bump": _larger,
+    "collision": _larger,
+    "stall": _larger,
+    "temperature": _larger,
+    "distance": _smaller,
+    "battery": _smaller,
+    "speed": _slower,
+}
+
+
+def merge(
+    quantities: dict[str, float],
+    sources: dict[str, str],
+    measured: Mapping[str, float],
+    sensor: str,
+) -> None:
+    """Add what one more sensor measured.
+
+    Args:
+        quantities: What was measured so far, by name; changed.
+        sources: Name of the sensor behind each; changed.
+        measured: What this sensor measured.
+        sensor: Its name.
+    """
+    for name, value in measured.items():
+        counts_more = _COUNTS_MORE.get(name)
+        is_first = name not in quantities
+        if is_first or counts_more is None or counts_more(value, quantities[name]):
+            quantities[name], sources[name] = value, sensor
+
+
+ESTIMATED = "estimated"
+"""Source of a quantity that follows from what is commanded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing:
+    """What the sensors said in one round.
+
+    Attributes:
+        quantities: What was measured, by name and in SI units; see `GuardState.quantities`.
+        sources: Name of the sensor behind each quantity.
+        failures: Why a sensor did not answer, in words, by its name.
+        slow: Sensors that took too long, among those that failed.
+        silent: Distance sensors that answered, but know no distance.
+    """
+
+    quantities: Mapping[str, float] = field(default_factory=dict[str, float])
+    sources: Mapping[str, str] = field(default_factory=dict[str, str])
+    failures: Mapping[str, str] = field(default_factory=dict[str, str])
+    slow: frozenset[str] = frozenset()
+    silent: frozenset[str] = frozenset()
+
+
+class SensedState:
+    """The newest sensing, completed by what is concluded from it.
+
+    Attributes:
+        quantities: By name and in SI units; what nothing measures and nothing implies is absent.
+        sources: Name of the sensor behind each, or "estimated".
+    """
+
+    def __init__(self) -> None:
+        self.quantities: dict[str, float] = {}
+        self.sources: dict[str, str] = {}
+
+    def complete(
+        self, sensing: Sensing, *, speed: float | None, stalled: bool, watches_stall: bool
+    ) -> None:
+        """Take in a sensing.
+
+        Args:
+            sensing: What the sensors said.
+            speed: What the speed should be, m/s, for where it is not measured; None for unknown.
+            stalled: Whether the robot pushes without moving.
+            watches_stall: Whether that would be noticed.
+        """
+        self.quantities = dict(sensing.quantities)
+        self.sources = dict(sensing.sources)
+        if watches_stall:
+            self._add("stall", float(stalled), self.sources["speed"])
+        if "speed" not in self.quantities and speed is not None:
+            self._add("speed", speed, ESTIMATED)
+        self._conclude_collision()
+
+    def _conclude_collision(self) -> None:
+        """A bumper is certain; a stall is the last thing that tells."""
+        signs = [name for name in ("bump", "stall") if name in self.quantities]
+        if not signs:
+            return
+        sign = next((name for name in signs if self.quantities[name] > 0.0), signs[0])
+        source = ESTIMATED if sign == "stall" else self.sources[sign]
+        self._add("collision", float(self.quantities[sign] > 0.0), source)
+
+    def _add(self, name: str, value: float, source: str) -> None:
+        self.quantities[name], self.sources[name] = value, source
+
 
 MOST_READ_NS: Final = 20_000_000
 """How long a sensor may take to answer, ns: for so long nothing can be stopped."""

@@ -12,15 +12,23 @@ import fcntl
 import json
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import REAL
 
-__all__ = ["ServePlan", "plan_fd", "read_plan_fd", "supervisor_command"]
+__all__ = [
+    "AFTER_FAILURE",
+    "ServePlan",
+    "descriptors",
+    "plan_fd",
+    "read_plan_fd",
+    "supervisor_command",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +107,19 @@ def read_plan_fd(fd: int) -> ServePlan:
     while part := os.pread(fd, 1 << 16, len(data)):
         data += part
     return ServePlan.from_json(data.decode())
+
+
+AFTER_FAILURE: Final = "--after-failure"
+"""The guard's argument that says that it follows processes which failed."""
+
+
+def descriptors(arguments: Sequence[str], names: Sequence[str]) -> dict[str, int]:
+    """The file descriptors of a command line such as `--plan-fd 3 --heartbeat-fd 4`.
+
+    Raises:
+        ValueError: If there are others, or one is missing.
+    """
+    pairs = dict(zip(arguments[::2], arguments[1::2], strict=True))
+    if sorted(pairs) != sorted(names):
+        raise ValueError(f"This takes {' N '.join(names)} N, not {' '.join(arguments)}.")
+    return {name: int(value) for name, value in pairs.items()}

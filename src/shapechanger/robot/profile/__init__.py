@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
+from shapechanger.robot.profile.load import (
+    find_profile,
+    load_profile,
+    shipped_profiles,
+    write_profile,
+)
 from shapechanger.robot.profile.profile import EnablePlan, Profile, ResetStep, RewardPlan
 from shapechanger.robot.profile.read import read_profile
-from shapechanger.robot.profile.starter import write_profile
 
 __all__ = [
     "EnablePlan",

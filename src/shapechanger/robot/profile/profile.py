@@ -5,12 +5,20 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
+from shapechanger.errors import RobotError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.drivers.dynamixel.settings import (
+    ServoSettings,
+    bus_settings,
+    servo_settings,
+)
+from shapechanger.robot.drivers.settings import number, numbers, texts
 from shapechanger.robot.guard.plan import (
     ActionPlan,
     GuardPlan,
@@ -19,10 +27,213 @@ from shapechanger.robot.guard.plan import (
     SensorPlan,
     StopPlan,
 )
-from shapechanger.robot.profile.quantities import APPLIED, state_features
-from shapechanger.robot.profile.servo_bus import tension_spans
+from shapechanger.robot.profile.mistakes import Source, called
 
-__all__ = ["EnablePlan", "Profile", "ResetStep", "RewardPlan"]
+__all__ = [
+    "APPLIED",
+    "COLLISION",
+    "JOINTS",
+    "QUANTITIES",
+    "STALL",
+    "TENDONS",
+    "EnablePlan",
+    "Profile",
+    "Quantity",
+    "ResetStep",
+    "RewardPlan",
+    "state_features",
+    "tension_spans",
+    "with_servo_bus",
+]
+
+APPLIED: Final = "applied"
+"""Last part of the name of a feature that says what an action really does: `steering/applied`."""
+
+STALL: Final = "stall"
+"""What the guard concludes from a speed that is measured: it pushes and does not move."""
+
+TENDONS: Final = "tendons"
+"""What the sensor of a servo bus measures: `FDP/length`, `FDP/speed` and `FDP/tension`."""
+
+JOINTS: Final = "joints"
+"""What encoders at joints measure: `MCP_flexion/angle`."""
+
+COLLISION: Final = "collision"
+"""What the guard concludes from a bumper, or from a stall."""
+
+
+class Quantity(NamedTuple):
+    """One number that a sensor gives.
+
+    Attributes:
+        measures: Which sensors give it, as in `SensorPlan.measures`; or what the guard concludes.
+        unit: Its SI unit.
+        low: Smallest value.
+        high: Largest value.
+    """
+
+    measures: str
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+
+
+QUANTITIES: Final = {
+    "speed": Quantity("speed", "m/s"),
+    "distance": Quantity("distance", "m", low=0.0),
+    "bump": Quantity("bump", "1", 0.0, 1.0),
+    "stall": Quantity(STALL, "1", 0.0, 1.0),
+    "collision": Quantity(COLLISION, "1", 0.0, 1.0),
+    "yaw_rate": Quantity("imu", "rad/s"),
+    "acceleration_x": Quantity("imu", "m/s²"),
+    "acceleration_y": Quantity("imu", "m/s²"),
+    "battery": Quantity("battery", "V", low=0.0),
+    "temperature": Quantity("temperature", "°C"),
+}
+"""The quantities by their names in `GuardState.quantities`, in the order of the state."""
+
+
+def state_features(
+    sensors: Iterable[SensorPlan], actions: Iterable[ActionPlan], limits: LimitPlan
+) -> list[Feature]:
+    """A feature for each quantity that a robot senses.
+
+    Without a sensor the guard estimates the speed from an action that propels and whose profile
+    says how fast it makes the robot, in m/s. Stalls and collisions are what the guard concludes.
+    """
+    sensors = tuple(sensors)
+    sources: dict[str, Element] = {}
+    for sensor in sensors:
+        sources.setdefault(sensor.measures, Element("sensor", sensor.name))
+    if "speed" in sources and limits.stall_s > 0.0:
+        sources[STALL] = sources["speed"]
+    if bumped := sources.get("bump", sources.get(STALL)):
+        sources[COLLISION] = bumped
+    for action in actions:
+        if action.propels and action.unit == QUANTITIES["speed"].unit:
+            sources.setdefault("speed", Element("actuator", action.name))
+    known = [
+        Feature(name, q.unit, q.low, q.high, sources[q.measures])
+        for name, q in QUANTITIES.items()
+        if q.measures in sources
+    ]
+    known += [f for s in sensors if s.measures == TENDONS for f in _tendon_features(s)]
+    return known + [f for s in sensors if s.measures == JOINTS for f in _joint_features(s)]
+
+
+def _tendon_features(sensor: SensorPlan) -> list[Feature]:
+    """Length, speed and tension of each tendon of a servo bus."""
+    names = texts(sensor.settings, "tendons")
+    most = numbers(sensor.settings, "most_tensions_n")
+    parts = [(name, n, Element("tendon", name)) for name, n in zip(names, most, strict=True)]
+    return [
+        *(Feature(f"{name}/length", "m", element=part) for name, _, part in parts),
+        *(Feature(f"{name}/speed", "m/s", element=part) for name, _, part in parts),
+        *(Feature(f"{name}/tension", "N", 0.0, n, part) for name, n, part in parts),
+    ]
+
+
+def _joint_features(sensor: SensorPlan) -> list[Feature]:
+    """Angle of each joint, within half a turn around its zero."""
+    names = texts(sensor.settings, "joints")
+    return [
+        Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name)) for name in names
+    ]
+
+
+_DRIVER: Final = "dynamixel"
+
+
+def with_servo_bus(
+    source: Source,
+    bus: Mapping[str, Any] | None,
+    outputs: tuple[OutputPlan, ...],
+    sensors: tuple[SensorPlan, ...],
+    stop: StopPlan,
+) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
+    """The outputs and sensors with what they need to know of their bus.
+
+    Args:
+        source: Where the profile was read.
+        bus: The table of the bus; None without one.
+        outputs: All outputs.
+        sensors: All sensors.
+        stop: How the robot stops.
+
+    Raises:
+        ProfileError: If outputs have no bus, or a bus no outputs or no sensor; if two servos have
+            one id, one cannot do what it is set to, or a stop would not let go.
+    """
+    on_bus = [output for output in outputs if output.driver == _DRIVER]
+    sensing = [sensor for sensor in sensors if sensor.driver == _DRIVER]
+    if not on_bus:
+        if bus is not None:
+            words = f"[servo_bus] needs an output with the driver {_DRIVER}"
+            raise source.mistake(("servo_bus",), words)
+        if sensing:
+            words = f"{called(('sensor', sensing[0].name))} needs outputs with the driver {_DRIVER}"
+            raise source.mistake(("sensor", sensing[0].name), words)
+        return outputs, sensors
+    first = ("output", on_bus[0].name)
+    if bus is None:
+        raise source.mistake(first, f"{called(first)} is on a bus: add [servo_bus]")
+    if len(sensing) != 1:
+        words = (
+            f"servos need one sensor with the driver {_DRIVER}, such as [sensor.tendons], which "
+            "hears when one of them fails"
+        )
+        raise source.mistake(("sensor",) if not sensing else ("sensor", sensing[1].name), words)
+    if stop.then != "release":
+        words = 'then of [stop] must be "release", so that no servo pulls while nobody commands'
+        raise source.mistake(("stop", "then"), words)
+    whole = [replace(output, settings={**output.settings, **bus}) for output in on_bus]
+    _check(source, whole, bus)
+    tendons: dict[str, Any] = {
+        "device": bus["device"],
+        "tendons": [output.name for output in on_bus],
+        "most_tensions_n": [number(output.settings, "most_tension_n") for output in on_bus],
+    }
+    by_name = {output.name: output for output in whole}
+    return (
+        tuple(by_name.get(output.name, output) for output in outputs),
+        tuple(
+            replace(sensor, settings={**sensor.settings, **tendons})
+            if sensor in sensing
+            else sensor
+            for sensor in sensors
+        ),
+    )
+
+
+def tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
+    """From pretension to the most tension, N, of each action that alone pulls one tendon."""
+    outputs = tuple(outputs)
+    moved = [name for output in outputs for name in output.mix]
+    spans: dict[str, float] = {}
+    for output in outputs:
+        if output.driver != _DRIVER or output.offset or len(output.mix) != 1:
+            continue
+        ((name, weight),) = output.mix.items()
+        if weight == 1.0 and moved.count(name) == 1:
+            settings = output.settings
+            spans[name] = number(settings, "most_tension_n") - number(settings, "pretension_n")
+    return {name: span for name, span in spans.items() if span > 0.0}
+
+
+def _check(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) -> None:
+    """Refuse what the driver would refuse, with the line."""
+    servos: list[ServoSettings] = []
+    for output in outputs:
+        try:
+            servos.append(servo_settings(output))
+        except (RobotError, UnknownName) as error:
+            words = str(error).rstrip(".")
+            raise source.mistake(("output", output.name), words) from error
+    try:
+        bus_settings({**outputs[0].settings, **bus}, tuple(servos))
+    except RobotError as error:
+        raise source.mistake(("servo_bus",), str(error).rstrip(".")) from error
+
 
 # The layout is in SI units, a profile may be in degrees.
 _SI: Final = {"deg": ("rad", math.pi / 180.0)}

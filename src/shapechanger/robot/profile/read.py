@@ -12,13 +12,14 @@ from typing import Any, Final, cast
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
-from shapechanger.robot.profile.devices import read_camera, read_output, read_sensor
-from shapechanger.robot.profile.keys import Key
-from shapechanger.robot.profile.limits import read_limits
-from shapechanger.robot.profile.lines import Place
-from shapechanger.robot.profile.mistake import Source, called, choice, shown
-from shapechanger.robot.profile.motion import check_mix, check_pulses, check_stop, read_action
-from shapechanger.robot.profile.profile import EnablePlan, Profile, ResetStep, RewardPlan
+from shapechanger.robot.profile.mistakes import Place, Source, called, choice, shown
+from shapechanger.robot.profile.profile import (
+    EnablePlan,
+    Profile,
+    ResetStep,
+    RewardPlan,
+    with_servo_bus,
+)
 from shapechanger.robot.profile.schema import (
     EMERGENCY_BUTTON_KEYS,
     ENABLE_KEYS,
@@ -28,15 +29,23 @@ from shapechanger.robot.profile.schema import (
     SERVO_BUS_KEYS,
     STOP_KEYS,
     TABLES,
+    ProfileKey,
 )
-from shapechanger.robot.profile.servo_bus import with_servo_bus
-from shapechanger.robot.profile.table import (
+from shapechanger.robot.profile.sections import (
+    check_mix,
+    check_pulses,
+    check_stop,
+    read_action,
+    read_camera,
     read_keys,
+    read_limits,
+    read_output,
+    read_sensor,
     refuse_bad_name,
     refuse_unknown_keys,
     table_at,
 )
-from shapechanger.robot.profile.wiring import Wiring
+from shapechanger.robot.profile.wiring import PinAllocation
 
 __all__ = ["read_profile"]
 
@@ -70,7 +79,7 @@ class _Reader:
     def __init__(self, source: Source, data: Mapping[str, Any]) -> None:
         self._source = source
         self._data = data
-        self._wiring = Wiring(source)
+        self._wiring = PinAllocation(source)
 
     def profile(self) -> Profile:
         """The whole profile."""
@@ -173,10 +182,12 @@ class _Reader:
         self._wiring.take_pin(pin, ("emergency_button", "pin"))
         return pin
 
-    def _only_table(self, name: str, keys: Sequence[Key]) -> dict[str, Any]:
+    def _only_table(self, name: str, keys: Sequence[ProfileKey]) -> dict[str, Any]:
         return self._keys(table_at(self._source, self._data, (name,)), (name,), keys)
 
-    def _keys(self, table: Mapping[str, Any], place: Place, keys: Sequence[Key]) -> dict[str, Any]:
+    def _keys(
+        self, table: Mapping[str, Any], place: Place, keys: Sequence[ProfileKey]
+    ) -> dict[str, Any]:
         refuse_unknown_keys(self._source, table, place, [key.name for key in keys])
         return read_keys(self._source, table, place, keys)
 

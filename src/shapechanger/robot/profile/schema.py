@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import date, datetime
+from typing import Any, Final, Literal, cast
 
 from shapechanger.robot.cameras.camera import CAMERA_DRIVERS
-from shapechanger.robot.drivers.dynamixel.models import MODELS
+from shapechanger.robot.drivers.dynamixel.settings import MODELS
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
-from shapechanger.robot.profile.keys import NO_PIN, Key
+from shapechanger.robot.profile.mistakes import nearest, shown
 
 __all__ = [
     "ACTION_KEYS",
+    "BCM_OF_BOARD",
     "CAMERA_KEYS",
     "CAMERA_SETTINGS",
     "DRIVING_PARTS",
     "EMERGENCY_BUTTON_KEYS",
     "ENABLE_KEYS",
+    "HIGHEST_BCM",
+    "I2C_PINS",
     "JOINT_KEYS",
     "LIMIT_KEYS",
     "MEASURES",
+    "NO_PIN",
     "OUTPUT_KEYS",
     "OUTPUT_SETTINGS",
     "OVER",
     "OVER_SETTINGS",
     "PARTS",
+    "REQUIRED",
     "RESET_KEYS",
     "REWARD_KEYS",
     "ROBOT_KEYS",
@@ -34,7 +43,254 @@ __all__ = [
     "SERVO_BUS_KEYS",
     "STOP_KEYS",
     "TABLES",
+    "UNITS",
+    "Kind",
+    "ProfileKey",
+    "bcm",
+    "stem_of",
+    "unit_of",
+    "with_unit",
 ]
+
+HIGHEST_BCM: Final = 27
+"""The largest BCM number on the header; the smallest is 0."""
+
+BCM_OF_BOARD: Final = {
+    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23,
+    18: 24, 19: 10, 21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5,
+    31: 6, 32: 12, 33: 13, 35: 19, 36: 16, 37: 26, 38: 20, 40: 21,
+}  # fmt: skip
+"""BCM number of each place on the header that has one."""
+
+I2C_PINS: Final = {0: (0, 1), 1: (2, 3)}
+"""BCM pins of data and clock of the I2C buses that have fixed ones."""
+
+_POWER_OF_BOARD: Final = (
+    dict.fromkeys((1, 17), "3.3 V")
+    | dict.fromkeys((2, 4), "5 V")
+    | dict.fromkeys((6, 9, 14, 20, 25, 30, 34, 39), "ground")
+)
+_WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
+
+
+def bcm(written: object) -> int:
+    """The BCM number of a pin.
+
+    Raises:
+        ValueError: If there is no such pin; the message says why, after a comma, or is empty where
+            there is no more to say.
+    """
+    if type(written) is int:
+        number = written
+    elif isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
+        number = int(match[2])
+        if match[1] == "BOARD":
+            if number in _POWER_OF_BOARD:
+                raise ValueError(f"and {written} is {_POWER_OF_BOARD[number]}")
+            if number not in BCM_OF_BOARD:
+                raise ValueError("and the header has the places 1 to 40")
+            number = BCM_OF_BOARD[number]
+    else:
+        raise ValueError
+    if not 0 <= number <= HIGHEST_BCM:
+        raise ValueError
+    return number
+
+
+UNITS: Final = {
+    "_deg_per_s": "degrees a second",
+    "_per_s": "per second",
+    "_hz": "hertz",
+    "_ms": "milliseconds",
+    "_us": "microseconds",
+    "_m": "metres",
+    "_s": "seconds",
+    "_v": "volts",
+    "_c": "degrees Celsius",
+}
+"""What the end of a key says, longest first."""
+
+# What people write instead.
+_OTHER_ENDS: Final = ("_deg", "_rad", "_cm", "_mm", "_km", "_mv", "_f", "_sec", "_khz", "_min")
+
+
+def unit_of(key: str) -> str:
+    """The unit that the name of a key ends with, in words; empty for none."""
+    return next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
+
+
+def stem_of(key: str) -> str:
+    """The name of a key without any unit."""
+    return next((key.removesuffix(e) for e in (*UNITS, *_OTHER_ENDS) if key.endswith(e)), key)
+
+
+def with_unit(key: str, known: Iterable[str]) -> str | None:
+    """The known key that is meant by one with no unit or another one; None for none."""
+    return next((k for k in known if unit_of(k) and stem_of(k) == stem_of(key)), None)
+
+
+Kind = Literal[
+    "number", "whole", "text", "truth", "pin", "pins", "size", "weights", "date", "choice"
+]
+"""What sort of value a key holds."""
+
+REQUIRED: Final = object()
+"""The default of a key that has none."""
+
+NO_PIN: Final = -1
+"""The value of a pin that is not connected."""
+
+_LONGEST_TEXT: Final = 64  # As names on the wire, see `shapechanger.link.messages`.
+_NOT_PRINTABLE: Final = re.compile(r"[^\x20-\x7e\xa0-\U0010ffff]")
+_A_PIN: Final = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileKey:
+    """One key of a table.
+
+    Attributes:
+        name: Its name, which ends with the unit.
+        kind: What it holds.
+        default: What it is where it is left out; `REQUIRED` for a key that may not be.
+        low: Smallest number.
+        high: Largest number; infinity goes with `above`.
+        above: Whether `low` itself is too small.
+        names: What a "choice" may be.
+        longest: Most characters of a text.
+    """
+
+    name: str
+    kind: Kind
+    default: Any = REQUIRED
+    low: float = 0.0
+    high: float = math.inf
+    above: bool = False
+    names: tuple[str, ...] = ()
+    longest: int = _LONGEST_TEXT
+
+    @property
+    def wanted(self) -> str:
+        """What it must be, in words."""
+        unit = unit_of(self.name)
+        match self.kind:
+            case "number":
+                return f"a number{self._range()}{f' ({unit})' if unit else ''}"
+            case "whole":
+                return f"a whole number{self._range()}{f' ({unit})' if unit else ''}"
+            case "text":
+                return f"a text of 1 to {self.longest} characters that can be printed"
+            case "truth":
+                return "true or false"
+            case "pin":
+                return _A_PIN if self.default != NO_PIN else f"{_A_PIN}, or {NO_PIN} for none"
+            case "pins":
+                return f"a list of pins, each {_A_PIN}"
+            case "size":
+                low, high = int(self.low), int(self.high)
+                return f"[width, height] in pixels, each an even number from {low} to {high}"
+            case "weights":
+                return f"a table of numbers{self._range()} by name of action"
+            case "date":
+                return "a date, such as 2026-11-03"
+            case "choice":
+                return f"one of {', '.join(repr(name) for name in self.names if name)}"
+
+    def value_of(self, written: Any) -> Any:
+        """The value, as plans have it.
+
+        Raises:
+            ValueError: If it is not what the key may hold; the message goes on after `wanted`.
+        """
+        try:
+            return self._value_of(written)
+        except ValueError as error:
+            raise ValueError(str(error) or f"not {shown(written)}") from None
+
+    def _value_of(self, written: Any) -> Any:
+        match self.kind:
+            case "number":
+                return self._number(written)
+            case "whole":
+                if type(written) is not int:
+                    raise ValueError
+                self._number(written)
+                return written
+            case "pin":
+                if type(written) is int and written == self.default == NO_PIN:
+                    return NO_PIN
+                return bcm(written)
+            case "pins":
+                return self._pins(written)
+            case "size":
+                return self._size(written)
+            case "weights":
+                return self._weights(written)
+            case "choice":
+                if not isinstance(written, str):
+                    raise ValueError
+                if written not in self.names:
+                    raise ValueError(f"not {written!r}{nearest(written, self.names)}")
+            case "text":
+                ok = isinstance(written, str) and 1 <= len(written) <= self.longest
+                if not ok or _NOT_PRINTABLE.search(written) or not written.strip():
+                    raise ValueError
+            case "truth":
+                if not isinstance(written, bool):
+                    raise ValueError
+            case "date":
+                if not isinstance(written, date) or isinstance(written, datetime):
+                    raise ValueError
+        return written
+
+    def _range(self) -> str:
+        low, high = f"{self.low:g}", f"{self.high:g}"
+        if math.isinf(self.high):
+            return f" above {low}"
+        return f" above {low} and up to {high}" if self.above else f" from {low} to {high}"
+
+    def _number(self, written: Any) -> float:
+        if type(written) not in (int, float):
+            raise ValueError
+        # Written so that NaN is refused.
+        if not self.low <= written <= self.high or (self.above and written == self.low):
+            raise ValueError
+        try:
+            return float(written)
+        except OverflowError:
+            raise ValueError from None
+
+    def _pins(self, written: Any) -> list[int]:
+        if not isinstance(written, list) or not written:
+            raise ValueError
+        pins: list[int] = []
+        for pin in cast("list[Any]", written):
+            try:
+                pins.append(bcm(pin))
+            except ValueError as error:
+                raise ValueError(str(error) or f"and {shown(pin)} is none") from None
+        return pins
+
+    def _size(self, written: Any) -> tuple[int, int]:
+        if not isinstance(written, list):
+            raise ValueError
+        sides = cast("list[Any]", written)
+        if len(sides) != 2 or any(type(side) is not int or side % 2 for side in sides):
+            raise ValueError
+        width, height = (int(self._number(side)) for side in sides)
+        return width, height
+
+    def _weights(self, written: Any) -> dict[str, float]:
+        if not isinstance(written, dict):
+            raise ValueError
+        weights: dict[str, float] = {}
+        for name, weight in cast("dict[str, Any]", written).items():
+            try:
+                weights[name] = self._number(weight)
+            except ValueError:
+                raise ValueError(f"and the one of {name} is {shown(weight)}") from None
+        return weights
+
 
 TABLES: Final = (
     "robot",
@@ -81,84 +337,84 @@ MEASURES: Final = {
 """What each sensor driver measures, as in `SensorPlan.measures`."""
 
 ROBOT_KEYS: Final = (
-    Key("name", "text"),
-    Key("body", "text"),
-    Key("control_hz", "number", 20.0, low=1.0, high=100.0),
-    Key("calibrated", "date", None),
+    ProfileKey("name", "text"),
+    ProfileKey("body", "text"),
+    ProfileKey("control_hz", "number", 20.0, low=1.0, high=100.0),
+    ProfileKey("calibrated", "date", None),
 )
 
 ACTION_KEYS: Final = (
-    Key("low", "number", None, low=-1.0, high=1.0),
-    Key("high", "number", 1.0, low=-1.0, high=1.0),
-    Key("rest", "number", 0.0, low=-1.0, high=1.0),
-    Key("slew_per_s", "number", math.inf, low=0.0, above=True),
-    Key("levels", "choice", "any", names=("any", "three")),
-    Key("threshold", "number", 0.33, low=0.0, high=1.0, above=True),
-    Key("propels", "truth", False),
-    Key("one_sided", "truth", False),
-    Key("unit", "choice", "1", names=("1", "deg", "rad", "m", "m/s", "N", "N·m")),
-    Key("gain", "number", 1.0, low=0.0, high=1e6, above=True),
+    ProfileKey("low", "number", None, low=-1.0, high=1.0),
+    ProfileKey("high", "number", 1.0, low=-1.0, high=1.0),
+    ProfileKey("rest", "number", 0.0, low=-1.0, high=1.0),
+    ProfileKey("slew_per_s", "number", math.inf, low=0.0, above=True),
+    ProfileKey("levels", "choice", "any", names=("any", "three")),
+    ProfileKey("threshold", "number", 0.33, low=0.0, high=1.0, above=True),
+    ProfileKey("propels", "truth", False),
+    ProfileKey("one_sided", "truth", False),
+    ProfileKey("unit", "choice", "1", names=("1", "deg", "rad", "m", "m/s", "N", "N·m")),
+    ProfileKey("gain", "number", 1.0, low=0.0, high=1e6, above=True),
 )
 
 OUTPUT_KEYS: Final = (
-    Key("driver", "choice", names=tuple(OUTPUT_DRIVERS)),
-    Key("part", "choice", "", names=("", *PARTS)),
-    Key("mix", "weights", low=-10.0, high=10.0),
-    Key("offset", "number", 0.0, low=-1.0, high=1.0),
+    ProfileKey("driver", "choice", names=tuple(OUTPUT_DRIVERS)),
+    ProfileKey("part", "choice", "", names=("", *PARTS)),
+    ProfileKey("mix", "weights", low=-10.0, high=10.0),
+    ProfileKey("offset", "number", 0.0, low=-1.0, high=1.0),
 )
 
-_BUS: Final = Key("bus", "whole", 1, low=0, high=99)
+_BUS: Final = ProfileKey("bus", "whole", 1, low=0, high=99)
 _PULSES: Final = (
-    Key("over", "choice", names=OVER),
-    Key("hz", "whole", 50, low=40, high=400),
+    ProfileKey("over", "choice", names=OVER),
+    ProfileKey("hz", "whole", 50, low=40, high=400),
 )
 _DUTY: Final = (
     # gpiozero's software PWM takes up to 10 kHz.
-    Key("pwm_hz", "whole", 50, low=1, high=10_000),
-    Key("start", "number", 0.0, low=0.0, high=1.0),
-    Key("full", "number", 1.0, low=0.0, high=1.0, above=True),
+    ProfileKey("pwm_hz", "whole", 50, low=1, high=10_000),
+    ProfileKey("start", "number", 0.0, low=0.0, high=1.0),
+    ProfileKey("full", "number", 1.0, low=0.0, high=1.0, above=True),
 )
 
 
-def _width(name: str, default: int) -> Key:
+def _width(name: str, default: int) -> ProfileKey:
     # The widths that lgpio.tx_servo takes; servos and controllers know no others.
-    return Key(name, "whole", default, low=500, high=2500)
+    return ProfileKey(name, "whole", default, low=500, high=2500)
 
 
 OUTPUT_SETTINGS: Final = {
     "hbridge": (
-        Key("forward", "pin"),
-        Key("backward", "pin"),
-        Key("enable", "pin", NO_PIN),
+        ProfileKey("forward", "pin"),
+        ProfileKey("backward", "pin"),
+        ProfileKey("enable", "pin", NO_PIN),
         *_DUTY,
     ),
-    "phase_enable": (Key("phase", "pin"), Key("enable", "pin"), *_DUTY),
+    "phase_enable": (ProfileKey("phase", "pin"), ProfileKey("enable", "pin"), *_DUTY),
     "servo": (
         *_PULSES,
         _width("left_us", 1000),
         _width("centre_us", 1500),
         _width("right_us", 2000),
-        Key("travel_deg_per_s", "number", math.inf, low=0.0, above=True),
+        ProfileKey("travel_deg_per_s", "number", math.inf, low=0.0, above=True),
     ),
     "esc": (
         *_PULSES,
         _width("backward_us", 1000),
         _width("neutral_us", 1500),
         _width("forward_us", 2000),
-        Key("arm_s", "number", 2.5, low=0.0, high=30.0),
-        Key("reverse", "choice", "direct", names=("direct", "double", "none")),
-        Key("brake_ms", "whole", 200, low=0, high=2000),
+        ProfileKey("arm_s", "number", 2.5, low=0.0, high=30.0),
+        ProfileKey("reverse", "choice", "direct", names=("direct", "double", "none")),
+        ProfileKey("brake_ms", "whole", 200, low=0, high=2000),
     ),
     "dynamixel": (
-        Key("id", "whole", low=0, high=252),
-        Key("model", "choice", names=tuple(MODELS)),
-        Key("spool_radius_m", "number", low=0.0, high=0.1, above=True),
-        Key("direction", "whole", 1, low=-1, high=1),
-        Key("most_tension_n", "number", low=0.0, high=1000.0, above=True),
-        Key("pretension_n", "number", low=0.0, high=1000.0, above=True),
-        Key("homing_n", "number", 3.0, low=0.0, high=1000.0, above=True),
+        ProfileKey("id", "whole", low=0, high=252),
+        ProfileKey("model", "choice", names=tuple(MODELS)),
+        ProfileKey("spool_radius_m", "number", low=0.0, high=0.1, above=True),
+        ProfileKey("direction", "whole", 1, low=-1, high=1),
+        ProfileKey("most_tension_n", "number", low=0.0, high=1000.0, above=True),
+        ProfileKey("pretension_n", "number", low=0.0, high=1000.0, above=True),
+        ProfileKey("homing_n", "number", 3.0, low=0.0, high=1000.0, above=True),
         # Where the servo stands while the finger is straight, in counts of 1/4096 turn.
-        Key("zero", "whole", 0, low=-1_000_000, high=1_000_000),
+        ProfileKey("zero", "whole", 0, low=-1_000_000, high=1_000_000),
     ),
 }
 """Keys of each output driver, besides those of what it goes `over`."""
@@ -166,117 +422,117 @@ OUTPUT_SETTINGS: Final = {
 OVER_SETTINGS: Final = {
     "pca9685": (
         _BUS,
-        Key("address", "whole", 0x40, low=0x40, high=0x7F),
-        Key("channel", "whole", low=0, high=15),
-        Key("output_enable", "pin", NO_PIN),
+        ProfileKey("address", "whole", 0x40, low=0x40, high=0x7F),
+        ProfileKey("channel", "whole", low=0, high=15),
+        ProfileKey("output_enable", "pin", NO_PIN),
     ),
-    "lgpio": (Key("pin", "pin"),),
+    "lgpio": (ProfileKey("pin", "pin"),),
     "sysfs": (
-        Key("chip", "whole", 0, low=0, high=99),
-        Key("channel", "whole", low=0, high=15),
+        ProfileKey("chip", "whole", 0, low=0, high=99),
+        ProfileKey("channel", "whole", low=0, high=15),
     ),
 }
 """Keys that a servo or a controller has for what makes its pulses."""
 
-SENSOR_KEYS: Final = (Key("driver", "choice", names=tuple(SENSOR_DRIVERS)),)
+SENSOR_KEYS: Final = (ProfileKey("driver", "choice", names=tuple(SENSOR_DRIVERS)),)
 
 SENSOR_SETTINGS: Final = {
     "encoder": (
-        Key("a", "pin"),
-        Key("b", "pin", NO_PIN),
-        Key("counts_per_turn", "number", low=0.0, high=1e6, above=True),
-        Key("wheel_m", "number", low=0.0, high=100.0, above=True),
+        ProfileKey("a", "pin"),
+        ProfileKey("b", "pin", NO_PIN),
+        ProfileKey("counts_per_turn", "number", low=0.0, high=1e6, above=True),
+        ProfileKey("wheel_m", "number", low=0.0, high=100.0, above=True),
     ),
     "switch": (
-        Key("pins", "pins"),
-        Key("pull", "choice", "up", names=("up", "down")),
+        ProfileKey("pins", "pins"),
+        ProfileKey("pull", "choice", "up", names=("up", "down")),
     ),
     "hcsr04": (
-        Key("trigger", "pin"),
-        Key("echo", "pin"),
-        Key("max_m", "number", 2.0, low=0.0, high=5.0, above=True),
+        ProfileKey("trigger", "pin"),
+        ProfileKey("echo", "pin"),
+        ProfileKey("max_m", "number", 2.0, low=0.0, high=5.0, above=True),
     ),
-    "mpu6050": (_BUS, Key("address", "whole", 0x68, low=0x68, high=0x69)),
-    "ina219": (_BUS, Key("address", "whole", 0x40, low=0x40, high=0x4F)),
+    "mpu6050": (_BUS, ProfileKey("address", "whole", 0x68, low=0x68, high=0x69)),
+    "ina219": (_BUS, ProfileKey("address", "whole", 0x40, low=0x40, high=0x4F)),
     "cpu_temperature": (
-        Key("path", "text", "/sys/class/thermal/thermal_zone0/temp", longest=4096),
+        ProfileKey("path", "text", "/sys/class/thermal/thermal_zone0/temp", longest=4096),
     ),
     "dynamixel": (),
-    "as5600": (_BUS, Key("mux", "whole", 0x70, low=0x70, high=0x77)),
+    "as5600": (_BUS, ProfileKey("mux", "whole", 0x70, low=0x70, high=0x77)),
 }
 """Keys of each sensor driver."""
 
 JOINT_KEYS: Final = (
-    Key("channel", "whole", low=0, high=7),
+    ProfileKey("channel", "whole", low=0, high=7),
     # Counts of 1/4096 turn while the joint is straight.
-    Key("zero", "whole", 0, low=0, high=4095),
-    Key("direction", "whole", 1, low=-1, high=1),
+    ProfileKey("zero", "whole", 0, low=0, high=4095),
+    ProfileKey("direction", "whole", 1, low=-1, high=1),
 )
 """Keys of each joint of a sensor with the driver as5600; each is a table of its own in it."""
 
 CAMERA_KEYS: Final = (
-    Key("driver", "choice", names=tuple(CAMERA_DRIVERS)),
-    Key("size", "size", (160, 120), low=16, high=1920),
-    Key("fps", "number", 20.0, low=1.0, high=120.0),
-    Key("jpeg_quality", "whole", 80, low=1, high=100),
-    Key("flip", "truth", False),
+    ProfileKey("driver", "choice", names=tuple(CAMERA_DRIVERS)),
+    ProfileKey("size", "size", (160, 120), low=16, high=1920),
+    ProfileKey("fps", "number", 20.0, low=1.0, high=120.0),
+    ProfileKey("jpeg_quality", "whole", 80, low=1, high=100),
+    ProfileKey("flip", "truth", False),
 )
 
 CAMERA_SETTINGS: Final = {
-    "picamera2": (Key("number", "whole", 0, low=0, high=9),),
-    "v4l2": (Key("device", "text", "/dev/video0", longest=4096),),
-    "file": (Key("path", "text", longest=4096),),
-    "pipe": (Key("path", "text", longest=4096),),
+    "picamera2": (ProfileKey("number", "whole", 0, low=0, high=9),),
+    "v4l2": (ProfileKey("device", "text", "/dev/video0", longest=4096),),
+    "file": (ProfileKey("path", "text", longest=4096),),
+    "pipe": (ProfileKey("path", "text", longest=4096),),
     "pattern": (),
 }
 """Keys of each camera driver."""
 
 LIMIT_KEYS: Final = (
-    Key("deadline_ms", "whole", 250, low=20, high=1000),
-    Key("camera_stale_ms", "whole", None, low=50, high=5000),
-    Key("bump_hold_ms", "whole", 750, low=0, high=60_000),
-    Key("stop_distance_m", "number", 0.0, low=0.0, high=5.0),
-    Key("stall_s", "number", 0.4, low=0.0, high=10.0),
-    Key("stall_throttle", "number", 0.2, low=0.0, high=1.0, above=True),
-    Key("low_battery_v", "number", 0.0, low=0.0, high=100.0),
-    Key("high_temperature_c", "number", 0.0, low=0.0, high=120.0),
-    Key("max_observation_age_ms", "whole", 400, low=20, high=5000),
-    Key("arming", "choice", "person", names=("person", "anyone")),
+    ProfileKey("deadline_ms", "whole", 250, low=20, high=1000),
+    ProfileKey("camera_stale_ms", "whole", None, low=50, high=5000),
+    ProfileKey("bump_hold_ms", "whole", 750, low=0, high=60_000),
+    ProfileKey("stop_distance_m", "number", 0.0, low=0.0, high=5.0),
+    ProfileKey("stall_s", "number", 0.4, low=0.0, high=10.0),
+    ProfileKey("stall_throttle", "number", 0.2, low=0.0, high=1.0, above=True),
+    ProfileKey("low_battery_v", "number", 0.0, low=0.0, high=100.0),
+    ProfileKey("high_temperature_c", "number", 0.0, low=0.0, high=120.0),
+    ProfileKey("max_observation_age_ms", "whole", 400, low=20, high=5000),
+    ProfileKey("arming", "choice", "person", names=("person", "anyone")),
 )
 
 STOP_KEYS: Final = (
-    Key("hold_ms", "whole", 0, low=0, high=10_000),
-    Key("ramp_ms", "whole", 0, low=0, high=10_000),
-    Key("then", "choice", "hold", names=("hold", "release")),
+    ProfileKey("hold_ms", "whole", 0, low=0, high=10_000),
+    ProfileKey("ramp_ms", "whole", 0, low=0, high=10_000),
+    ProfileKey("then", "choice", "hold", names=("hold", "release")),
 )
 
 REWARD_KEYS: Final = (
-    Key("velocity", "number", 1.0, low=0.0, high=1e6),
-    Key("collision", "number", -10.0, low=-1e6, high=0.0),
-    Key("stall", "number", -1.0, low=-1e6, high=0.0),
-    Key("collision_ends_episode", "truth", True),
+    ProfileKey("velocity", "number", 1.0, low=0.0, high=1e6),
+    ProfileKey("collision", "number", -10.0, low=-1e6, high=0.0),
+    ProfileKey("stall", "number", -1.0, low=-1e6, high=0.0),
+    ProfileKey("collision_ends_episode", "truth", True),
 )
 
 RESET_KEYS: Final = (
-    Key("values", "weights", low=-1.0, high=1.0),
-    Key("seconds", "number", low=0.0, high=60.0, above=True),
+    ProfileKey("values", "weights", low=-1.0, high=1.0),
+    ProfileKey("seconds", "number", low=0.0, high=60.0, above=True),
 )
 
 ENABLE_KEYS: Final = (
-    Key("pin", "pin"),
+    ProfileKey("pin", "pin"),
     # The guard toggles the pin at each of its ticks, 10 ms apart; it may be late by some.
-    Key("hold_ms", "whole", 100, low=30, high=1000),
+    ProfileKey("hold_ms", "whole", 100, low=30, high=1000),
 )
 
 SERVO_BUS_KEYS: Final = (
-    Key("device", "text", "/dev/ttyUSB0", longest=4096),
-    Key("baud", "whole", 1_000_000, low=9600, high=4_500_000),
+    ProfileKey("device", "text", "/dev/ttyUSB0", longest=4096),
+    ProfileKey("baud", "whole", 1_000_000, low=9600, high=4_500_000),
     # The watchdog of the servos counts in steps of 20 ms.
-    Key("watchdog_ms", "whole", 100, low=20, high=2540),
-    Key("ramp_ms", "whole", 300, low=0, high=10_000),
+    ProfileKey("watchdog_ms", "whole", 100, low=20, high=2540),
+    ProfileKey("ramp_ms", "whole", 300, low=0, high=10_000),
     # So that one servo that is silent keeps the guard for less than it lets a sensor take.
-    Key("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
+    ProfileKey("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
 )
 """What the outputs with the driver dynamixel are on."""
 
-EMERGENCY_BUTTON_KEYS: Final = (Key("pin", "pin"),)
+EMERGENCY_BUTTON_KEYS: Final = (ProfileKey("pin", "pin"),)

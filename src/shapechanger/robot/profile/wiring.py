@@ -7,13 +7,17 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
-from shapechanger.robot.profile.keys import NO_PIN, Key
-from shapechanger.robot.profile.lines import Place
-from shapechanger.robot.profile.mistake import Source, called
-from shapechanger.robot.profile.pins import I2C_PINS
-from shapechanger.robot.profile.schema import OUTPUT_SETTINGS, OVER_SETTINGS, SENSOR_SETTINGS
+from shapechanger.robot.profile.mistakes import Place, Source, called
+from shapechanger.robot.profile.schema import (
+    I2C_PINS,
+    NO_PIN,
+    OUTPUT_SETTINGS,
+    OVER_SETTINGS,
+    SENSOR_SETTINGS,
+    ProfileKey,
+)
 
-__all__ = ["Wiring"]
+__all__ = ["PinAllocation"]
 
 _Settings = Mapping[str, Any]
 # Address of every AS5600: ams, data sheet v1-06, "Register Description".
@@ -37,7 +41,7 @@ class _User:
         return f"{self.place[-1]} of {called(self.place[:-1])}"
 
 
-class Wiring:
+class PinAllocation:
     """What is used so far.
 
     Args:
@@ -129,7 +133,7 @@ class Wiring:
     def _take_address(self, bus: Any, address: Any, user: _User) -> None:
         self._take(f"address {address:#x} of I2C bus {bus}", user)
 
-    def _take_pins(self, settings: _Settings, place: Place, keys: Iterable[Key]) -> None:
+    def _take_pins(self, settings: _Settings, place: Place, keys: Iterable[ProfileKey]) -> None:
         for key in keys:
             if key.kind == "pins":
                 for pin in settings[key.name]:

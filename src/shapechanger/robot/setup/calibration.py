@@ -12,12 +12,12 @@ from shapechanger.robot.guard.plan import OutputPlan
 
 __all__ = [
     "PULSES",
-    "Jogging",
+    "JogResult",
     "motor_changes",
     "pulse_changes",
     "reading",
     "wheel_changes",
-    "widened",
+    "with_widest_pulses",
 ]
 
 PULSES: Final = {
@@ -33,7 +33,7 @@ _WIDEST_US: Final = 2400
 
 
 @dataclass(frozen=True, slots=True)
-class Jogging:
+class JogResult:
     """What a person found by jogging a servo or a controller.
 
     Attributes:
@@ -47,7 +47,7 @@ class Jogging:
     high: float
 
 
-def widened(output: OutputPlan) -> OutputPlan:
+def with_widest_pulses(output: OutputPlan) -> OutputPlan:
     """The same output with the widest pulses there are, to jog in; its middle stays.
 
     Raises:
@@ -73,7 +73,7 @@ def reading(output: OutputPlan, value: float) -> str:
     return f"duty {abs(value) * _number(output, 'full'):.2f}"
 
 
-def pulse_changes(output: OutputPlan, found: Jogging) -> dict[str, int]:
+def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
     """What to write for an output that was jogged, by dotted name; whole microseconds.
 
     Args:

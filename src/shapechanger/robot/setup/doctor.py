@@ -224,7 +224,7 @@ def _encoders(
     sensors = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
     if not sensors or importlib.util.find_spec("gpiozero") is None:
         return
-    from shapechanger.robot.setup.joints import bus_speed, examine_encoders, real_encoders
+    from shapechanger.robot.setup.zeros import bus_speed, examine_encoders, real_encoders
 
     yield bus_speed(_config(root))
     for sensor in sensors:

@@ -17,11 +17,10 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from shapechanger.twin.servos.models import TwinModel, twin_model
-from shapechanger.twin.servos.motor import Motor, Tendon
-from shapechanger.twin.servos.packets import BROADCAST
-from shapechanger.twin.servos.table import LIMIT, RANGE, Table, TableError
+from shapechanger.twin.servos.motor import SimulatedMotor, Tendon
+from shapechanger.twin.servos.protocol import BROADCAST, LIMIT, RANGE, Table, TableError
 
-__all__ = ["Answer", "Faults", "Servo", "ServoPlan"]
+__all__ = ["Faults", "ServoPlan", "SimulatedServo", "StatusPacket"]
 
 _PING: Final = 0x01
 _READ: Final = 0x02
@@ -85,7 +84,7 @@ class ServoPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class StatusPacket:
     """What goes into a status packet.
 
     Attributes:
@@ -97,7 +96,7 @@ class Answer:
     data: bytes = b""
 
 
-class Servo:
+class SimulatedServo:
     """One servo.
 
     Args:
@@ -115,7 +114,7 @@ class Servo:
         self.model: TwinModel = twin_model(plan.model)
         self.faults = Faults()
         self.volts = self.model.volts
-        self.motor = Motor(self.model, plan.tendon, plan.angle)
+        self.motor = SimulatedMotor(self.model, plan.tendon, plan.angle)
         self._table = Table(self.model, plan.id, plan.firmware, baud_code, self._check)
         self._now_ns = 0
         self._heard_ns = 0
@@ -148,7 +147,7 @@ class Servo:
         if self.is_awake:
             self._heard_ns = self._now_ns
 
-    def obey(self, instruction: int, parameters: bytes, addressed: int) -> Answer | None:
+    def obey(self, instruction: int, parameters: bytes, addressed: int) -> StatusPacket | None:
         """Do what an instruction says.
 
         Args:
@@ -172,7 +171,7 @@ class Servo:
             )
         return None
 
-    def read(self, at: int, length: int) -> Answer:
+    def read(self, at: int, length: int) -> StatusPacket:
         """What it says in a sync read."""
         self._show()
         try:
@@ -277,8 +276,8 @@ class Servo:
             self._table.set(64, 0)
         self._recall()
 
-    def _said(self, error: int, data: bytes) -> Answer:
-        return Answer(error | (_ALERT if self._table.get(70) else 0), data)
+    def _said(self, error: int, data: bytes) -> StatusPacket:
+        return StatusPacket(error | (_ALERT if self._table.get(70) else 0), data)
 
     def _show(self) -> None:
         """Put what it measures into its registers."""

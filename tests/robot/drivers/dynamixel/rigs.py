@@ -6,11 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
-from shapechanger.robot.drivers.dynamixel.state import BusState
-from shapechanger.twin.servos.line import Line
-from shapechanger.twin.servos.port import LinePort
-from shapechanger.twin.servos.servo import Servo, ServoPlan
+from shapechanger.twin.servos.bus import LinePort, SimulatedBus
+from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
 """The tendons; their servos have the ids 1 to 7."""
@@ -54,7 +53,7 @@ class Rig:
         self.settings = settings() if bus is None else bus
         if plans is None:
             plans = [ServoPlan(one.id, MODEL, angle=2.0 * one.id) for one in self.settings.servos]
-        self.line = Line(plans)
+        self.line = SimulatedBus(plans)
         self.port = LinePort(self.line)
         self.bus = ServoBus(self.settings, lambda _: self.port)
 
@@ -65,7 +64,7 @@ class Rig:
         self.bus.hold()
         return self
 
-    def twin(self, name: str) -> Servo:
+    def twin(self, name: str) -> SimulatedServo:
         """The simulated servo of a tendon."""
         return self.line.servos[NAMES.index(name) + 1]
 

@@ -6,7 +6,7 @@ from typing import Literal
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.state import BusState
+from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.twin.servos.servo import ServoPlan
 from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
 

@@ -7,7 +7,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.twin.servos.packets import packed, status
+from shapechanger.twin.servos.protocol import packed, status
 from tests.robot.drivers.dynamixel.rigs import NAMES, Rig
 
 _ids = st.integers(0, 255)

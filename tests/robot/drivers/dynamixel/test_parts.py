@@ -2,9 +2,9 @@
 
 import pytest
 
-from shapechanger.robot.drivers.dynamixel.ramp import Ramp
-from shapechanger.robot.drivers.dynamixel.registers import decode_present, hardware_errors
-from shapechanger.robot.drivers.dynamixel.slack import Slack
+from shapechanger.robot.drivers.dynamixel.bus import Ramp
+from shapechanger.robot.drivers.dynamixel.health import Slack
+from shapechanger.robot.drivers.dynamixel.protocol import decode_present, hardware_errors
 
 MS = 1_000_000
 

@@ -7,10 +7,9 @@ from dynamixel_sdk import PacketHandler, PortHandler
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.port import PromptPort
+from shapechanger.robot.drivers.dynamixel.protocol import PromptPort
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-from shapechanger.twin.servos.line import Line
-from shapechanger.twin.servos.pty import LinePty
+from shapechanger.twin.servos.bus import LinePty, SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
 from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, settings
 
@@ -22,7 +21,7 @@ _PATIENT_MS = 20_000.0
 def pty() -> Iterator[LinePty]:
     """Seven servos behind a terminal; the first stands at -3 counts."""
     plans = [ServoPlan(i, MODEL, angle=-0.004 if i == 1 else 2.0 * i) for i in range(1, 8)]
-    with LinePty(Line(plans)) as line:
+    with LinePty(SimulatedBus(plans)) as line:
         yield line
 
 

@@ -7,9 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.models import MODELS
-from shapechanger.robot.drivers.dynamixel.settings import ServoSettings
-from shapechanger.robot.drivers.dynamixel.units import (
+from shapechanger.robot.drivers.dynamixel.health import (
     cap_count,
     goal_count,
     length_m,
@@ -17,6 +15,7 @@ from shapechanger.robot.drivers.dynamixel.units import (
     tension_n,
     within,
 )
+from shapechanger.robot.drivers.dynamixel.settings import MODELS, ServoSettings
 from tests.robot.drivers.dynamixel.rigs import servo
 
 

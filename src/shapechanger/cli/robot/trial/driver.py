@@ -20,7 +20,7 @@ import msgspec
 from shapechanger.errors import LinkError, RobotError
 from shapechanger.layout import Layout
 from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known import KnownRobot
+from shapechanger.remote.known_robots import KnownRobot
 
 __all__ = ["Driver", "main"]
 

@@ -14,14 +14,13 @@ from typing import Final, Literal
 from shapechanger.cli.robot.trial.driver import Driver
 from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
+from shapechanger.link.authentication import new_key
 from shapechanger.link.messages import Role
-from shapechanger.link.proof import new_key
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.network import BadNetwork
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.running import RunningRobot
+from shapechanger.twin.robot import Operator, RunningRobot
 
 __all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
 

@@ -16,13 +16,18 @@ from shapechanger.cli.robot.trial.faults import Fault, Scene, Untimely
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.ledger import read_ledger
 from shapechanger.twin.network import BadNetwork
-from shapechanger.twin.operator import Operator
-from shapechanger.twin.oracle import Command, Interval, propelled, time_to_rest, unauthorised
-from shapechanger.twin.running import RunningRobot, run_robot
+from shapechanger.twin.oracle import (
+    ExpectedCommand,
+    Interval,
+    propelled,
+    time_to_rest,
+    unauthorised,
+)
+from shapechanger.twin.robot import Operator, RunningRobot, run_robot
+from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import RunningBoard, start_board
-from shapechanger.twin.wiring import Wiring
+from shapechanger.twin.wiring import TwinWiring
 
 __all__ = ["Trial", "TrialResult", "has"]
 
@@ -91,7 +96,7 @@ class Trial:
         self._profile = profile
         self._plan: GuardPlan = profile.guard_plan()
         self._one_shot_ms = float(self._plan.enable_hold_ms) if one_shot else None
-        self._wiring = Wiring(self._plan, self._one_shot_ms)
+        self._wiring = TwinWiring(self._plan, self._one_shot_ms)
         self._robot: RunningRobot | None = None
         self._restarts = 0
         self._board: RunningBoard | None = None
@@ -243,7 +248,7 @@ class Trial:
         moved = [i for i in propelled(ledger, self._wiring) if i.end_ns > began_ns]
         deadline_ms = self._plan.limits.deadline_ms
         commands = [
-            Command(sent_ns, deadline_ms)
+            ExpectedCommand(sent_ns, deadline_ms)
             for sent_ns in sent
             if not (fault.silences and sent_ns > at_ns + _LATE_MS * 1e6)
         ]

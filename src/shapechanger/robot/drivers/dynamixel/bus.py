@@ -6,32 +6,161 @@ from collections.abc import Mapping
 from typing import Final
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.asking import Asking
-from shapechanger.robot.drivers.dynamixel.health import Health
-from shapechanger.robot.drivers.dynamixel.port import OpenPort, open_serial_port
-from shapechanger.robot.drivers.dynamixel.ramp import Ramp
-from shapechanger.robot.drivers.dynamixel.registers import (
-    BUS_WATCHDOG,
-    GOAL_CURRENT,
-    HARDWARE_ERROR,
-    PRESENT,
-    TORQUE_ENABLE,
-    Register,
-    decode_present,
-)
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
-from shapechanger.robot.drivers.dynamixel.setup import find, grip, make_ready
-from shapechanger.robot.drivers.dynamixel.state import BusState, Mode, ServoState
-from shapechanger.robot.drivers.dynamixel.units import (
+from shapechanger.robot.drivers.dynamixel.health import (
+    BusState,
+    Mode,
+    ServoHealth,
+    ServoState,
+    cap_count,
     goal_count,
     length_m,
     lengthening,
     tension_n,
     within,
 )
-from shapechanger.robot.drivers.dynamixel.wire import ALERT, Answer, Wire
+from shapechanger.robot.drivers.dynamixel.protocol import (
+    ALERT,
+    BUS_WATCHDOG,
+    CURRENT_LIMIT,
+    CURRENT_MODE,
+    DRIVE_MODE,
+    FIRMWARE,
+    GOAL_CURRENT,
+    HARDWARE_ERROR,
+    OPERATING_MODE,
+    PRESENT,
+    RETURN_DELAY,
+    TORQUE_ENABLE,
+    WATCHDOG_STEP_NS,
+    Asking,
+    OpenPort,
+    Register,
+    ServoReply,
+    Wire,
+    decode_present,
+    hardware_errors,
+    open_serial_port,
+)
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = ["ServoBus"]
+__all__ = ["Ramp", "ServoBus", "find", "grip", "make_ready", "watchdog_steps"]
+
+
+class Ramp:
+    """From some tensions to others, in a straight line over time.
+
+    Args:
+        start: Tension of each tendon at the beginning, N, by name.
+        end: At the end; the same names.
+        since_ns: When it begins.
+        ramp_ms: How long it takes.
+    """
+
+    def __init__(
+        self, start: Mapping[str, float], end: Mapping[str, float], since_ns: int, ramp_ms: int
+    ) -> None:
+        # Nobody pulls harder because of a stop.
+        self._start = {name: max(value, end[name]) for name, value in start.items()}
+        self._end = dict(end)
+        self._since_ns = since_ns
+        self._ramp_ns = ramp_ms * 1_000_000
+
+    def tensions(self, now_ns: int) -> dict[str, float]:
+        """What each tendon pulls now, N."""
+        left = self._left(now_ns)
+        return {
+            name: self._end[name] + left * (value - self._end[name])
+            for name, value in self._start.items()
+        }
+
+    def is_over(self, now_ns: int) -> bool:
+        """Whether all of them are at the end."""
+        return self._left(now_ns) == 0.0
+
+    def _left(self, now_ns: int) -> float:
+        """How much of the way is left, 1 to 0."""
+        gone_ns = now_ns - self._since_ns
+        if gone_ns >= self._ramp_ns:
+            return 0.0
+        return min(1.0, 1.0 - gone_ns / self._ramp_ns)
+
+
+def watchdog_steps(bus: BusSettings) -> int:
+    """The time of the watchdog in steps of 20 ms."""
+    return bus.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
+
+
+def find(wire: Wire, bus: BusSettings) -> None:
+    """Check that every servo answers and is what it should be.
+
+    Raises:
+        RobotError: If one is missing, is of another model, or its firmware is too old.
+    """
+    models = {servo.id: wire.ping(servo.id) for servo in bus.servos}
+    if missing := [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is None]:
+        there = [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is not None]
+        raise RobotError(
+            f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
+            f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and baud, "
+            "and at the latency timer of the adapter."
+        )
+    for servo in bus.servos:
+        known, number = servo.known, models[servo.id]
+        if number != known.number:
+            raise RobotError(
+                f"{servo.words} is no {known.name}: its model number is {number}, "
+                f"not {known.number}."
+            )
+        firmware = wire.read(servo.id, FIRMWARE)
+        if firmware < known.least_firmware:
+            raise RobotError(
+                f"{servo.words} has firmware {firmware}; its own watchdog needs "
+                f"{known.least_firmware} or newer."
+            )
+
+
+def make_ready(wire: Wire, bus: BusSettings, servo: ServoSettings) -> None:
+    """Make one servo ready to pull: current mode, its caps, no goal, and no torque.
+
+    Raises:
+        RobotError: If it does not answer, refuses, or has switched itself off.
+    """
+    wire.write(servo.id, TORQUE_ENABLE, 0)
+    wire.write(
+        servo.id, BUS_WATCHDOG, 0
+    )  # A watchdog that has tripped keeps all goals as they are.
+    if error := wire.read(servo.id, HARDWARE_ERROR):
+        words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
+        raise RobotError(
+            f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque again, "
+            "after which it must find its zero afresh."
+        )
+    # These last without power, and wear out: they are written only where they differ.
+    _keep(wire, servo, RETURN_DELAY, 0)
+    _keep(wire, servo, DRIVE_MODE, 0)
+    _keep(wire, servo, OPERATING_MODE, CURRENT_MODE)
+    _keep(wire, servo, CURRENT_LIMIT, cap_count(servo))
+    # A change of the mode sets the goal to the limit.
+    wire.write(servo.id, GOAL_CURRENT, 0)
+    wire.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+
+
+def grip(wire: Wire, bus: BusSettings, servo: ServoSettings) -> None:
+    """Give one servo torque; it pulls nothing yet, and its watchdog looks after it.
+
+    Raises:
+        RobotError: If it does not answer or refuses.
+    """
+    wire.write(servo.id, BUS_WATCHDOG, 0)
+    wire.write(servo.id, GOAL_CURRENT, 0)
+    wire.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+    wire.write(servo.id, TORQUE_ENABLE, 1)
+
+
+def _keep(wire: Wire, servo: ServoSettings, register: Register, value: int) -> None:
+    if wire.read(servo.id, register) != value:
+        wire.write(servo.id, register, value)
+
 
 # One of them is read in each cycle; so a trip is known after four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
@@ -57,7 +186,7 @@ class ServoBus:
         self._wire = Wire(open_port(settings), settings.device)
         self._ids = {servo.id: servo for servo in settings.servos}
         self._asking = Asking(self._wire, tuple(self._ids), fast=settings.fast)
-        self._health = {servo.id: Health(servo, settings) for servo in settings.servos}
+        self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
         self._zeros: dict[str, int] = {}
         self._mode: Mode = "off"
         self._ramp: Ramp | None = None
@@ -153,7 +282,7 @@ class ServoBus:
             self._ask_for(tensions)
         if self._mode == "silent":
             return BusState(now_ns, "silent", {}, self._missed(), self._faults())
-        heard: dict[int, Answer] = {}
+        heard: dict[int, ServoReply] = {}
         self._wire.has_stray = False
         try:
             self._tell(now_ns)
@@ -269,7 +398,7 @@ class ServoBus:
             self._goals[servo.id] = 0 if ill else goal_count(servo, pull)
         self._wire.sync_write(GOAL_CURRENT, self._goals)
 
-    def _audit(self, heard: dict[int, Answer]) -> None:
+    def _audit(self, heard: dict[int, ServoReply]) -> None:
         """Read what shows whether they still obey; who cannot be trusted is no longer heard."""
         # Who was away may have been without power: then its position means something else.
         back = [one for one in heard if self._health[one].missed]
@@ -291,7 +420,7 @@ class ServoBus:
         return set(answers)
 
     def _judge(
-        self, heard: Mapping[int, Answer], now_ns: int, *, late: bool
+        self, heard: Mapping[int, ServoReply], now_ns: int, *, late: bool
     ) -> dict[str, ServoState]:
         states: dict[str, ServoState] = {}
         for servo_id, servo in self._ids.items():

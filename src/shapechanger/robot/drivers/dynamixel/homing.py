@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.health import BusState, length_per_count
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
-from shapechanger.robot.drivers.dynamixel.state import BusState
-from shapechanger.robot.drivers.dynamixel.units import length_per_count
 
 __all__ = ["Homing"]
 

@@ -10,9 +10,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.plans import bus_settings, servo_settings
-from shapechanger.robot.drivers.dynamixel.settings import ServoSettings
-from shapechanger.robot.drivers.dynamixel.state import BusState
+from shapechanger.robot.drivers.dynamixel.health import BusState
+from shapechanger.robot.drivers.dynamixel.settings import (
+    ServoSettings,
+    bus_settings,
+    servo_settings,
+)
 from shapechanger.robot.drivers.settings import text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware

@@ -1,0 +1,78 @@
+"""`shapechanger demos import`: a recording from what others recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from shapechanger.cli.console import plain_console
+
+__all__ = ["Export", "Import", "counted"]
+
+
+@dataclass(frozen=True)
+class Import:
+    """Make a recording of what others recorded; what is read stays as it is."""
+
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]
+    """The folder to read."""
+    out: Path
+    """The recording to make; nothing is there yet."""
+    format: str = "auto"
+    """Format of the folder: 2017, tub, minari or csv; auto looks for itself."""
+
+    def run(self) -> None:
+        """Import, and say what came."""
+        from shapechanger.demos.exchange import import_recording
+
+        done = import_recording(self.source, self.out, self.format)
+        plain_console().print(
+            f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
+            f"{counted(done.steps, 'step')}, {counted(done.pictures, 'picture')}\nwrote {self.out}",
+            soft_wrap=True,
+        )
+
+
+def counted(number: int, what: str) -> str:
+    """Such as "1 step" and "2 steps"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write a recording in a format of others; the recording stays as it is."""
+
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """A recording, or one episode of it."""
+    out: Path
+    """The folder to make; nothing is there yet. For minari its name ends in a version: drive-v0."""
+    to: str
+    """Format to write: minari, csv, 2017 or tub."""
+    dropped: bool = False
+    """Write the steps that were dropped, too, and that they were; only minari and csv can."""
+
+    def run(self) -> None:
+        """Export, and say what went."""
+        from shapechanger.demos.exchange import export_recording
+
+        done = export_recording(self.data, self.out, self.to, dropped=self.dropped)
+        console = plain_console()
+        console.print(
+            f"wrote {self.out} ({done.format}): {counted(done.steps, 'step')} of "
+            f"{counted(done.episodes, 'episode')}",
+            soft_wrap=True,
+        )
+        if done.left_out:
+            where = "; --dropped takes them with it" if done.format in {"minari", "csv"} else ""
+            console.print(
+                f"left out {done.left_out} steps that were dropped{where}", soft_wrap=True
+            )
+        if done.format == "minari":
+            console.print(
+                f"load it with MINARI_DATASETS_PATH={self.out.absolute().parent} and "
+                f"minari.load_dataset({self.out.name!r})",
+                soft_wrap=True,
+            )

@@ -1,0 +1,342 @@
+"""`shapechanger demos replay`: what was recorded again, as a film, in an env or on a robot."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.demos.edit import episode_at
+from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.demos.dataset import decode_picture
+from shapechanger.demos.episodes import Episode
+from shapechanger.demos.overlay import blank, overlay
+from shapechanger.errors import DemosError, LinkError, RobotRefused
+from shapechanger.layout import Layout
+
+if TYPE_CHECKING:
+    from shapechanger.demos.episodes import Episode, Step
+    from shapechanger.demos.recording import Seen
+    from shapechanger.transfer.env_ref import EnvRef
+if TYPE_CHECKING:
+    from shapechanger.demos.episodes import Episode
+    from shapechanger.link.messages import Welcome
+    from shapechanger.remote.client import RobotClient
+    from shapechanger.teleop import Terminal
+
+__all__ = ["Replay", "film", "play_in_env", "play_on_robot"]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Play an episode again: as a film, in an env, or on a robot."""
+
+    episode: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]
+    """Folder of the episode."""
+    film: Path | None = None
+    """A film to write, such as out.mp4, with the actions drawn in."""
+    env: str = ""
+    """Id of an env to play the actions in, from the seed that was recorded; it says how far the
+    two come apart."""
+    robot: str = ""
+    """Name of a robot to play the actions on, see `robot remember`; a person at this terminal
+    arms it, and any key stops it."""
+
+    def run(self) -> None:
+        """Play it where it was asked for."""
+        asked = [bool(self.film), bool(self.env), bool(self.robot)]
+        if sum(asked) != 1:
+            raise DemosError("An episode is played with one of --film, --env and --robot.")
+        episode = episode_at(self.episode)
+        if not episode.kept:
+            raise DemosError(f"No step of {episode.path} counts: `shapechanger demos good` it.")
+        if self.film is not None:
+            film(episode, self.film)
+        elif self.env:
+            play_in_env(episode, self.env)
+        else:
+            play_on_robot(episode, self.robot)
+
+
+def play_in_env(episode: Episode, env_id: str) -> None:
+    """Play an episode in an env, from the seed that was recorded, and say how it differs.
+
+    What the outputs did is what is played, where that is known: it is what the pictures follow
+    from, while an expert may have meant something else.
+
+    Raises:
+        DemosError: If the env takes other actions.
+        UnknownName: If there is no such env.
+    """
+    from shapechanger.demos.recording import Sight
+
+    header = episode.header
+    kept = episode.kept
+    apart = _Apart()
+    with opened(_ref(episode, env_id), max_episode_steps=-1) as env:
+        sight = Sight(env, 95)
+        recorded = Layout.from_json(header.action_layout)
+        if [(f.name, f.unit, f.shape) for f in sight.action_layout] != [
+            (f.name, f.unit, f.shape) for f in recorded
+        ]:
+            raise DemosError(
+                f"{env_id} moves {', '.join(sight.action_layout.names)}, and {episode.path.name} "
+                f"was recorded with {', '.join(recorded.names)}."
+            )
+        states = sight.state_layout
+        compares = states is not None and states.to_json() == header.state_layout
+        observation, info = env.reset(
+            seed=header.seed, options=cast("Any", header.notes.get("reset_options"))
+        )
+        played, ended = 0, ""
+        for step in kept:
+            apart.look(episode, step, sight.seen(observation, info), states=compares)
+            values = step.action if step.applied is None else step.applied
+            observation, reward, terminated, truncated, info = env.step(
+                np.array(values, np.float32)
+            )
+            played += 1
+            apart.earn(step, float(reward))
+            if terminated or truncated:
+                ended = "; there it was over" if played < len(kept) else ""
+                break
+    console = plain_console()
+    console.print(f"played {played} of {len(kept)} steps in {env_id}{ended}", soft_wrap=True)
+    for line in _caveats(episode):
+        console.print(line, soft_wrap=True)
+    for line in apart.told(states if compares else None):
+        console.print(line, soft_wrap=True)
+
+
+def _ref(episode: Episode, env_id: str) -> EnvRef:
+    """The env, with the arguments that were recorded where it is the same one."""
+    from shapechanger.transfer.env_ref import EnvRef
+
+    ref, header = env_ref(env_id), episode.header
+    kwargs = header.env_kwargs if ref.id == header.env else {}
+    return EnvRef(ref.id, {**kwargs, **ref.kwargs})
+
+
+def _caveats(episode: Episode) -> list[str]:
+    """Why an episode cannot come out the same."""
+    told: list[str] = []
+    if episode.header.seed is None:
+        told.append("it was recorded without a seed, so it began somewhere else")
+    kept = episode.kept
+    if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
+        told.append("steps of it do not count and were not played, so it went on from elsewhere")
+    if any(step.applied is None for step in kept):
+        told.append("what its outputs did is not known, so what was decided was played")
+    return told
+
+
+class _Apart:
+    """How far a replay comes apart from what was recorded."""
+
+    def __init__(self) -> None:
+        self._states: list[NDArray[np.float64]] = []
+        self._pictures: list[float] = []
+        self._rewards: list[tuple[float, float]] = []
+
+    def look(self, episode: Episode, step: Step, seen: Seen, *, states: bool) -> None:
+        """Compare what is seen now with what was seen before this step."""
+        from shapechanger.demos.dataset import decode_picture
+
+        if states:
+            self._states.append(np.abs(np.array(seen.state) - np.array(step.state)))
+        jpeg = episode.jpeg(step)
+        if jpeg is None or seen.jpeg is None:
+            return
+        old, new = decode_picture(jpeg, step.frame), decode_picture(seen.jpeg, "the env's picture")
+        if old.shape == new.shape:
+            self._pictures.append(float(np.abs(old.astype(float) - new).mean()))
+
+    def earn(self, step: Step, reward: float) -> None:
+        """Take in what the step was worth, then and now."""
+        if step.reward is not None:
+            self._rewards.append((step.reward, reward))
+
+    def told(self, layout: Layout | None) -> list[str]:
+        """The differences, a line each."""
+        lines: list[str] = []
+        if self._pictures and not any(self._pictures):
+            lines.append("the pictures are the same in every step")
+        elif self._pictures:
+            lines.append(
+                f"pictures differ by {np.mean(self._pictures):.1f} of 255 on average, "
+                f"{self._pictures[-1]:.1f} at the end"
+            )
+        if layout is not None and self._states:
+            gaps = np.array(self._states)
+            if not np.nanmax(gaps, initial=0.0):
+                lines.append("the state is the same in every step")
+            for name, place in layout.slices.items():
+                of_one = gaps[:, place]
+                if np.nanmax(of_one, initial=0.0):
+                    lines.append(
+                        f"{layout[name]} differs by {np.nanmean(of_one):.3g} on average, "
+                        f"{np.nanmax(of_one):.3g} at most"
+                    )
+        if self._rewards:
+            then, now = np.sum(self._rewards, axis=0)
+            lines.append(f"it was worth {then:.2f} and is now worth {now:.2f}")
+        return lines or ["there is nothing to compare it with"]
+
+
+_WITHOUT_CAMERA: Final = (480, 40)
+
+
+def film(episode: Episode, path: Path) -> None:
+    """Write the steps of an episode that count as a film.
+
+    Raises:
+        OutputError: If it cannot be written.
+        DemosError: If a picture is damaged.
+        MissingExtra: If the encoder is not installed.
+    """
+    from shapechanger.cli.pictures import require_film, write_film
+
+    require_film(path)
+    layout = Layout.from_json(episode.header.action_layout)
+    frames: list[NDArray[Any]] = []
+    size = None
+    for step in episode.kept:
+        jpeg = episode.jpeg(step)
+        picture = (
+            blank(_WITHOUT_CAMERA)
+            if jpeg is None
+            else decode_picture(jpeg, f"{episode.path}/frames/{step.frame}")
+        )
+        frame = overlay(picture, step, layout)
+        size = size or frame.shape
+        if frame.shape == size:  # A film has one size; a camera that changed it is left out.
+            frames.append(frame)
+    write_film(frames, path, episode.header.control_hz)
+    left = len(episode.kept) - len(frames)
+    rest = f"; {left} pictures of another size are left out" if left else ""
+    plain_console().print(
+        f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}",
+        soft_wrap=True,
+    )
+
+
+_SAME_RATE: Final = 0.01
+_LOOK_S: Final = 0.5
+
+
+def play_on_robot(episode: Episode, name: str) -> None:
+    """Play an episode on a robot, once a person at this terminal has armed it.
+
+    The robot's own caps, reflexes and deadline hold as for anybody who drives it. Any key stops it,
+    and so does everything that goes wrong.
+
+    Raises:
+        DemosError: If the robot moves something else, or at another rate.
+        LinkError: If it cannot be reached, or is lost.
+        NoTerminal: If there is no terminal for a person to stop it from.
+    """
+    from shapechanger.remote.client import RobotClient
+    from shapechanger.remote.known_robots import recall
+    from shapechanger.teleop import Terminal
+
+    known = recall(name)
+    console = plain_console()
+    with (
+        Terminal() as terminal,
+        RobotClient.connect(known, role="person", frames=False) as robot,
+    ):
+        _require_fit(episode, robot.welcome)
+        console.print(
+            f"{episode.seconds:.1f} s of {episode.path.name}, blindly: nobody looks where "
+            f"{robot.welcome.robot} drives. It begins where it stands now.\n"
+            "E arms it and begins · any other key leaves; while it plays, any key stops it.",
+            soft_wrap=True,
+        )
+        if not _agreed(robot, terminal):
+            console.print("left; nothing was played")
+            return
+        try:
+            robot.take()
+            robot.arm()
+            ended = _play(robot, terminal, episode)
+        finally:
+            if robot.alive:
+                robot.disarm()
+                robot.release()
+        console.print(ended, soft_wrap=True)
+
+
+def _require_fit(episode: Episode, welcome: Welcome) -> None:
+    """Refuse a robot that would do something else than was recorded.
+
+    Raises:
+        DemosError: If it moves other things, in other units or ranges, or at another rate.
+    """
+    recorded = Layout.from_json(episode.header.action_layout)
+    moved = Layout.from_json(welcome.action_layout)
+    if [_range(f) for f in recorded] != [_range(f) for f in moved]:
+        raise DemosError(
+            f"{welcome.robot} takes {_told(moved)}, and {episode.path.name} was recorded with "
+            f"{_told(recorded)}."
+        )
+    rate, own = episode.header.control_hz, welcome.control_hz
+    if abs(rate / own - 1.0) > _SAME_RATE:
+        raise DemosError(
+            f"{welcome.robot} takes {own:g} commands a second, and {episode.path.name} has "
+            f"{rate:g} steps a second."
+        )
+    if welcome.clock == "twin":
+        raise DemosError(
+            f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so nobody "
+            "could stop it in time: serve it with `--clock real`."
+        )
+
+
+def _agreed(robot: RobotClient, terminal: Terminal) -> bool:
+    """Whether the person presses E, and nothing else."""
+    while True:
+        robot.acknowledge()  # So that the link is not lost while somebody thinks.
+        keys = terminal.keys(_LOOK_S)
+        if keys:
+            return keys == ["e"]
+
+
+def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
+    """Command step after step until the end or a key; what came of it, in words."""
+    period_s = 1.0 / robot.welcome.control_hz
+    steps = episode.kept
+    seen = robot.ask().message
+    due_s = time.monotonic()
+    for number, step in enumerate(steps):
+        if terminal.keys(max(0.0, due_s - time.monotonic())):
+            robot.emergency_stop("A person pressed a key.")
+            return f"stopped by a key after {number} of {len(steps)} steps: emergency stop"
+        if not (seen.mine and seen.armed):
+            why = seen.stop_reason or f"{seen.holder or 'nobody'} commands it now"
+            return f"stopped after {number} of {len(steps)} steps: {why}"
+        # What it did then is what the recording shows; it has the caps of then, and gets its own.
+        robot.command(step.action if step.applied is None else step.applied, answers=seen.seq)
+        try:
+            seen = robot.observation(seen.seq).message
+        except RobotRefused:
+            raise
+        except LinkError as error:
+            raise LinkError(f"After {number} of {len(steps)} steps: {error}") from error
+        # It never hurries to catch up: what is late stays late.
+        due_s = max(due_s + period_s, time.monotonic())
+    terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command has its period, too.
+    return f"played {len(steps)} steps"
+
+
+def _range(feature: object) -> tuple[object, ...]:
+    return tuple(getattr(feature, name) for name in ("name", "unit", "shape", "low", "high"))
+
+
+def _told(layout: Layout) -> str:
+    return ", ".join(f"{f} from {f.low:g} to {f.high:g}" for f in layout)

@@ -1,0 +1,154 @@
+"""`shapechanger demos list`: the episodes of a recording."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final
+
+import tyro
+from rich.table import Table
+
+from shapechanger.cli.console import plain_console
+from shapechanger.demos.episodes import Episode, episodes_of, read_episode
+from shapechanger.errors import DemosError, OutputError
+
+__all__ = ["ListEpisodes", "Show", "shares", "told_length"]
+
+_WIDEST: Final = 400
+
+
+@dataclass(frozen=True)
+class ListEpisodes:
+    """List the episodes of a recording."""
+
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """Folder of the recording, or of one episode."""
+
+    def run(self) -> None:
+        """Print a line for each, and what they are together."""
+        from shapechanger.demos.statistics import summary
+
+        table = Table(
+            "episode", "of", "when (UTC)", "steps", "length", "drivers", "marks", "outcome",
+            box=None, pad_edge=False,
+        )  # fmt: skip
+        for name in ("steps", "length", "marks"):
+            next(c for c in table.columns if c.header == name).justify = "right"
+        broken: list[str] = []
+        steps = kept = 0
+        seconds = 0.0
+        paths = episodes_of(self.data)
+        for path in paths:
+            try:
+                one = summary(read_episode(path))
+            except DemosError as error:
+                broken.append(str(error))
+                table.add_row(path.name, "", "", "", "", "", "", "cannot be read, see below")
+                continue
+            steps, kept, seconds = steps + one.steps, kept + one.kept, seconds + one.seconds
+            table.add_row(
+                one.name,
+                one.what,
+                one.created[:16].replace("T", " "),
+                str(one.steps) if one.kept == one.steps else f"{one.kept} of {one.steps}",
+                told_length(one.seconds),
+                shares({str(driver): count for driver, count in one.drivers.items()}),
+                str(one.marks or ""),
+                one.outcome if one.closed else "not closed",
+            )
+        console = plain_console()
+        # A name that is cut off cannot be typed: rather let the terminal break the line.
+        needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
+        plain_console(width=max(console.width, needed)).print(table)
+        many = f"{len(paths)} episode{'' if len(paths) == 1 else 's'}"
+        console.print(f"{many}: {kept} of {steps} steps count, {told_length(seconds)}")
+        for sentence in broken:
+            console.print(sentence, soft_wrap=True)
+
+
+def told_length(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> told_length(4.25), told_length(59.97), told_length(754.0)
+    ('4.2 s', '1:00 min', '12:34 min')
+    """
+    if round(seconds, 1) < 60.0:  # A minute.
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d} min"
+
+
+def shares(counts: dict[str, int]) -> str:
+    """Who did how much.
+
+    >>> shares({"policy": 30, "expert": 10}), shares({"expert": 4})
+    ('policy 75 %, expert 25 %', 'expert')
+    """
+    total = sum(counts.values())
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{name} {100.0 * count / total:.0f} %" for name, count in counts.items())
+
+
+@dataclass(frozen=True)
+class Show:
+    """Say what is in a recording in numbers, or show it as a page with pictures."""
+
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """Folder of the recording, or of one episode."""
+    out: Path | None = None
+    """The page to write, such as page.html; it needs no other file."""
+
+    def run(self) -> None:
+        """Print the numbers, and write the page."""
+        from shapechanger.reports.demonstrations import distributions
+
+        if self.out is not None and self.out.is_dir():
+            raise OutputError(f"Cannot write {self.out}: it is a folder.")
+        episodes: list[Episode] = []
+        broken: list[str] = []
+        for path in episodes_of(self.data):
+            try:
+                episodes.append(read_episode(path))
+            except DemosError as error:
+                broken.append(str(error))
+        console = plain_console()
+        for line in _told(episodes):
+            console.print(line, soft_wrap=True)
+        for name, unit, found in distributions(episodes):
+            of = "" if unit == "1" else f" {unit}"
+            console.print(
+                f"{name}: {found.least:.3g} to {found.most:.3g}{of}, median {found.median:.3g}",
+                soft_wrap=True,
+            )
+        for sentence in broken:
+            console.print(sentence, soft_wrap=True)
+        if self.out is None:
+            return
+        from shapechanger.reports.demonstrations import recording_html
+        from shapechanger.transfer.files import make_folder, write_atomic
+
+        make_folder(self.out.parent)
+        name = self.data.resolve().name
+        write_atomic(self.out, recording_html(name, episodes, broken).encode())
+        console.print(f"wrote {self.out}", soft_wrap=True)
+
+
+def _told(episodes: Sequence[Episode]) -> list[str]:
+    """What a recording is, in a few lines."""
+    counts: Counter[str] = Counter(step.driver for one in episodes for step in one.kept)
+    seconds = sum(one.seconds for one in episodes)
+    many = f"{len(episodes)} episode{'' if len(episodes) == 1 else 's'}"
+    steps = sum(len(one.steps) for one in episodes)
+    kept = sum(len(one.kept) for one in episodes)
+    lines = [f"{many}: {kept} of {steps} steps count, {told_length(seconds)}"]
+    if counts:
+        lines.append(f"driven by {shares(dict(counts.most_common()))}")
+    outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
+    if outcomes:
+        ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())
+        lines.append(f"ended by: {ended}")
+    return lines

@@ -1,0 +1,139 @@
+"""`shapechanger finger`: record how a finger moves, and find out what it is like."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.table import Table
+
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import env_ref, options_of, require_seed
+from shapechanger.errors import FingerError, OutputError
+
+if TYPE_CHECKING:
+    from shapechanger.identify import IdentifiedFinger
+
+__all__ = ["Finger", "Identify", "RecordFinger"]
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Find out what a finger is like from a log, with intervals."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
+    """The log, as `shapechanger finger record` writes it."""
+    out: Path | None = None
+    """File for the parameters, such as finger.json: what an env of the finger takes as
+    `parameters`."""
+    report: Path | None = None
+    """The page to write; beside the log if not given."""
+
+    def run(self) -> None:
+        """Print the parameters, and write them and the page."""
+        from shapechanger.identify import identify, load_log
+        from shapechanger.reports.finger import finger_html, summary_line
+        from shapechanger.transfer.files import make_folder, write_atomic
+
+        page = self.report or self.log.with_name(f"{self.log.stem}.html")
+        files = [path for path in (self.out, page) if path is not None]
+        for path in files:
+            if path.is_dir():
+                raise OutputError(f"Cannot write {path}: it is a folder.")
+            if path.resolve() == self.log.resolve():
+                raise OutputError(f"Cannot write {path}: it is the log.")
+        log = load_log(self.log)
+        for path in files:
+            make_folder(path.parent)
+        console, notes = plain_console(), plain_console(stderr=True)
+        found = identify(log, lambda words: notes.print(f"{words} …", soft_wrap=True))
+        write_atomic(page, finger_html(found, self.log.name).encode())
+        if self.out is not None:
+            write_atomic(self.out, found.parameters.to_json().encode())
+        console.print(_table(found))
+        for name, why in found.untold:
+            console.print(f"{name} cannot be told: {why}", soft_wrap=True)
+        console.print(f"wrote {' and '.join(str(path) for path in files)}", soft_wrap=True)
+        console.print(summary_line(found), soft_wrap=True)
+
+
+def _table(found: IdentifiedFinger) -> Table:
+    from shapechanger.reports.finger import interval, label, number
+
+    table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
+    for e in found.estimates:
+        table.add_row(label(e), number(e, e.value), interval(e), number(e, e.nominal))
+    return table
+
+
+@dataclass(frozen=True)
+class RecordFinger:
+    """Move all joints of a finger about, and keep a log of it."""
+
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    """Id of the env, such as Finger."""
+    out: Path
+    """The log to write, such as finger.npz."""
+    seconds: float = 10.0
+    """How long, s."""
+    seed: int = 0
+    """Seed of the motions."""
+    actions: str = "impedance"
+    """What an action commands: impedance, tension or length."""
+    gap: str = ""
+    """Name of the gap that the finger is drawn from, such as real-like; empty for the nominal
+    finger."""
+    finger_seed: int = 0
+    """Which finger of the gap."""
+    options: str = ""
+    """More arguments of the env as JSON, such as '{"robot": "my-finger"}'."""
+
+    def run(self) -> None:
+        """Record, and say what came of it."""
+        from shapechanger.envs.finger.identification import record_babble
+        from shapechanger.identify import save_log
+        from shapechanger.transfer.env_ref import EnvRef
+        from shapechanger.transfer.files import make_folder
+
+        require_seed(self.seed)
+        require_seed(self.finger_seed)
+        if not 0.0 < self.seconds < float("inf"):
+            raise FingerError(f"--seconds is more than 0, got {self.seconds}.")
+        make_folder(self.out.parent)
+        ref = env_ref(self.env)
+        more: dict[str, Any] = {"actions": self.actions}
+        if self.gap:
+            more |= {"gap": self.gap, "finger_seed": self.finger_seed}
+        ref = EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
+        try:
+            env = ref.make(max_episode_steps=-1)
+        except TypeError as error:
+            reason = str(error).partition(" was raised from")[0]
+            raise FingerError(f"{ref.id} is no env of a finger: {reason}.") from error
+        try:
+            log = record_babble(env, self.seconds, self.seed, self.actions)
+        finally:
+            env.close()
+        save_log(log, self.out)
+        plain_console().print(
+            f"wrote {len(log)} rows, {log.seconds:g} s, to {self.out}\n"
+            f"find out what it is like: shapechanger finger identify {shlex.quote(str(self.out))}",
+            soft_wrap=True,
+        )
+
+
+@dataclass(frozen=True)
+class Finger:
+    """Record how a finger moves, and find out what it is like."""
+
+    command: (
+        Annotated[RecordFinger, tyro.conf.subcommand("record")]
+        | Annotated[Identify, tyro.conf.subcommand("identify")]
+    )
+
+    def run(self) -> None:
+        """Do what was asked."""
+        self.command.run()

@@ -1,0 +1,400 @@
+"""Chips on the board's I2C buses, register by register."""
+
+from __future__ import annotations
+
+import errno
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, Literal, Protocol, get_args
+
+from shapechanger.errors import UnknownName
+from shapechanger.twin.signals import Pulse
+from shapechanger.worlds.world import Readings
+
+__all__ = [
+    "Behind",
+    "Chip",
+    "Magnet",
+    "SimulatedAs5600",
+    "SimulatedIna219",
+    "SimulatedMpu6050",
+    "SimulatedPca9685",
+    "Tca9548a",
+]
+
+
+Magnet = Literal["", "gone", "weak", "strong"]
+"""How the magnet is; "" for one that is well."""
+
+_STATUS: Final = 0x0B
+_RAW_ANGLE: Final = 0x0C
+_ANGLE: Final = 0x0E
+_DETECTED: Final = 0x20
+_STATUS_OF: Final = {"": _DETECTED, "gone": 0x10, "weak": _DETECTED | 0x10, "strong": 0x28}
+_COUNTS_PER_TURN: Final = 4096
+
+
+class SimulatedAs5600:
+    """Registers that are answered from the angle of a joint.
+
+    Args:
+        joint: Name of the joint that the magnet turns with.
+        angle: The angle as it is measured now, rad.
+        zero: Counts at the angle 0.
+        direction: 1 if the counts rise with the angle, -1 if they fall.
+
+    Attributes:
+        joint: Name of the joint.
+    """
+
+    def __init__(self, joint: str, angle: Callable[[], float], zero: int, direction: int) -> None:
+        self.joint = joint
+        self._angle = angle
+        self._zero = zero
+        self._direction = direction
+        self._magnet: Magnet = ""
+
+    def set_magnet(self, how: Magnet) -> None:
+        """Let something happen to the magnet; "" makes it well.
+
+        Raises:
+            UnknownName: If that cannot happen to it.
+        """
+        if how not in get_args(Magnet):  # It may have come from another process.
+            raise UnknownName("fault of a magnet", str(how), get_args(Magnet))
+        self._magnet = how
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes, from a register on.
+
+        Behind the low byte of an angle comes its high byte again, where reading began there.
+        """
+        counts = self._counts()
+        if register in (_RAW_ANGLE, _ANGLE):
+            return [self._byte(register + i % 2, counts) for i in range(length)]
+        return [self._byte(register + i & 0xFF, counts) for i in range(length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Nothing: what can be set is not simulated, and nobody sets it."""
+
+    def _counts(self) -> int:
+        if self._magnet == "gone":
+            return 0
+        turned = self._direction * self._angle() / (2.0 * math.pi)
+        return (self._zero + round(turned * _COUNTS_PER_TURN)) % _COUNTS_PER_TURN
+
+    def _byte(self, register: int, counts: int) -> int:
+        if register == _STATUS:
+            return _STATUS_OF[self._magnet]
+        if register in (_RAW_ANGLE, _ANGLE):
+            return counts >> 8
+        if register in (_RAW_ANGLE + 1, _ANGLE + 1):
+            return counts & 0xFF
+        return 0
+
+
+class Chip(Protocol):
+    """A chip at one address of an I2C bus."""
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes, from a register on."""
+        ...
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, from a register on."""
+        ...
+
+
+_CONFIGURATION: Final = 0
+_SHUNT_VOLTAGE: Final = 1
+_BUS_VOLTAGE: Final = 2
+_POWER: Final = 3
+_CURRENT: Final = 4
+_CALIBRATION: Final = 5
+_RESET: Final = 0x8000
+_AT_POWER_ON: Final = 0x399F
+
+_SHUNT_OHM: Final = 0.1  # On the usual breakout boards.
+_SHUNT_LSB_V: Final = 10e-6
+_BUS_LSB_V: Final = 4e-3
+_CONVERSION_READY: Final = 0x2
+
+
+class SimulatedIna219:
+    """Registers of 16 bits that are answered from the world.
+
+    Args:
+        readings: What the world shows now.
+    """
+
+    def __init__(self, readings: Callable[[], Readings]) -> None:
+        self._readings = readings
+        self._configuration = _AT_POWER_ON
+        self._calibration = 0
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes of one register; it does not count on."""
+        word = self._word(register).to_bytes(2, "big")
+        return [word[i % 2] for i in range(length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write a register of 16 bits."""
+        if len(data) != 2:
+            return  # The chip takes a register only as a whole.
+        word = data[0] << 8 | data[1]
+        if register == _CONFIGURATION:
+            self._configuration = _AT_POWER_ON if word & _RESET else word
+        elif register == _CALIBRATION:
+            self._calibration = word & 0xFFFE
+
+    def _word(self, register: int) -> int:
+        seen = self._readings()
+        shunt = round(min(0.32, seen.current_a * _SHUNT_OHM) / _SHUNT_LSB_V)
+        bus = round(seen.battery_v / _BUS_LSB_V)
+        current = shunt * self._calibration // 4096
+        match register:
+            case 0:
+                return self._configuration
+            case 1:
+                return shunt & 0xFFFF
+            case 2:
+                return min(bus, 0x1FFF) << 3 | _CONVERSION_READY
+            case 3:
+                return current * bus // 5000 & 0xFFFF
+            case 4:
+                return current & 0xFFFF
+            case 5:
+                return self._calibration
+            case _:
+                return 0
+
+
+_GYRO_CONFIG: Final = 0x1B
+_ACCEL_CONFIG: Final = 0x1C
+_ACCEL_XOUT_H: Final = 0x3B
+_GYRO_ZOUT_L: Final = 0x48
+_PWR_MGMT_1: Final = 0x6B
+_WHO_AM_I: Final = 0x75
+_MPU6050_RESET: Final = 0x80
+_SLEEP: Final = 0x40
+
+_STANDARD_GRAVITY: Final = 9.80665  # m/s2
+_LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
+_LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
+_ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
+
+
+class SimulatedMpu6050:
+    """Registers that are answered from the world.
+
+    Args:
+        readings: What the world shows now.
+    """
+
+    def __init__(self, readings: Callable[[], Readings]) -> None:
+        self._readings = readings
+        self._registers = bytearray(128)
+        self._wake_up()
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes, from a register on."""
+        if register <= _GYRO_ZOUT_L and register + length > _ACCEL_XOUT_H:
+            self._measure()
+        return [self._registers[(register + i) % 128] for i in range(length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, from a register on."""
+        for i, byte in enumerate(data):
+            at = (register + i) % 128
+            if at == _PWR_MGMT_1 and byte & _MPU6050_RESET:
+                self._wake_up()
+            elif at != _WHO_AM_I:
+                self._registers[at] = byte
+
+    def _wake_up(self) -> None:
+        self._registers[:] = bytes(128)
+        self._registers[_PWR_MGMT_1] = _SLEEP
+        self._registers[_WHO_AM_I] = 0x68
+
+    def _measure(self) -> None:
+        if self._registers[_PWR_MGMT_1] & _SLEEP:
+            return
+        seen = self._readings()
+        per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
+        per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
+        values = (
+            seen.acceleration_x / _STANDARD_GRAVITY * per_g,
+            seen.acceleration_y / _STANDARD_GRAVITY * per_g,
+            per_g,
+            _ROOM_TEMPERATURE,
+            0.0,
+            0.0,
+            math.degrees(seen.yaw_rate) * per_rate,
+        )
+        data = b"".join(_word(value) for value in values)
+        self._registers[_ACCEL_XOUT_H : _ACCEL_XOUT_H + len(data)] = data
+
+
+def _word(value: float) -> bytes:
+    return max(-32768, min(32767, round(value))).to_bytes(2, "big", signed=True)
+
+
+_OSCILLATOR_HZ: Final = 25e6  # Section 7.3.5.
+_COUNTS: Final = 4096  # Section 7.3.3: a period has so many.
+_CHANNELS: Final = 16
+
+_MODE1: Final = 0x00
+_FIRST_LED: Final = 0x06
+_LAST_LED: Final = 0x45
+_FIRST_ALL_LED: Final = 0xFA
+_LAST_ALL_LED: Final = 0xFD
+_PRESCALE: Final = 0xFE
+_LEAST_PRESCALE: Final = 3
+
+_RESTART: Final = 0x80
+_AUTO_INCREMENT: Final = 0x20
+_PCA9685_SLEEP: Final = 0x10
+_FULL: Final = 0x10  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
+
+
+class SimulatedPca9685:
+    """Registers, and what they make of the channels."""
+
+    def __init__(self) -> None:
+        self._registers = bytearray(256)
+        # Section 7.3, table 4: as the chip wakes up. It sleeps and all channels are fully off.
+        self._registers[_MODE1] = 0x11
+        self._registers[0x01] = 0x04
+        self._registers[0x02:0x06] = bytes((0xE2, 0xE4, 0xE8, 0xE0))
+        for channel in range(_CHANNELS):
+            self._registers[_FIRST_LED + 4 * channel + 3] = _FULL
+        self._registers[_PRESCALE] = 0x1E
+        self._halted: set[int] = set()  # Channels that wait for RESTART after a sleep.
+
+    @property
+    def channels(self) -> list[Pulse]:
+        """The pulses of all channels; 0 us for a channel that is off."""
+        period_s = _COUNTS * (self._registers[_PRESCALE] + 1) / _OSCILLATOR_HZ
+        hz = 1.0 / period_s
+        return [
+            Pulse(self._counts(channel) / _COUNTS * period_s * 1e6, hz)
+            for channel in range(_CHANNELS)
+        ]
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes, from a register on; the same one again and again without auto-increment."""
+        return [self._registers[at] for at in self._addressed(register, length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, from a register on."""
+        # Whether it counts on is what MODE1 said when the transfer began.
+        for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
+            self._write_byte(at, byte)
+
+    def _addressed(self, register: int, length: int) -> list[int]:
+        if self._registers[_MODE1] & _AUTO_INCREMENT:
+            return [(register + i) % 256 for i in range(length)]
+        return [register] * length
+
+    def _write_byte(self, at: int, byte: int) -> None:
+        if at == _MODE1:
+            self._write_mode1(byte)
+        elif at == _PRESCALE:
+            if self._registers[_MODE1] & _PCA9685_SLEEP:  # Section 7.3.5: only while it sleeps.
+                self._registers[at] = max(byte, _LEAST_PRESCALE)
+        elif _FIRST_ALL_LED <= at <= _LAST_ALL_LED:
+            for channel in range(_CHANNELS):
+                self._registers[_FIRST_LED + 4 * channel + at - _FIRST_ALL_LED] = byte
+            self._halted.clear()
+        else:
+            self._registers[at] = byte
+            if _FIRST_LED <= at <= _LAST_LED:
+                self._halted.discard((at - _FIRST_LED) // 4)
+
+    def _write_mode1(self, byte: int) -> None:
+        before = self._registers[_MODE1]
+        after = byte & ~_RESTART
+        if byte & _PCA9685_SLEEP and not before & _PCA9685_SLEEP:
+            # Section 7.3.1.1: channels that were on stop until RESTART is written as 1.
+            self._halted = {c for c in range(_CHANNELS) if self._counts(c)}
+        if byte & _RESTART and not byte & _PCA9685_SLEEP:
+            self._halted.clear()
+        if self._halted:
+            after |= _RESTART
+        self._registers[_MODE1] = after
+
+    def _counts(self, channel: int) -> int:
+        """For how many of the counts of a period a channel is on."""
+        if self._registers[_MODE1] & _PCA9685_SLEEP or channel in self._halted:
+            return 0
+        at = _FIRST_LED + 4 * channel
+        on_low, on_high, off_low, off_high = self._registers[at : at + 4]
+        if off_high & _FULL:
+            return 0
+        if on_high & _FULL:
+            return _COUNTS
+        on = (on_high & 0x0F) << 8 | on_low
+        off = (off_high & 0x0F) << 8 | off_low
+        return (off - on) % _COUNTS
+
+
+class Tca9548a:
+    """A control register of one byte, whose bits open channels; none is open at power-on.
+
+    Args:
+        channels: What is behind each channel, from 0 to 7; all chips have one address there.
+    """
+
+    def __init__(self, channels: Mapping[int, Chip]) -> None:
+        self.channels = dict(channels)
+        self._control = 0
+
+    @property
+    def open(self) -> list[Chip]:
+        """The chips that hear what is said now."""
+        return [chip for channel, chip in self.channels.items() if self._control >> channel & 1]
+
+    def read(self, register: int, length: int) -> list[int]:
+        """The control register again and again; to ask for a register is to write it."""
+        self._control = register
+        return [self._control] * length
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """The last byte counts, and the one that other chips take for a register is the first."""
+        self._control = (register, *data)[-1]
+
+
+class Behind:
+    """What answers behind a multiplexer at the address of its chips.
+
+    Args:
+        mux: The multiplexer.
+    """
+
+    def __init__(self, mux: Tca9548a) -> None:
+        self._mux = mux
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Bytes of all chips that hear it: where one pulls the line low, it is low.
+
+        Raises:
+            OSError: If no chip hears it, with the number that the kernel's driver gives.
+        """
+        said = [0xFF] * length
+        for chip in self._heard():
+            said = [a & b for a, b in zip(said, chip.read(register, length), strict=True)]
+        return said
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes to all chips that hear it.
+
+        Raises:
+            OSError: If no chip hears it.
+        """
+        for chip in self._heard():
+            chip.write(register, data)
+
+    def _heard(self) -> list[Chip]:
+        if not (heard := self._mux.open):
+            raise OSError(errno.EREMOTEIO, "no chip answers")
+        return heard
