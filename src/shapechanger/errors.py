@@ -9,6 +9,7 @@ ShapechangerError
 │   └── EmptyShift                  source and target do the same, so nothing crosses
 ├── SpaceMismatch (ValueError)      two spaces that differ where they must not
 ├── BadAction (ValueError)          an action that an env cannot take
+├── EnvArgumentError (ValueError)   an argument of an env that has the wrong type
 ├── VectorEnvError (ValueError)     a vector env that cannot be made as it was asked for
 ├── FingerError (ValueError)        a finger that cannot be built, or not move as asked
 ├── WorldError (ValueError)         a world that cannot be laid out as it was asked for
@@ -47,6 +48,7 @@ __all__ = [
     "CorruptStudy",
     "DemosError",
     "EmptyShift",
+    "EnvArgumentError",
     "FingerError",
     "ForeignStudy",
     "LayoutError",
@@ -122,6 +124,10 @@ class SpaceMismatch(ShapechangerError, ValueError):
 
 class BadAction(ShapechangerError, ValueError):
     """An action that an env cannot take; the message names the env."""
+
+
+class EnvArgumentError(ShapechangerError, ValueError):
+    """An argument of an env that has the wrong type."""
 
 
 class VectorEnvError(ShapechangerError, ValueError):

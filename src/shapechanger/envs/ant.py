@@ -1,4 +1,4 @@
-"""Ants: run forwards on whatever legs there are."""
+"""Ant envs: run forwards on any number and length of legs."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from shapechanger.layout import Feature
 
 __all__ = ["AntEnv", "ExtendedAntEnv"]
 
-# An ant this many times higher than it stands has been thrown up. The ceiling of Ant is then 0.98
-# m, where Gymnasium has 1.0, and that of BigAnt 1.80 m, where the 2017 release had 2.0.
+# An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
+# m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9
 
 _sum: Final = np.add.reduce
@@ -71,26 +71,24 @@ class _Ant(Binding):
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Gymnasium's `Ant-v5` with any body of the family of ants.
+    """Gymnasium's `Ant-v5` with any body of the ant family.
 
     Actions, observations, rewards and infos are those of `Ant-v5`; `observation_layout` and
-    `action_layout` name each number. Three things follow from the body:
+    `action_layout` name each number. Three things depend on the body:
 
-    - **Start pose**: the model's own, with each joint moved a tenth of its range inside its limits,
-      and the torso no lower than the feet need. Noise is drawn as in `Ant-v5`; joints stay inside
-      their limits and feet above the floor.
+    - **Start pose**: the model's own, with each joint at least a tenth of its range inside its
+      limits, and the torso high enough for the feet. Noise is drawn as in `Ant-v5`; joints stay
+      inside their limits and feet above the floor.
     - **Healthy range**: an ant is unhealthy when its torso's up axis points down, when it is higher
-      than 1.9 times its own standing height, or when its state is not finite. A fixed lower height
-      cannot tell a flipped ant, which rests at 0.27 m, from one that lies down.
-    - **Spaces**: an ant with more joints has more numbers.
+      than 1.9 times its own standing height, or when its state is not finite. A lower limit could
+      not distinguish a flipped ant, which rests at 0.27 m, from one that lies down.
+    - **Spaces**: an ant with more joints has larger spaces.
 
     Args:
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Heights of the torso between which the ant is healthy, m; None derives the
             upper one from the body and sets no lower one.
-        fast_model: Whether a model that moves to the last bit like the body's, and costs less, may
-            step it, and MuJoCo measures no times (`data.timer`) meanwhile.
-        **arguments: All arguments of `Ant-v5`.
+        **arguments: All arguments of `Ant-v5`, and those of `Reshapable`.
     """
 
     family = ANT
@@ -104,19 +102,19 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         self,
         body: BodyLike = "Ant",
         healthy_z_range: tuple[float, float] | None = None,
-        fast_model: bool = True,
         **arguments: Any,
     ) -> None:
-        self.fast_model = fast_model
         self._given_z_range = healthy_z_range
         self.contacts_observed = arguments.get("include_cfrc_ext_in_observation", True)
         self.place_hidden = arguments.get("exclude_current_positions_from_observation", True)
         self._force_range = arguments.get("contact_force_range", (-1.0, 1.0))
+        if healthy_z_range is not None:
+            arguments["healthy_z_range"] = healthy_z_range
         self._begin(body, arguments)
         cast("Any", GymnasiumAntEnv).__init__(
-            self, healthy_z_range=healthy_z_range or (-math.inf, math.inf), **arguments
+            self, **{"healthy_z_range": (-math.inf, math.inf), **arguments}
         )
-        self._finish({"healthy_z_range": healthy_z_range, "fast_model": fast_model, **arguments})
+        self._finish(arguments)
 
     def _follow_body(self) -> None:
         super()._follow_body()
@@ -127,7 +125,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     @property
     def main_body(self) -> int | str:
-        """The body whose velocity is rewarded."""
+        """The body whose velocity is rewarded, by number or name."""
         return self._main_body
 
     def _bind(self, watch: ModelWatch) -> _Ant:
@@ -293,13 +291,13 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     @property
     def up(self) -> float:
-        """How far the torso's up axis points up: 1 upright, 0 on its side, -1 upside down."""
+        """Vertical part of the torso's up axis: 1 upright, 0 on its side, -1 upside down."""
         x, y = self.data.qpos[4:6]
         return float(1.0 - 2.0 * (x * x + y * y))
 
     @property
     def is_healthy(self) -> bool:
-        """Whether the state is finite, the torso upright and not higher than it should be."""
+        """Whether the state is finite, and the torso upright and within its healthy heights."""
         return bool(super().is_healthy) and self.up > 0.0
 
 
@@ -320,12 +318,12 @@ def _is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
 
 
 class ExtendedAntEnv(AntEnv):
-    """The ant with a third segment on each leg, so that both its spaces differ from the ant's.
+    """The ant with a third segment on each leg, which makes both spaces larger than the ant's.
 
     Args:
         body: As in `AntEnv`; None for the extended ant.
-        actuated_extension: Whether the third segments have motors of their own, 12 in all; the 2017
-            release had none there, 8 in all.
+        actuated_extension: Whether the third segments have motors of their own, which makes 12; the
+            2017 release had 8.
         **arguments: All arguments of `AntEnv`.
     """
 
