@@ -74,8 +74,9 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     ## Info
     `progress`, metres along the course since the start; `collisions` since the start, of any part
     of the vehicle, also where no bumper detects them; `pose`, (x, y, heading) in m and rad;
-    `course`, the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`,
-    `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
+    `course`, the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
+    `refused`, `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`,
+    `decided_ns`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
