@@ -222,14 +222,14 @@ def test_a_disk_that_is_full_already_moves_nothing(tmp_path: Path) -> None:
 
 
 def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
-    """The second is told, before it moves anything."""
+    """The second recorder is refused before the env moves."""
     inner = CorridorEnv("state")
     with (
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0),
         RecordEpisodes(inner, tmp_path) as env,
     ):
         env.reset()
-        with pytest.raises(DemosError, match="records in"):
+        with pytest.raises(DemosError, match="in use by another recorder"):
             env.step(FORWARD)
     assert inner.done == []
 
