@@ -143,7 +143,8 @@ class DriverDecision:
 
     Attributes:
         carried_out: Action to pass to the env, shape (n,).
-        meant: Action to record as decided, shape (n,); differs where a demonstrator errs on purpose.
+        meant: Action to record as decided, shape (n,); differs where a demonstrator errs on
+            purpose.
         driver: Who decided.
         wanted: Action of a policy while somebody else drives.
         remark: Text of a mark to set; "" for none.

@@ -177,15 +177,16 @@ class _Decision(NamedTuple):
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
     """Wrapper that records what is observed and done in an env.
 
-    A step holds an observation, the action decided for it, and the outcome. Where a person intervened
-    (`info["intervene_action"]`), the person's action is recorded as decided, and the action passed to
-    `step` as what a policy wanted.
+    A step holds an observation, the action decided for it, and the outcome. Where a person
+    intervened (`info["intervene_action"]`), the person's action is recorded as decided, and the
+    action passed to `step` as what a policy wanted.
 
     If a step cannot be written, the wrapper stops the env with one action that moves nothing, and
     `step` raises the error; everything written before is complete.
 
     Args:
-        env: Its observations are a picture, a state, or a Dict of `image` and `state`; it has layouts.
+        env: Its observations are a picture, a state, or a Dict of `image` and `state`; it has
+            layouts.
         recording: Folder of the recording; created if missing.
         driver: Who decides the actions passed to `step`.
         about: Further fields of the header, such as `robot`, `body`, `source` and `notes`.

@@ -27,7 +27,7 @@ FORMAT: Final = 1
 """Version of the format. Readers refuse any other version."""
 
 Clock = Literal["real", "twin", "none"]
-"""Source of the nanoseconds in steps: the clock of a real robot, the stepped clock of a twin, or none."""
+"""Source of the nanoseconds in steps: a robot's clock, the stepped clock of a twin, or none."""
 
 _CLOCKS: Final = ("real", "twin", "none")
 _IMAGE_SIZE: Final = 2
@@ -139,7 +139,7 @@ def _compact(layout: dict[str, Any] | None) -> str:
 
 
 def _layout_size(layout: str) -> int:
-    """Return the number of values of a layout, without importing `shapechanger.layout` (and NumPy)."""
+    """Return the number of values of a layout, without importing NumPy."""
     try:
         features = cast("list[dict[str, Any]]", json.loads(layout)["features"])
         return sum(math.prod(feature.get("shape", ())) for feature in features)
@@ -148,7 +148,7 @@ def _layout_size(layout: str) -> int:
 
 
 Driver = Literal["person", "policy", "expert", "program"]
-"""Who decided an action: a person, a learned policy, an expert with full state, or another program."""
+"""Who decided: a person, a learned policy, an expert with full state, or another program."""
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 

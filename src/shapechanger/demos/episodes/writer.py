@@ -32,8 +32,8 @@ _SYNC_PERIOD_S: Final = 1.0
 class Syncer:
     """Flush files to disk once a second, so that a power cut costs at most a second.
 
-    A crash of the program alone costs nothing, because the kernel has the bytes by then. The work is
-    done in a thread, because a memory card may take longer than a control period.
+    A crash of the program alone costs nothing, because the kernel has the bytes by then. The work
+    is done in a thread, because a memory card may take longer than a control period.
 
     Args:
         fd: A growing file, which stays open until `close`.
