@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol
 
 import tyro
 from rich.console import Console
@@ -21,9 +21,7 @@ from rich.text import Text
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import OutputPlan
-from shapechanger.robot.profile.edit import rewrite
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (
@@ -35,7 +33,9 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     with_widest_pulses,
 )
-from shapechanger.twin.robot import run_robot
+
+if TYPE_CHECKING:
+    from shapechanger.remote.client import RobotClient
 
 __all__ = [
     "Calibrate",
@@ -370,6 +370,9 @@ class Calibration:
     @contextmanager
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
         """The robot with other settings, served and armed for a person."""
+        from shapechanger.robot.profile.edit import rewrite
+        from shapechanger.twin.robot import run_robot
+
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder) / "profile.toml"
             path.write_bytes(self._profile.path.read_bytes())

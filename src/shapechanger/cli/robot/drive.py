@@ -14,14 +14,13 @@ from rich.live import Live
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console
-from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.remote.client import RobotClient
 from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
+    from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
     from shapechanger.remote.client import RobotClient
     from shapechanger.remote.known_robots import KnownRobot
 if TYPE_CHECKING:
@@ -340,6 +339,8 @@ def load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     from shapechanger.demos.cloning.policy import CameraPolicy
 
     policy = CameraPolicy.load(path)
+    from shapechanger.remote.client import RobotClient
+
     with RobotClient.connect(robot, frames=False) as there:
         welcome = there.welcome
     actions = Layout.from_json(welcome.action_layout)
@@ -409,6 +410,8 @@ class PolicyDriver:
 
     def _run(self) -> None:
         try:
+            from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+
             env = RemoteVehicleEnv(**self._options)
             try:
                 while not self._ended.is_set():

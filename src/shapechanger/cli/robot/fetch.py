@@ -28,7 +28,6 @@ from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
 from shapechanger.errors import DemosError, RobotRefused, UnknownName
 from shapechanger.link.messages import EpisodeSummary, Piece
-from shapechanger.remote.client import RobotClient
 
 if TYPE_CHECKING:
     from shapechanger.link.messages import EpisodeSummary

@@ -20,16 +20,16 @@ from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
-from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import RunningRobot
 
 if TYPE_CHECKING:
     from shapechanger.cli.robot.trial.faults import Fault
     from shapechanger.cli.robot.trial.trial import Trial, TrialResult
+    from shapechanger.remote.client import RobotClient
     from shapechanger.robot.profile.profile import Profile
+    from shapechanger.twin.robot import RunningRobot
 
 __all__ = ["Check", "Selftest", "check_jumper", "check_robot"]
 
