@@ -64,7 +64,7 @@ def there(robot: RunningRobot) -> KnownRobot:
 
 
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
-    """At full throttle: at rest at the deadline; joined again, somebody can drive again."""
+    """The robot stops at its deadline, and can be driven again after the cable is joined."""
     profile = write_profile(tmp_path)
     wiring = TwinWiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)

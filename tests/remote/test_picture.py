@@ -15,7 +15,7 @@ sides = st.integers(1, 12)
 
 
 def test_a_picture_is_rgb_and_upright() -> None:
-    """Shape (height, width, 3), red where it is red."""
+    """Shape (height, width, 3), with red in the first channel."""
     seen = decode_picture(picture((160, 120), number=10))
     assert seen.shape == (120, 160, 3)
     assert seen.dtype == np.uint8
@@ -25,20 +25,20 @@ def test_a_picture_is_rgb_and_upright() -> None:
 
 
 @given(data=st.binary(max_size=200))
-def test_bytes_that_are_no_picture_are_refused_in_words(data: bytes) -> None:
-    """Whatever they are."""
+def test_invalid_jpegs_are_errors(data: bytes) -> None:
+    """For any bytes."""
     with pytest.raises(LinkError, match="invalid JPEG"):
         decode_picture(data)
 
 
-def test_a_torn_picture_is_refused() -> None:
-    """Half a JPEG is no JPEG."""
+def test_a_truncated_jpeg_is_an_error() -> None:
+    """Half a JPEG does not decode."""
     whole = picture((160, 120), 1)
     with pytest.raises(LinkError, match="invalid JPEG"):
         decode_picture(whole[: len(whole) // 2])
 
 
-def test_a_few_bytes_cannot_ask_for_all_memory() -> None:
+def test_a_few_bytes_cannot_claim_all_memory() -> None:
     """A header may claim gigabytes."""
     whole = bytearray(picture((16, 16), 1))
     frame = whole.index(b"\xff\xc0")
@@ -51,7 +51,7 @@ def test_a_few_bytes_cannot_ask_for_all_memory() -> None:
 def test_one_colour_stays_that_colour(
     width: int, height: int, wide: int, high: int, level: int
 ) -> None:
-    """At any size, of the shape that was asked for."""
+    """At any size."""
     small = resize_picture(np.full((height, width, 3), level, np.uint8), (wide, high))
     assert small.shape == (high, wide, 3)
     assert small.dtype == np.uint8
@@ -62,21 +62,21 @@ def test_one_colour_stays_that_colour(
 def test_shrinking_by_a_whole_number_keeps_the_mean(
     data: st.DataObject, wide: int, high: int, by: int
 ) -> None:
-    """A box is its mean, so the brightness stays, but for rounding."""
+    """Up to rounding."""
     seed = data.draw(st.integers(0, 2**32 - 1))
     whole = np.random.default_rng(seed).integers(0, 256, (by * high, by * wide, 3), np.uint8)
     assert abs(float(resize_picture(whole, (wide, high)).mean()) - float(whole.mean())) <= 0.5
 
 
 def test_other_sizes_take_the_nearest_pixel() -> None:
-    """Without mirroring or shifting: the middle of 5 from 10 and so on."""
+    """Without mirroring or shifting."""
     row = np.arange(5, dtype=np.uint8)
     whole = np.repeat(np.repeat(row[None, :, None], 2, axis=0), 3, axis=2)
     assert resize_picture(whole, (2, 2))[0, :, 0].tolist() == [1, 3]
     assert resize_picture(whole, (10, 2))[0, :, 0].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
 
 
-def test_its_own_size_is_the_picture_itself() -> None:
-    """No work for nothing."""
+def test_an_equal_size_returns_the_picture_itself() -> None:
+    """Without a copy."""
     whole = np.zeros((2, 3, 3), np.uint8)
     assert resize_picture(whole, (3, 2)) is whole

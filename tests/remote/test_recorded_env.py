@@ -16,8 +16,8 @@ from tests.remote.robot import Robot
 Run = Callable[..., Robot]
 
 
-def test_pictures_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
-    """Byte for byte, with the robot's own times and what its outputs did."""
+def test_frames_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
+    """Byte for byte, with the robot's times and applied outputs."""
     robot = run(arm_by_itself=True)
     options: dict[str, Any] = {"pace": "lockstep", "state": True} | robot.arguments
     with gym.make("shapechanger/RemoteVehicle-v1", **options) as made:

@@ -15,7 +15,7 @@ from tests.robot.daemon.running import running
 
 
 def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
-    """Strangers stay outside, and who does not command gives no command."""
+    """Clients stay unauthenticated, and those without control send no command."""
     counts = fuzz(5_000, seed=1)
     assert counts["strangers refused"] == 1_250
     assert counts["connections ended"] > 1_000
@@ -23,7 +23,7 @@ def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
 
 
 def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The daemon answers each with a reason or not at all, and serves the next one as ever."""
+    """The daemon answers with a reason or closes, and serves the next client."""
     secret = tmp_path / "secret"
     secret.mkdir()
     (secret / "episode.json").write_text("{}")
