@@ -1,4 +1,4 @@
-"""`shapechanger transfer`: a whole transfer study in one command."""
+"""`shapechanger transfer`: a complete transfer study."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-import msgspec
 import tyro
 from rich.table import Table
 
@@ -29,12 +28,12 @@ from shapechanger.transfer.env_ref import EnvRef
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from shapechanger.transfer.plan import Plan, Run
-    from shapechanger.transfer.study import Study
+    from shapechanger.transfer.plan import Plan, Run, TransferTask
+    from shapechanger.transfer.study import Study, TaskTraits
 
 __all__ = ["Transfer", "run_steps", "write_study_report"]
 
-# What --quick divides the budget by, and the seeds it does with: enough to see that all works.
+# Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
 _QUICK_SEEDS: Final = 2
 _FILE_WIDTH: Final = 120
@@ -42,9 +41,9 @@ _FILE_WIDTH: Final = 120
 
 @dataclass(frozen=True)
 class Transfer:
-    """Learn in SOURCE, move to TARGET, and measure what the move was worth.
+    """Train in SOURCE, transfer to TARGET, and compare with training from scratch.
 
-    Stopped half-way, the same command goes on where it was.
+    Run the same command again to resume.
     """
 
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
@@ -63,7 +62,9 @@ class Transfer:
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
-    """A policy to bring along in place of training one for each seed."""
+    """A given source policy, instead of training one for each seed."""
+    trust: bool = False
+    """Load the given policy even if it contains something that can run code."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
@@ -93,16 +94,23 @@ class Transfer:
     """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
     def run(self) -> None:
-        """Do the study, print its table, and write its report."""
+        """Run the study, print its table, and write its report."""
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.study import is_folder_of, run_study, unfinished_runs
+        from shapechanger.transfer.study import (
+            inspect_task,
+            is_folder_of,
+            run_study,
+            unfinished_runs,
+        )
 
         self._require_sense()
-        # The report comes last; if what draws it is missing, say so before the work.
+        # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
-        # A file has no width of its own; a table in it should not be folded.
+        # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        plan = self._plan()
+        task = self._task()
+        traits = inspect_task(task)
+        plan = self._plan(task, traits)
         executor = Processes(1 if plan.exclusive else self.workers)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
@@ -114,9 +122,11 @@ class Transfer:
                     plan,
                     out,
                     source_policy=self.source_policy,
+                    trust=self.trust,
                     executor=executor,
                     on_progress=progress,
                     command=_command(),
+                    traits=traits,
                 )
         except KeyboardInterrupt:
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
@@ -127,10 +137,10 @@ class Transfer:
         console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
 
     def _require_sense(self) -> None:
-        """Refuse options that contradict one another, or of which one would be dropped.
+        """Refuse contradictory or unused options.
 
         Raises:
-            StudyError: If a seed or an arm cannot be.
+            StudyError: If a seed or an arm is invalid.
             MapError: If the body map is given twice.
         """
         require_seed(self.seed)
@@ -143,29 +153,28 @@ class Transfer:
                 "--map."
             )
 
-    def _plan(self) -> Plan:
-        """What to do."""
-        from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
-        from shapechanger.transfer.methods import default_arms
+    def _task(self) -> TransferTask:
+        """Source and target, with their bodies and options."""
         from shapechanger.transfer.plan import TransferTask
-        from shapechanger.transfer.study import make_plan
 
         source = driven(env_ref(self.source, self.source_body))
         target = driven(env_ref(self.target, self.target_body), self.target_lens)
-        task = TransferTask(
+        return TransferTask(
             source.having(options_of(self.source_options, "--source-options")),
             target.having(options_of(self.target_options, "--target-options")),
         )
-        for env in (task.source, task.target):
-            _require_options(env)
+
+    def _plan(self, task: TransferTask, traits: TaskTraits) -> Plan:
+        """The plan of the study."""
+        from shapechanger.transfer.learners.settings import learner_settings
+        from shapechanger.transfer.study import default_arms, make_plan
+
         learner = self.learner or default_learner(task.target)
         settings = learner_settings(learner)
         steps, seeds = self.steps, self.seeds
         if self.quick:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-            if isinstance(settings, LearnerSettings):
-                every = min(settings.eval_every, settings.whole_updates(shortest // 4))
-                settings = msgspec.structs.replace(settings, eval_every=every, source_steps=0)
+            settings = settings.for_budget(shortest)
             steps = shortest if steps is None else steps
             seeds = _QUICK_SEEDS if seeds is None else seeds
         return make_plan(
@@ -176,16 +185,18 @@ class Transfer:
             steps=steps,
             source_steps=self.source_steps,
             source_policy=self.source_policy,
-            arms=self.arms or default_arms(task),
+            trust=self.trust,
+            arms=self.arms or default_arms(traits),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),
             map_text=_read(self.map) if self.map else "",
             units=self.units,
+            traits=traits,
         )
 
 
 def write_study_report(study: Study, out: Path) -> Path:
-    """Write the report; a machine that cannot draw bodies gets one without their pictures."""
+    """Write the report, without pictures of the bodies if they cannot be rendered."""
     from shapechanger.reports.study import write_report
 
     path = out / "report.html"
@@ -199,7 +210,7 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """The steps of each run, for the progress; an evaluation counts as one."""
+    """Return the number of steps of each run for the progress; an evaluation counts as one."""
     from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS
 
     steps = {"scratch": plan.steps, "fine-tune": plan.steps}
@@ -207,26 +218,11 @@ def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
     return {run.name: steps.get(run.kind, 1) for run in runs}
 
 
-def _require_options(env: EnvRef) -> None:
-    """Refuse options that an env does not take.
-
-    Raises:
-        StudyError: If there is one.
-    """
-    try:
-        env.make().close()
-    except TypeError as error:
-        reason, told, _ = str(error).partition(" was raised from the environment creator")
-        if not told:
-            raise
-        raise StudyError(f"{env.id} cannot be made with these options: {reason}.") from error
-
-
 def _split_rule(text: str) -> tuple[str, str]:
-    """The name and the rule of `NAME=RULE`.
+    """Split `NAME=RULE`.
 
     Raises:
-        MapError: If it is not of that form.
+        MapError: If it has another form.
     """
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
@@ -235,7 +231,7 @@ def _split_rule(text: str) -> tuple[str, str]:
 
 
 def _read(path: Path) -> str:
-    """The text of a file.
+    """Read a text file.
 
     Raises:
         MapError: If it cannot be read.
@@ -247,7 +243,7 @@ def _read(path: Path) -> str:
 
 
 def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
-    """Both bodies as they start, to one scale; None if the envs draw none."""
+    """Render both bodies in their start poses at one scale; None if the envs cannot."""
     with opened(source) as one, opened(target) as other:
         both: list[Any] = [one.unwrapped, other.unwrapped]
         if not all(hasattr(env, "picture") for env in both):
@@ -257,12 +253,12 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 
 def _name(env: EnvRef) -> str:
-    """A short name for a folder."""
+    """Return a short folder name."""
     return env.id.split("/")[-1].removesuffix("-v1")
 
 
 def _way_on(plan: Plan, out: Path) -> str:
-    """What is kept of a study that was cut off, and how to go on; empty if it had not begun."""
+    """Tell how to resume an interrupted study; empty if it had not started."""
     from shapechanger.transfer.study import is_folder_of, unfinished_runs
 
     if not is_folder_of(plan, out):
@@ -273,16 +269,16 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 
 def _command() -> str:
-    """The command as it was typed."""
+    """Return the command line."""
     return shlex.join(["shapechanger", *sys.argv[1:]])
 
 
 def _print(console: Console, study: Study) -> None:
-    """The table of measures, and what they come to."""
+    """Print the table of measures and the verdict."""
     from shapechanger.reports.verdict import measure_rows, verdict
 
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
-    # What an arm leaves undefined, as zero-shot does most, is in the report with the reason.
+    # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
     for row in [row for row in measure_rows(study) if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     console.print(table)

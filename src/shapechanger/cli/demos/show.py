@@ -1,4 +1,4 @@
-"""`shapechanger demos list`: the episodes of a recording."""
+"""`shapechanger demos list | show`: summaries of a recording."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from rich.table import Table
 from shapechanger.cli.console import plain_console
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
+from shapechanger.reports.numbers import duration_text, shares_text
 
-__all__ = ["ListEpisodes", "Show", "shares", "told_length"]
+__all__ = ["ListEpisodes", "ShowEpisodes"]
 
 _WIDEST: Final = 400
 
@@ -28,7 +29,7 @@ class ListEpisodes:
     """Folder of the recording, or of one episode."""
 
     def run(self) -> None:
-        """Print a line for each, and what they are together."""
+        """Print a line per episode and the totals."""
         from shapechanger.demos.statistics import summary
 
         table = Table(
@@ -54,48 +55,24 @@ class ListEpisodes:
                 one.what,
                 one.created[:16].replace("T", " "),
                 str(one.steps) if one.kept == one.steps else f"{one.kept} of {one.steps}",
-                told_length(one.seconds),
-                shares({str(driver): count for driver, count in one.drivers.items()}),
+                duration_text(one.seconds),
+                shares_text({str(driver): count for driver, count in one.drivers.items()}),
                 str(one.marks or ""),
                 one.outcome if one.closed else "not closed",
             )
         console = plain_console()
-        # A name that is cut off cannot be typed: rather let the terminal break the line.
+        # Truncated names could not be typed; let the terminal wrap the line.
         needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
         plain_console(width=max(console.width, needed)).print(table)
         many = f"{len(paths)} episode{'' if len(paths) == 1 else 's'}"
-        console.print(f"{many}: {kept} of {steps} steps count, {told_length(seconds)}")
+        console.print(f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}")
         for sentence in broken:
             console.print(sentence, soft_wrap=True)
 
 
-def told_length(seconds: float) -> str:
-    """A time as people say it.
-
-    >>> told_length(4.25), told_length(59.97), told_length(754.0)
-    ('4.2 s', '1:00 min', '12:34 min')
-    """
-    if round(seconds, 1) < 60.0:  # A minute.
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes}:{rest:02d} min"
-
-
-def shares(counts: dict[str, int]) -> str:
-    """Who did how much.
-
-    >>> shares({"policy": 30, "expert": 10}), shares({"expert": 4})
-    ('policy 75 %, expert 25 %', 'expert')
-    """
-    total = sum(counts.values())
-    if len(counts) == 1:
-        return next(iter(counts))
-    return ", ".join(f"{name} {100.0 * count / total:.0f} %" for name, count in counts.items())
-
-
 @dataclass(frozen=True)
-class Show:
-    """Say what is in a recording in numbers, or show it as a page with pictures."""
+class ShowEpisodes:
+    """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """Folder of the recording, or of one episode."""
@@ -103,7 +80,7 @@ class Show:
     """The page to write, such as page.html; it needs no other file."""
 
     def run(self) -> None:
-        """Print the numbers, and write the page."""
+        """Print the summary and write the page."""
         from shapechanger.reports.demonstrations import distributions
 
         if self.out is not None and self.out.is_dir():
@@ -138,15 +115,15 @@ class Show:
 
 
 def _told(episodes: Sequence[Episode]) -> list[str]:
-    """What a recording is, in a few lines."""
+    """Describe a recording in a few lines."""
     counts: Counter[str] = Counter(step.driver for one in episodes for step in one.kept)
     seconds = sum(one.seconds for one in episodes)
     many = f"{len(episodes)} episode{'' if len(episodes) == 1 else 's'}"
     steps = sum(len(one.steps) for one in episodes)
     kept = sum(len(one.kept) for one in episodes)
-    lines = [f"{many}: {kept} of {steps} steps count, {told_length(seconds)}"]
+    lines = [f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}"]
     if counts:
-        lines.append(f"driven by {shares(dict(counts.most_common()))}")
+        lines.append(f"driven by {shares_text(dict(counts.most_common()))}")
     outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
     if outcomes:
         ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())

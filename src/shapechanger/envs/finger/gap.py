@@ -166,7 +166,7 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
         ),
         # The same for a finger whose servos have gears and spools of a centimetre, as the profile
         # "finger" has: what turns weighs 1.4 kg at the tendon, drags with 4 N·s/m and rubs with
-        # 0.5 N (the motor's numbers, `shapechanger.twin.servos.models`, by the spool's radius); the
+        # 0.5 N (the motor's numbers, `shapechanger.twin.servos.motor`, by the spool's radius); the
         # force is there within a millisecond, but a rig changes it by no more than all of it in
         # 50 ms, which a lag stands for, and what it senses is late as well: policies did there as
         # they do here with 40 to 60 ms. They pull 15 of 25 N at most, and 1 N at least.

@@ -1,4 +1,4 @@
-"""The servo bus of a robot, with what its tendons pull at."""
+"""Servos of a robot by the names of their tendons, and what the tendons pull."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ from shapechanger.twin.servos.motor import EndStops, Load, Tendon
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
-__all__ = ["Rig", "ServoFault", "TendonWorld", "rig_of"]
+__all__ = ["Rig", "ServoFault", "TendonWorld"]
 
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
-"""What can happen to a servo: it says nothing, hears nothing, is too hot, is overloaded, has lost
-its tendon for good, or loses its power for a moment. "" makes it speak and cool."""
+"""Faults of a servo.
+
+"mute": it obeys without answering. "deaf": it receives nothing. "hot", "overload": it shuts itself
+off. "snapped": its tendon is torn for good. "power": its power fails for a moment. "" repairs
+"mute", "deaf" and "hot".
+"""
 
 _COUNTS_PER_RAD: Final = 4096 / (2.0 * math.pi)
 _HOT_C: Final = 75.0
@@ -31,31 +35,38 @@ class TendonWorld(Protocol):
 
     @property
     def cable_stiffness(self) -> float:
-        """Of the tendons between servos and what they move, N/m."""
+        """Stiffness of the tendons, N/m."""
         ...
 
     def connect(self, tendons: Sequence[str], rig: Rig) -> Load:
-        """Be what these tendons pull at, in this order; the rig is told when it is put somewhere.
+        """Attach the tendons of a rig.
+
+        Args:
+            tendons: Names, in the order of the servos.
+            rig: The rig; its `settle` is to be called after each change of posture.
+
+        Returns:
+            The load of the tendons.
 
         Raises:
-            RobotError: If it has other tendons.
+            RobotError: If the world has other tendons.
         """
         ...
 
     def travels(self) -> Sequence[float]:
-        """How far the end of each tendon is towards its spool, m, as `Load.pull` says."""
+        """Return how far the end of each tendon is towards its spool, m; see `Load.pull`."""
         ...
 
 
 class Rig:
-    """Servos on a line, by the names of their tendons.
+    """Servos on a bus, by the names of their tendons.
 
     Args:
-        plan: The robot; it has outputs with the driver dynamixel.
-        world: Where it is; its tendons are pulled where it has some, and springs elsewhere.
+        plan: The robot, which has outputs with the driver "dynamixel".
+        world: World of the robot; in a world without tendons the servos pull springs.
 
     Attributes:
-        line: The bus.
+        bus: The bus.
 
     Raises:
         RobotError: If the world has other tendons.
@@ -73,7 +84,7 @@ class Rig:
                 id=whole(one, "id"),
                 model=text(one, "model"),
                 tendon=Tendon(number(one, "spool_radius_m"), whole(one, "direction"), stiffness),
-                # In the middle of a count: where it stands while the finger is straight.
+                # In the middle of a count, as it stands while the finger is straight.
                 angle=(whole(one, "zero") + 0.5) / _COUNTS_PER_RAD,
             )
             for one in settings
@@ -81,21 +92,31 @@ class Rig:
         load: Load = EndStops(len(plans))
         if self._world is not None:
             load = self._world.connect(self._names, self)
-        self.line = SimulatedBus(plans, load, whole(settings[0], "baud"))
-        self._servos = dict(zip(self._names, self.line.servos.values(), strict=True))
+        self.bus = SimulatedBus(plans, load, whole(settings[0], "baud"))
+        self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
         self.settle()
 
-    def require(self, device: str) -> None:
-        """Refuse a bus that is not there.
+    @classmethod
+    def of(cls, plan: GuardPlan, world: World) -> Rig | None:
+        """Return the rig of a robot; None for one without a servo bus.
 
         Raises:
-            RobotError: If it is at another device.
+            RobotError: If the world has other tendons.
+        """
+        has_bus = any(output.driver == "dynamixel" for output in plan.outputs)
+        return cls(plan, world) if has_bus else None
+
+    def require(self, device: str) -> None:
+        """Check that the bus is at a device.
+
+        Raises:
+            RobotError: If it is at another one.
         """
         if device != self._device:
             raise RobotError(f"There is no {device} at this twin, only {self._device}.")
 
     def servo(self, tendon: str) -> SimulatedServo:
-        """The servo of a tendon.
+        """Return the servo of a tendon.
 
         Raises:
             UnknownName: If there is no such tendon.
@@ -105,11 +126,11 @@ class Rig:
         return self._servos[tendon]
 
     def tensions(self) -> dict[str, float]:
-        """What each tendon is pulled with, N, by name."""
+        """Return the tension of each tendon, N, by name."""
         return {name: servo.motor.tension for name, servo in self._servos.items()}
 
     def settle(self) -> None:
-        """Turn all spools so that their tendons are just taut, as a person does by hand."""
+        """Turn all spools until their tendons are just taut, as a person does by hand."""
         if self._world is None:
             return
         travels = list(self._world.travels())
@@ -117,18 +138,20 @@ class Rig:
             tendon, motor = servo.plan.tendon, servo.motor
             motor.angle = servo.plan.angle + travel / (tendon.direction * tendon.spool_radius_m)
             motor.speed = motor.tension = 0.0
-        self.line.set_travels(travels)
+        self.bus.set_travels(travels)
 
-    def break_servo(self, tendon: str, how: ServoFault) -> None:
-        """Let something happen to a servo; "" takes back what can be taken back.
+    def break_servo(self, tendon: str, fault: ServoFault | str) -> None:
+        """Make a servo fail.
+
+        Args:
+            tendon: Name of its tendon.
+            fault: The fault; "" repairs what can be repaired.
 
         Raises:
             UnknownName: If there is no such tendon, or no such fault.
         """
         servo = self.servo(tendon)
-        if how not in get_args(ServoFault):  # It may have come from another process.
-            raise UnknownName("fault of a servo", str(how), get_args(ServoFault))
-        match how:
+        match fault:
             case "":
                 servo.faults.mute = servo.faults.deaf = False
                 servo.motor.temperature = min(servo.motor.temperature, _WELL_C)
@@ -144,14 +167,5 @@ class Rig:
                 servo.plan.tendon.snapped = True
             case "power":
                 servo.lose_power()
-
-
-def rig_of(plan: GuardPlan, world: World) -> Rig | None:
-    """The servos of a robot; None for one without a servo bus.
-
-    Raises:
-        RobotError: If the world has other tendons.
-    """
-    if not any(output.driver == "dynamixel" for output in plan.outputs):
-        return None
-    return Rig(plan, world)
+            case _:
+                raise UnknownName("fault of a servo", fault, get_args(ServoFault))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shapechanger.reports.numbers import estimate_text
-from shapechanger.reports.study import MeasureRow, arm_rows, measure_rows
+from shapechanger.reports.verdict import MeasureRow, arm_rows, measure_rows
 from shapechanger.transfer.metrics import DEFAULT_THRESHOLDS
 from shapechanger.transfer.study import Study
-from tests.transfer.report.studies import STEPS, make_study, rising
+from tests.reports.studies import STEPS, make_study, rising
 
 # Straight lines, so that areas and crossings can be read off. Scratch rises from 0 to 1000 in
 # 10,240 steps and then ends, on average, at the mean of its last three evaluations: 900.
@@ -57,12 +57,12 @@ def test_times_by_hand(lines: Study) -> None:
     )
 
 
-def test_runs_that_never_get_there_are_told() -> None:
+def test_runs_that_never_reach_it_are_noted() -> None:
     """They count with the budget, and the note says which they are."""
     study = make_study(fine_tune=rising(0.0, 300.0, 1000.0, seed=2))
     note = by_name(study, "fine-tune")["Time to threshold 0.9: steps saved"].note
     assert "0 of 5 seeds of fine-tune after a mean of 10,240 steps" in note
-    assert note.endswith("Runs that did not get there count as 10,240.")
+    assert note.endswith("Runs that did not reach it count as 10,240.")
 
 
 def test_every_arm_has_every_measure(study: Study) -> None:
@@ -146,6 +146,6 @@ def test_nobody_is_good_where_nobody_beats_the_random_policy() -> None:
     assert {row.good for row in arm_rows(study)} == {""}
 
 
-def test_a_policy_that_was_brought_along_has_no_source_row() -> None:
+def test_a_given_policy_has_no_source_row() -> None:
     """Its runs are not part of the study."""
-    assert "source" not in [row.kind for row in arm_rows(make_study(brought=True))]
+    assert "source" not in [row.kind for row in arm_rows(make_study(given=True))]

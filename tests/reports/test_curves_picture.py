@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.reports.charts import Counting, learning_curves
 from shapechanger.transfer.study import Study
-from tests.transfer.report.studies import make_study, rising
+from tests.reports.studies import make_study, rising
 
 COUNTINGS: tuple[Counting, ...] = ("target", "total")
 
@@ -30,7 +30,7 @@ STUDIES = {
         scratch=same(0.0), fine_tune=same(0.0), zero_shot=same(0.0)[:, :1], random=same(0.0)[:, :1]
     ),
     "zero-shot only": make_study(arms=("scratch", "zero-shot")),
-    "long source": make_study(source_steps=51_200, brought=True),
+    "long source": make_study(source_steps=51_200, given=True),
     "no source steps": make_study(source_steps=0),
 }
 

@@ -13,13 +13,12 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger import env as finger_env
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import StudyError
-from shapechanger.reports import verdict
-from shapechanger.reports.study import arm_rows, caveats
+from shapechanger.reports.verdict import arm_rows, caveats, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.methods import default_arms, policy_path
+from shapechanger.transfer.methods import policy_path
 from shapechanger.transfer.plan import ARMS, EVERY_ARM, Run, TransferTask
-from shapechanger.transfer.study import Study, run_study
+from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
 FINGER = EnvRef("shapechanger/Finger-v1")
@@ -81,7 +80,7 @@ def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> N
     assert made.plan.task.source == FINGER
 
 
-def test_success_is_told(study: tuple[Study, Path, list[Any]]) -> None:
+def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
     """Where an env says what it is: for each arm, and of the source policy in the source."""
     made, _, _ = study
     said = {row.kind: row.success for row in arm_rows(made)}
@@ -89,7 +88,7 @@ def test_success_is_told(study: tuple[Study, Path, list[Any]]) -> None:
     assert said["randomised"].startswith("0 % [0 %, 0 %]")
     assert "Success at the end: the source policy in the source 0 %" in verdict(made)
     assert "identified 0 %" in verdict(made)
-    assert any("whose finger_seed is the number of the seed" in words for words in caveats(made))
+    assert any("whose finger_seed is the index of the seed" in words for words in caveats(made))
 
 
 def test_a_study_that_cannot_go_on_begins_no_run_twice(
@@ -103,16 +102,16 @@ def test_a_study_that_cannot_go_on_begins_no_run_twice(
     assert again.summaries == made.summaries
 
 
-def test_arms_that_nobody_asked_for() -> None:
+def test_default_arms() -> None:
     """The same task in another finger gets all arms, any other pair the three of always."""
-    assert default_arms(TransferTask(FINGER, REAL_LIKE)) == EVERY_ARM
-    assert default_arms(TransferTask(FINGER, FOLLOWS)) == ARMS
-    assert default_arms(TransferTask(SMALL, BIG)) == ARMS
+    assert default_arms(inspect_task(TransferTask(FINGER, REAL_LIKE))) == EVERY_ARM
+    assert default_arms(inspect_task(TransferTask(FINGER, FOLLOWS))) == ARMS
+    assert default_arms(inspect_task(TransferTask(SMALL, BIG))) == ARMS
 
 
-def test_a_target_that_tells_nothing_of_itself_is_refused() -> None:
+def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
     """Before anything is trained."""
-    with pytest.raises(StudyError, match="does not tell how"):
+    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 cannot adapt .*SmallInv"):
         tiny_plan(arms=("scratch", "identified"))
 
 

@@ -1,4 +1,4 @@
-"""A clone, or another policy, that a study is given in place of its own."""
+"""Studies with a given source policy: a clone, or a policy of PPO."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A policy of a pendulum that has learned by trying."""
+    """A policy of a pendulum trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.zip"
     policy = train(
         SMALL,
@@ -71,7 +71,7 @@ def _plan(source_policy: Path, **more: Any) -> Plan:
     return make_plan(task, "cloning", settings, seeds=2, source_policy=source_policy, **more)
 
 
-def test_a_clone_is_brought_along(clone_file: Path, tmp_path: Path) -> None:
+def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> None:
     """No source is trained, zero-shot is this clone, and every seed goes on from it."""
     plan = _plan(clone_file)
     assert plan.source_steps == 40
@@ -109,34 +109,34 @@ def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Pat
         _plan(clone_file, task=TransferTask(slippery, ICY))
 
 
-def test_a_clone_is_nothing_for_a_learner_without_eyes(clone_file: Path) -> None:
+def test_ppo_refuses_a_clone(clone_file: Path) -> None:
     """One sentence says which learners take it."""
     with pytest.raises(StudyError, match=r"dry\.zip is a clone, and tiny does not learn from pict"):
         tiny_plan(source_policy=clone_file)
 
 
-def test_a_policy_that_tried_is_nothing_for_cloning(ppo_file: Path) -> None:
+def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
     """And the other way round."""
-    with pytest.raises(StudyError, match=r"pole\.zip has learned by trying, with tiny, and clon"):
+    with pytest.raises(StudyError, match=r"pole\.zip was trained with tiny, and cloning starts"):
         _plan(ppo_file)
 
 
-def test_a_clone_that_sees_something_else_is_refused(clone_file: Path) -> None:
+def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
     """Its demonstrations would be of another size; better said before the work."""
     framing = Framing(height=10, width=20, top=0.0)
     settings = msgspec.structs.replace(
         QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
     )
-    with pytest.raises(StudyError, match=r"sees pictures of 12 x 20 .* and cloning 10 x 20"):
+    with pytest.raises(StudyError, match=r"takes pictures of 12 x 20 .* and cloning 10 x 20"):
         _plan(clone_file, settings=settings)
 
 
 @pytest.mark.parametrize("data", [{}, {"env": DRY.id, "arguments": {}}, {"env": 5}])
-def test_a_clone_of_nobody_knows_what_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
+def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
     """Such as one that was made from recorded pictures alone."""
     path = tmp_path / "found.zip"
     CameraPolicy.fresh(QUICK_CLONING.clone, 0).described(**data).save(path)
-    with pytest.raises(StudyError, match=r"found\.zip does not say from which demonstrations"):
+    with pytest.raises(StudyError, match=r"card of .*found\.zip lacks the demonstrations"):
         _plan(path)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from shapechanger.reports.verdict import Direction, caveats, direction, verdict
 from shapechanger.transfer.metrics import Estimate
-from tests.transfer.report.studies import STEPS, make_study, rising
+from tests.reports.studies import STEPS, make_study, rising
 
 SCRATCH = rising(0.0, 1000.0, 3000.0)
 NO_TRANSFER = "the comparison means little"
@@ -30,11 +30,11 @@ def test_direction_goes_by_the_interval(estimate: Estimate, expected: Direction)
 
 
 def test_transfer_helped() -> None:
-    """All three measures are told, and so is the total count."""
+    """All three measures appear, and total steps too."""
     text = verdict(make_study())
     assert text.startswith(
-        "Counted in target steps, transfer helped: fine-tune earned more than scratch over the "
-        "whole of its learning curve (total reward gain +0."
+        "Counted in target steps, transfer helped: fine-tune earned more than scratch over "
+        "its whole learning curve (total reward gain +0."
     )
     assert ", ended higher (asymptotic gain +" in text
     assert " and reached the score 0.9 sooner (+" in text
@@ -77,13 +77,13 @@ def test_helped_in_target_steps_and_hurt_in_total_steps() -> None:
 
 
 def test_a_source_that_takes_the_whole_budget() -> None:
-    """Then total steps compare with the random policy, and only the jumpstart is told."""
+    """Then total steps compare with the random policy, and only the jumpstart remains."""
     study = make_study(source_steps=10_240)
     text = verdict(study)
     assert "Counted in total steps, the budget cannot show a gain" in text
-    assert "has cost 10,240 steps of 10,240" in text
-    assert "fine-tune starts below where scratch has come by then (jumpstart -" in text
-    assert "only the jumpstart says something" in caveats(study)[0]
+    assert "used 10,240 steps of 10,240" in text
+    assert "fine-tune starts below the level that scratch has reached by then (jumpstart -" in text
+    assert "only the jumpstart is meaningful" in caveats(study)[0]
 
 
 def test_scratch_that_did_not_learn() -> None:
@@ -106,32 +106,32 @@ def test_scratch_that_learnt_by_chance_only() -> None:
 @pytest.mark.parametrize(
     ("level", "words"),
     [
-        (400.0, "transfer helped at the start: the moved policy, which is not trained on the "),
+        (400.0, "transfer helped at the start: the source policy, which is not trained on the "),
         (-400.0, "transfer hurt at the start"),
         (0.0, "transfer made no clear difference at the start"),
     ],
 )
 def test_zero_shot_only(level: float, words: str) -> None:
-    """Judged by its start; its end is told beside it."""
+    """Judged by its start; its end follows."""
     zero_shot = level + np.linspace(-50.0, 50.0, 5)[:, np.newaxis]
     text = verdict(make_study(arms=("scratch", "zero-shot"), zero_shot=zero_shot))
     assert words in text
-    assert "worse than what scratch ends with (asymptotic gain -" in text
-    assert "scratch after 2,048 steps, as many as the source has cost (jumpstart" in text
+    assert "worse than the end of scratch (asymptotic gain -" in text
+    assert "scratch after 2,048 steps, as many as the source used (jumpstart" in text
 
 
 def test_zero_shot_only_with_a_long_source() -> None:
     """Scratch is then read at its end, and the sentence says so."""
     text = verdict(make_study(arms=("scratch", "zero-shot"), source_steps=20_480))
-    assert "worse than scratch at its end, though the source has cost 20,480 steps" in text
+    assert "worse than scratch at its end, though the source used 20,480 steps" in text
 
 
 def test_caveats_name_what_the_numbers_cannot_say() -> None:
-    """One policy brought along, and few seeds."""
-    two = make_study(scratch=SCRATCH[:2], brought=True)
-    told = " ".join(caveats(two))
-    assert "until its 2,048 source steps have passed" in told
-    assert "one source policy that was brought along" in told
-    assert "With 2 seeds the intervals are wide" in told
+    """One given policy, and few seeds."""
+    two = make_study(scratch=SCRATCH[:2], given=True)
+    text = " ".join(caveats(two))
+    assert "until its 2,048 source steps have passed" in text
+    assert "one given source policy" in text
+    assert "With 2 seeds the intervals are wide" in text
     assert len(caveats(make_study())) == 1
     assert caveats(make_study(source_steps=0)) == ()

@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.reports.study import report_html
 from shapechanger.transfer.study import Study
-from tests.transfer.report.studies import make_study
+from tests.reports.studies import make_study
 
 
 @pytest.fixture(scope="session")

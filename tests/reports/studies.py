@@ -12,7 +12,7 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.settings import LearnerSettings
+from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.methods import RunResult
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
@@ -20,7 +20,7 @@ from shapechanger.transfer.study import Study
 
 STEPS = np.linspace(0, 10_240, 11)
 
-SETTINGS = LearnerSettings(
+SETTINGS = PpoSettings(
     n_envs=4,
     n_steps=64,
     batch_size=64,
@@ -91,7 +91,7 @@ def make_study(
     random: NDArray[np.float64] | None = None,
     arms: tuple[Arm, ...] = ARMS,
     source_steps: int = 2048,
-    brought: bool = False,
+    given: bool = False,
     terms: Sequence[str] = (),
     source: EnvRef | None = None,
     target: EnvRef | None = None,
@@ -114,7 +114,7 @@ def make_study(
             rising(400.0, 1000.0, 1000.0, seeds, seed=2) if fine_tune is None else fine_tune
         ),
     }
-    wanted: list[RunKind] = [*([] if brought else ["source"]), "random", *arms]
+    wanted: list[RunKind] = [*([] if given else ["source"]), "random", *arms]
     plan = Plan(
         task=TransferTask(
             source or EnvRef("shapechanger/Ant-v1"), target or EnvRef("shapechanger/BigAnt-v1")
@@ -127,7 +127,7 @@ def make_study(
         seeds=seeds,
         arms=arms,
         seed=7,
-        source_policy="ab" * 32 if brought else "",
+        source_policy="ab" * 32 if given else "",
         versions={"shapechanger": "0.1.0", "numpy": "2.4.0"},
     )
     return Study(
@@ -136,7 +136,7 @@ def make_study(
         machine="Linux x86_64",
         shift=shift,
         runs=tuple(run for kind in wanted for run in results(kind, drawn[kind], terms)),
-        source_return=() if brought else tuple(float(row[-1]) for row in drawn["source"]),
+        source_return=() if given else tuple(float(row[-1]) for row in drawn["source"]),
         summaries=_summaries(plan, drawn),
     )
 

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MissingExtra, OutputError
-from shapechanger.reports import verdict
 from shapechanger.reports.page import png
-from shapechanger.reports.study import measure_rows, report_html, write_report
+from shapechanger.reports.study import report_html, write_report
+from shapechanger.reports.verdict import measure_rows, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.study import Study
-from tests.transfer.report.studies import make_study, rising, same_body
+from tests.reports.studies import make_study, rising, same_body
 
 EVIL = "<script>alert(1)</script>&\"'"
 VOID = {"meta", "img"}
@@ -123,7 +123,7 @@ def test_the_page_says_how_it_was_made(page: str) -> None:
         "ppo-balance",
         "learning_rate 0.001",
         "shapechanger transfer Ant BigAnt --seeds 5",
-        "7, which the seeds of all runs are drawn from",
+        "7, from which the seeds of all runs are drawn",
         "shapechanger 0.1.0, numpy 2.4.0",
         "Linux x86_64",
         "5.2 min for all runs together",
@@ -221,7 +221,7 @@ def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
 @pytest.mark.parametrize(
     ("study", "words"),
     [
-        (make_study(brought=True), "brought along, SHA-256 abababab"),
+        (make_study(given=True), "given, SHA-256 abababab"),
         (make_study(arms=("scratch", "zero-shot")), "Zero-shot against scratch"),
         (make_study(scratch=rising(-50.0, -50.0, 1e3)), "There are no scores: scratch ended at"),
         (make_study(scratch=rising(-9e6, -1e5, 3e3, seeds=2)), "With 2 seeds"),
@@ -229,7 +229,7 @@ def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
         (make_study(shift=""), "The envs publish no certificate"),
         (make_study(command=""), "called from Python"),
     ],
-    ids=["brought", "zero-shot", "not learnt", "two seeds", "huge", "no shift", "no command"],
+    ids=["given policy", "zero-shot", "not learnt", "two seeds", "huge", "no shift", "no command"],
 )
 def test_whatever_is_missing_is_said(study: Study, words: str) -> None:
     """The page is whole in each case, and nowhere shows a hole of the program."""

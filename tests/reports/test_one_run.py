@@ -1,4 +1,4 @@
-"""An arm of one run, as zero-shot is of a policy that was brought along."""
+"""An arm of one run, such as zero-shot with a given policy."""
 
 from __future__ import annotations
 
