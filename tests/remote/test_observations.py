@@ -1,4 +1,4 @@
-"""Pictures: decoding what a stranger sent, and other sizes."""
+"""Pictures and observations from the messages of a robot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
-from shapechanger.remote.observations import decode_picture, resize_picture
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Observation, Welcome
+from shapechanger.remote import observations
+from shapechanger.remote.inbox import Received
+from shapechanger.remote.observations import RobotSpaces, decode_picture, resize_picture
 from tests.remote.robot import picture
 
 sides = st.integers(1, 12)
@@ -80,3 +84,78 @@ def test_an_equal_size_returns_the_picture_itself() -> None:
     """Without a copy."""
     whole = np.zeros((2, 3, 3), np.uint8)
     assert resize_picture(whole, (3, 2)) is whole
+
+
+def spaces() -> RobotSpaces:
+    """Return the spaces of a robot with a camera and no sensors."""
+    layout = Layout(()).to_json()
+    welcome = Welcome(
+        robot="tin",
+        body="car",
+        action_layout=layout,
+        state_layout=layout,
+        image_size=(16, 12),
+        control_hz=20.0,
+        deadline_ms=250,
+        max_observation_age_ms=400,
+        reward={},
+        reset=(),
+        arming="anyone",
+        clock="real",
+        session=1,
+    )
+    return RobotSpaces(welcome, (16, 12), image=True, state=False)
+
+
+def seen(frame_seq: int, jpeg: bytes | None) -> Received:
+    """Return an observation with a frame."""
+    message = Observation(
+        seq=frame_seq,
+        captured_ns=0,
+        state_ns=0,
+        sent_ns=0,
+        frame=jpeg,
+        frame_seq=frame_seq,
+        state=(),
+        sources={},
+        action_applied=(),
+        applied_seq=None,
+        applied_ns=None,
+        command_ns=None,
+        stop_reason="",
+        armed=False,
+        emergency=False,
+        emergencies=0,
+        holder="",
+        mine=False,
+    )
+    return Received(message, 0.0, jpeg)
+
+
+def test_a_restarted_robot_shows_its_new_frame() -> None:
+    """It counts frames from 1 again, and an equal number means another frame then."""
+    robot = spaces()
+    before = robot.view(seen(1, picture((16, 12), 1)))
+    robot.reconnect()
+    after = robot.view(seen(1, picture((16, 12), 20)))
+    assert after.fresh
+    assert (after.observation != before.observation).any()
+
+
+def test_an_invalid_frame_is_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Later observations bring the same frame; the picture stays the last valid one."""
+    robot = spaces()
+    good = robot.view(seen(1, picture((16, 12), 1)))
+    tried: list[bytes] = []
+
+    def decode(jpeg: bytes) -> object:
+        tried.append(jpeg)
+        return decode_picture(jpeg)
+
+    monkeypatch.setattr(observations, "decode_picture", decode)
+    for _ in range(3):
+        assert not robot.shows(seen(2, b"no picture"))
+        shown = robot.view(seen(2, b"no picture"))
+        assert not shown.fresh
+        assert (shown.observation == good.observation).all()
+    assert len(tried) == 1
