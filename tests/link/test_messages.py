@@ -1,4 +1,4 @@
-"""The messages of the link: they arrive as they left, or not at all."""
+"""Messages of the link: round trips, bounds and invalid bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The client against a robot on a real socket: what goes well, and what is refused."""
+"""Client against a fake robot on a real socket."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links that break: each is noticed in time, said in words, and never hidden by old data."""
+"""Broken links: noticed in time, reported, and never hidden by old data."""
 
 from __future__ import annotations
 

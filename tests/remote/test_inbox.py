@@ -1,4 +1,4 @@
-"""The one slot between the thread that receives and the one that decides."""
+"""Inbox between the receiving thread and the callers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a workstation remembers of robots, and who else may read it."""
+"""Files of known robots."""
 
 from __future__ import annotations
 

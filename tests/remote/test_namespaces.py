@@ -1,4 +1,4 @@
-"""A radio that really dies: the robot here, its driver in a network namespace, the cable cut."""
+"""Cut cable between network namespaces."""
 
 from __future__ import annotations
 

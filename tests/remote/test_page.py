@@ -1,4 +1,4 @@
-"""What docs/remote.md shows works as it shows it."""
+"""Examples of docs/remote.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The env against the daemon that runs on robots, with a guard and a camera that are faked."""
+"""Remote env against the real daemon, with a fake guard and camera."""
 
 from __future__ import annotations
 

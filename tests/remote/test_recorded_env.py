@@ -1,4 +1,4 @@
-"""What a program records of a robot that it drives through the env."""
+"""Recording of a remote env by the program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The client's side of recording, suggesting and looking at recordings, on the real daemon."""
+"""Client's side of recordings and suggestions, with the real daemon."""
 
 from __future__ import annotations
 

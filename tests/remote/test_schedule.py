@@ -1,4 +1,4 @@
-"""The control rate, on a clock that is moved by hand."""
+"""Control period, on a clock that the test moves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A person takes the robot from a program and gives it back, and the episode goes on."""
+"""Episodes in which a person takes control and gives it back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The env against a robot on a real socket."""
+"""Remote env against a fake robot on a real socket."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page and the robot mean the same by the same bytes, and make the same proof."""
+"""The console and the robot agree on messages and proofs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A person sees and drives a robot with the page, and it stops whenever they cannot any more."""
+"""Driving with the console, and its stops."""
 
 from __future__ import annotations
 

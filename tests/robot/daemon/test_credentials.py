@@ -1,4 +1,4 @@
-"""The key and the certificate of a robot."""
+"""Key and certificate of a robot."""
 
 from __future__ import annotations
 

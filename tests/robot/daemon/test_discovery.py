@@ -1,4 +1,4 @@
-"""The announcement on the local network."""
+"""Announcement on the local network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A little of `benchmarks/fuzz_link.py` with each run of the tests."""
+"""Short run of `benchmarks/fuzz_link.py`."""
 
 from __future__ import annotations
 

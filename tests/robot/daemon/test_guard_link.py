@@ -1,4 +1,4 @@
-"""The daemon's end of the socket to the guard."""
+"""Link from the daemon to the guard."""
 
 from __future__ import annotations
 

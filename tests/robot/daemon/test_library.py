@@ -1,4 +1,4 @@
-"""What was recorded, as others see it: the same bytes, bounded, and nothing outside the folder."""
+"""Library of recordings: the same bytes, bounded, and nothing outside the folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a client is told of the robot."""
+"""Observations for one client."""
 
 from __future__ import annotations
 

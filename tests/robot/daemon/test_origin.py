@@ -1,4 +1,4 @@
-"""Which web pages may open a connection."""
+"""Origin check of connections from web pages."""
 
 from __future__ import annotations
 

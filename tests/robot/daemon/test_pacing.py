@@ -1,4 +1,4 @@
-"""When a client gets its next observation."""
+"""Pace of observations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the command line hands over."""
+"""Settings of the daemon."""
 
 from __future__ import annotations
 

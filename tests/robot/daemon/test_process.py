@@ -1,4 +1,4 @@
-"""The daemon as a process of its own, as the supervisor starts it."""
+"""Daemon in its own process, as the supervisor starts it."""
 
 from __future__ import annotations
 

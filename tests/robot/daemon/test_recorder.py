@@ -1,4 +1,4 @@
-"""The thread that writes: what it takes, it writes; a disk that is too slow ends the episode."""
+"""Recorder: pairing of commands with observations, and the thread that writes."""
 
 from __future__ import annotations
 

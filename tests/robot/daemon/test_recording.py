@@ -1,4 +1,4 @@
-"""Recording on a daemon over real sockets: who may, what is written, and what others are told."""
+"""Recording with a daemon on real sockets."""
 
 from __future__ import annotations
 

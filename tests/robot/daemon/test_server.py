@@ -1,4 +1,4 @@
-"""A daemon over real sockets: who is let in, and what becomes of those who misbehave."""
+"""Daemon on real sockets: authentication, control, limits and stops."""
 
 from __future__ import annotations
 

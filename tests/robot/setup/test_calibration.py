@@ -1,4 +1,4 @@
-"""From what a person saw to changes of a profile."""
+"""Profile changes from a calibration."""
 
 import pytest
 

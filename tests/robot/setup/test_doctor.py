@@ -1,4 +1,4 @@
-"""What the doctor finds on a robot, before it drives."""
+"""Checks of a robot before it drives."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""Where encoders stand while a finger is straight, and how their magnets sit."""
+"""Zeros and checks of the encoders at the joints."""
 
 from __future__ import annotations
 

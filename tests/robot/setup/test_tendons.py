@@ -1,4 +1,4 @@
-"""Where servos stand while a finger is straight."""
+"""Zeros of the tendon servos."""
 
 from __future__ import annotations
 

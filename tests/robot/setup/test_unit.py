@@ -1,4 +1,4 @@
-"""The systemd unit that a new robot gets."""
+"""systemd unit of a new robot."""
 
 from pathlib import Path
 
