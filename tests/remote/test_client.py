@@ -16,6 +16,8 @@ from shapechanger.link.authentication import new_key
 from shapechanger.remote.client import RobotClient
 from tests.remote.robot import Robot, eventually
 
+pytestmark = pytest.mark.realtime
+
 Run = Callable[..., Robot]
 Connect = Callable[..., RobotClient]
 

@@ -23,6 +23,8 @@ from tests.remote.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Running, running
 
+pytestmark = pytest.mark.realtime
+
 ID = "shapechanger/RemoteVehicle-v1"
 HZ = 20.0
 SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}

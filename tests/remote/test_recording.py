@@ -13,6 +13,8 @@ from shapechanger.remote.client import RobotClient
 from tests.remote.robot import eventually
 from tests.remote.test_real_daemon import Served
 
+pytestmark = pytest.mark.realtime
+
 Connect = Callable[..., RobotClient]
 
 

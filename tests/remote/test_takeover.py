@@ -13,6 +13,8 @@ from shapechanger.remote.client import RobotClient
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 
+pytestmark = pytest.mark.realtime
+
 AHEAD = np.array([0.25, 0.5], np.float32)
 BACK = (-0.5, -0.4)
 

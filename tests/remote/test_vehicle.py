@@ -25,6 +25,8 @@ from shapechanger.testing import MakeEnv
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from tests.remote.robot import FULL_SPEED, STATE, THROTTLE, WALL, Robot, eventually
 
+pytestmark = pytest.mark.realtime
+
 Run = Callable[..., Robot]
 
 ID = "shapechanger/RemoteVehicle-v1"

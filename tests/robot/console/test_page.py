@@ -16,6 +16,8 @@ from shapechanger.link.authentication import new_key
 from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Visit = Callable[..., Console]
 
 

@@ -22,6 +22,8 @@ from tests.robot.console.browser import Console, Pins
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 from tests.twin.robots import until
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Visit = Callable[..., Console]
 
 _DEADLINE_MS = 250.0

@@ -13,6 +13,8 @@ from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, d
 from tests.robot.daemon.plans import guard_state
 from tests.robot.daemon.running import until
 
+pytestmark = pytest.mark.realtime
+
 
 class Ends:
     """Both ends, and what was called."""

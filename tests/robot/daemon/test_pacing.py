@@ -13,6 +13,8 @@ from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, picture
 from tests.robot.daemon.running import Running, running, until
 
+pytestmark = pytest.mark.realtime
+
 
 def play(
     script: Callable[[Running], Awaitable[None]],

@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.robot.daemon.pre_auth import PreAuthConnections
+
+pytestmark = pytest.mark.realtime
 
 
 @dataclass

@@ -28,6 +28,8 @@ from shapechanger.robot.daemon.recorder import (
 )
 from tests.robot.daemon.plans import ACTIONS, picture
 
+pytestmark = pytest.mark.realtime
+
 HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
 WITHIN_S = 20.0
 

@@ -36,6 +36,8 @@ from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robot.daemon.plans import ACTIONS, car_plan, picture
 from tests.robot.daemon.running import Client, Running, running, until
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def play(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:

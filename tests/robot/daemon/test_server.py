@@ -42,6 +42,8 @@ from shapechanger.robot.daemon.pre_auth import PreAuthConnections
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Client, Running, running, until
 
+pytestmark = pytest.mark.realtime
+
 Script = Callable[[Running], Awaitable[None]]
 
 

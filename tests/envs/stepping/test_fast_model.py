@@ -1,4 +1,4 @@
-"""Which models get a twin, and that those which must not, do not."""
+"""Which models get a fast model, and which must not."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _searches(fast: mujoco.MjModel) -> bool:
     return bool(flags & _ISLAND) and not flags & (_MIDPHASE | _CONTACT)
 
 
-def _twin(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
+def _fast_model_of(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
     model = spec.compile()
     return model, find_fast_model(ModelWatch(model), spec.copy)
 
@@ -76,7 +76,7 @@ def _knows_its_pairs(model: mujoco.MjModel) -> bool:
 
 def test_one_tree_on_one_floor_knows_its_contacts() -> None:
     """No search, no islands; the public model is untouched."""
-    model, fast = _twin(_scene())
+    model, fast = _fast_model_of(_scene())
     assert fast is not None
     assert _knows_its_pairs(fast)
     assert fast.npair == 3
@@ -102,7 +102,7 @@ def test_one_tree_on_one_floor_knows_its_contacts() -> None:
 )
 def test_pairs_get_the_numbers_that_the_search_would_mix(parts: dict[str, str]) -> None:
     """Margins are summed, friction is the larger, stiffness is mixed: all by comparison."""
-    model, fast = _twin(_scene(**parts))
+    model, fast = _fast_model_of(_scene(**parts))
     assert fast is not None
     assert _knows_its_pairs(fast)
     _roll(model, fast, 400)
@@ -120,7 +120,7 @@ def test_pairs_get_the_numbers_that_the_search_would_mix(parts: dict[str, str]) 
 )
 def test_where_the_order_is_open_the_search_stays(parts: dict[str, str]) -> None:
     """Every pair that the stock model could generate is still looked for."""
-    model, fast = _twin(_scene(**parts))
+    model, fast = _fast_model_of(_scene(**parts))
     assert fast is not None
     assert not fast.npair
     np.testing.assert_array_equal(fast.geom_contype, model.geom_contype)
@@ -142,15 +142,15 @@ _FREE = '<body name="ball" pos="1 0 0.5"><freejoint/><geom name="ball" size="0.1
     ],
     ids=["two trees", "tendon", "equality", "mocap", "energy"],
 )
-def test_what_the_rules_do_not_know_has_no_twin(parts: dict[str, str]) -> None:
+def test_what_the_rules_do_not_know_has_no_fast_model(parts: dict[str, str]) -> None:
     """The stock model steps it."""
-    assert _twin(_scene(**parts))[1] is None
+    assert _fast_model_of(_scene(**parts))[1] is None
 
 
 def test_pairs_of_the_model_stay_as_they_are() -> None:
     """They have their own numbers, and the search adds others."""
     pair = '<contact><pair geom1="shin" geom2="trunk" friction="2 2 0.1 0.1 0.1"/></contact>'
-    model, fast = _twin(_scene(rest=pair))
+    model, fast = _fast_model_of(_scene(rest=pair))
     assert fast is not None
     assert fast.npair == 1
     assert _searches(fast)
@@ -190,10 +190,10 @@ def _sensing(spec: Any) -> None:
 )
 def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
     """A spring, friction and a sensor are felt as before."""
-    _, plain = _twin(_scene())
+    _, plain = _fast_model_of(_scene())
     spec = _scene()
     add(spec)
-    model, fast = _twin(spec)
+    model, fast = _fast_model_of(spec)
     assert plain is not None
     assert fast is not None
     assert plain.opt.disableflags & flag
@@ -206,17 +206,37 @@ def test_without_dampers_the_springs_stay() -> None:
     spec = _scene()
     spec.option.disableflags = _DAMPER
     spec.body("shin").gravcomp = 1.0
-    model, fast = _twin(spec)
+    model, fast = _fast_model_of(spec)
     assert fast is not None
     assert not fast.opt.disableflags & _SPRING
     _roll(model, fast, 400)
+
+
+@pytest.mark.parametrize(("medium", "amount"), [("density", 1000.0), ("viscosity", 10.0)])
+@pytest.mark.parametrize("flags", [0, _DAMPER])
+def test_a_fluid_is_felt(medium: str, amount: float, flags: int) -> None:
+    """A density alone or a viscosity alone acts on the fast model as on the original."""
+    spec = _scene()
+    spec.option.disableflags = flags
+    setattr(spec.option, medium, amount)
+    model, fast = _fast_model_of(spec)
+    assert fast is not None
+    assert bool(fast.opt.disableflags & _SPRING) is not bool(flags)
+    assert getattr(fast.opt, medium) == amount
+    _roll(model, fast, 200)
+    dry, wet = mujoco.MjData(model), mujoco.MjData(model)
+    wet.qvel[0] = dry.qvel[0] = 3.0
+    mujoco.mj_step(fast, wet, 5)
+    setattr(model.opt, medium, 0.0)
+    mujoco.mj_step(model, dry, 5)
+    assert dry.qvel[0] > wet.qvel[0] + 1e-3
 
 
 def test_a_filter_of_contacts_is_obeyed() -> None:
     """Explicit pairs would not ask it."""
     mujoco.set_mjcb_contactfilter(lambda *_: 0)
     try:
-        assert _twin(_scene(floor='friction="0.77 0.1 0.1"'))[1] is None
+        assert _fast_model_of(_scene(floor='friction="0.77 0.1 0.1"'))[1] is None
     finally:
         mujoco.set_mjcb_contactfilter(None)
 
@@ -250,7 +270,7 @@ def test_any_other_difference_is_found_out(change: Any) -> None:
     assert not moves_equally(ant.model, fast)
 
 
-def test_a_twin_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fast_model_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not in the first steps of a body, unless another env has found it."""
     monkeypatch.setattr(AntEnv, "patience", 3)
     twin.forget_fast_models()
@@ -275,12 +295,12 @@ def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
             assert env._bound.has_fast_model is (True if step >= 2 else None)
 
 
-def test_twins_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fast_models_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """A training with a new body in each episode must not grow."""
     monkeypatch.setattr(twin, "_REMEMBERED", 2)
     twin.forget_fast_models()
     for friction in (0.3, 0.4, 0.5, 0.4):
-        assert _twin(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
+        assert _fast_model_of(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
     assert len(twin._twins) == 2
 
 

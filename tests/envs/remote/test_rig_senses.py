@@ -107,7 +107,7 @@ def test_the_order_is_the_rigs(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["car", "finger-pwm"])
 def test_other_robots_are_refused(name: str) -> None:
     """They have no tendons, or do not measure them."""
-    with pytest.raises(RobotRefused, match="it is no finger on a rig of servos"):
+    with pytest.raises(RobotRefused, match="it is not a finger"):
         _senses_of(load_profile(find_profile(name)))
 
 

@@ -23,7 +23,7 @@ def test_there_is_no_such_twin() -> None:
 @pytest.mark.parametrize("twin", ["", "nominal"])
 def test_a_finger_of_no_gap_has_no_seed(twin: str) -> None:
     """As for `Finger-v1`."""
-    with pytest.raises(FingerError, match="which finger of a gap"):
+    with pytest.raises(FingerError, match="selects a finger of a gap"):
         gym.make(RIG, twin=twin, finger_seed=3)
 
 
