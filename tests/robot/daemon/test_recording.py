@@ -269,7 +269,7 @@ def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None
         async with robot.client(role="person") as one, robot.client(role="person") as two:
             with EpisodeWriter.create(tmp_path / "kept", header):
                 await one.say(Record(on=True))
-                assert "already" in (await one.expect(Refused)).reason
+                assert "in use by another recorder" in (await one.expect(Refused)).reason
             await recording(one)
             await two.say(Record(on=True))
             assert "recorded already" in (await two.expect(Refused)).reason
