@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Evaluate", "Shrinking", "Train", "print_judgement"]
+__all__ = ["Evaluate", "Shrinking", "TrainClone", "print_judgement"]
 
 
 @dataclass(frozen=True)
-class Train:
+class TrainClone:
     """Clone a driver from demonstrations; write the policy and a report."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
@@ -68,8 +68,7 @@ class Train:
         console = plain_console()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
         if settings.members > 1:
-            use_one_thread()  # More threads slow down networks this small, especially on a busy
-            machine.
+            use_one_thread()  # More threads slow down networks this small.
         shrinking = Shrinking(settings.framing)
         data = load_dataset(self.data, shrink=shrinking)
         judged = judged_steps(data.episodes, self.split, self.held_out)
