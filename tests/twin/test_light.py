@@ -1,4 +1,4 @@
-"""What the guard loads of the twin."""
+"""Modules that the guard loads on a twin."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_pulses_are_decoded_from_the_registers() -> None:
 
 
 def test_bits_for_full_off_and_full_on() -> None:
-    """Bit 4 of the last register is off, whatever the others say; so for all channels at once."""
+    """Bit 4 of the last register is off, whatever the others are; the same for all channels."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFA, [0, 0x10, 0, 0])
@@ -72,7 +72,7 @@ def test_the_frequency_is_set_while_it_sleeps() -> None:
 
 
 def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
-    """After a sleep the channels wait for RESTART, as the data sheet says."""
+    """After a sleep the channels wait for RESTART, as in the data sheet."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])

@@ -74,7 +74,7 @@ def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
 
 
 def test_a_polite_end_leaves_motors_low_and_plain_outputs_alone(tmp_path: Path) -> None:
-    """As the pins of a Pi; and nobody is reported dead."""
+    """As the pins of a Pi; and no process is recorded as dead."""
     with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")
@@ -149,6 +149,6 @@ def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
 
 
 def test_no_board_is_said_in_words(tmp_path: Path) -> None:
-    """Whoever names the wrong socket is told so."""
+    """A wrong socket is an error with its path."""
     with pytest.raises(RobotError, match="No twin's board answers"):
         connect(str(tmp_path / "nothing"))
