@@ -9,6 +9,7 @@ ShapechangerError
 │   └── EmptyShift                  source and target behave identically
 ├── SpaceMismatch (ValueError)      incompatible spaces
 ├── BadAction (ValueError)          action that an env cannot take
+├── EnvArgumentError (ValueError)   argument of an env with the wrong type
 ├── VectorEnvError (ValueError)     vector env that cannot be made as requested
 ├── FingerError (ValueError)        finger that cannot be built or moved as requested
 ├── WorldError (ValueError)         world that cannot be laid out as requested
@@ -46,6 +47,7 @@ __all__ = [
     "CorruptStudy",
     "DemosError",
     "EmptyShift",
+    "EnvArgumentError",
     "FingerError",
     "ForeignStudy",
     "LayoutError",
@@ -123,8 +125,12 @@ class BadAction(ShapechangerError, ValueError):
     """Action that an env cannot take; the message names the env."""
 
 
+class EnvArgumentError(ShapechangerError, ValueError):
+    """Argument of an env with the wrong type."""
+
+
 class VectorEnvError(ShapechangerError, ValueError):
-    """A vector env that cannot be made, or reset, as it was asked for."""
+    """Vector env that cannot be made or reset as requested."""
 
 
 class FingerError(ShapechangerError, ValueError):

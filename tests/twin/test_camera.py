@@ -22,6 +22,8 @@ from shapechanger.twin.start import RunningBoard, start_board
 from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR, until
 
+pytestmark = pytest.mark.realtime
+
 _CAMERA = CameraPlan("pipe", fps=20.0)
 
 

@@ -17,6 +17,8 @@ from shapechanger.twin.server import START_NS
 from shapechanger.twin.start import start_board
 from tests.twin.robots import CAR, granted, process, steady
 
+pytestmark = pytest.mark.realtime
+
 _GUARD = """
 import sys
 from gpiozero import Motor

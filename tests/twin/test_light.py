@@ -6,9 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import shapechanger
 from shapechanger.twin.start import start_board
 from tests.twin.robots import CAR
+
+pytestmark = pytest.mark.realtime
 
 _BARE = """
 import sys, types

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from shapechanger.twin.network import BadNetwork
 from tests.twin.robots import until
 
+pytestmark = pytest.mark.realtime
+
 PATIENCE_S = 10.0
 
 

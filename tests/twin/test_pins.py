@@ -15,6 +15,8 @@ from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
 from tests.twin.robots import CAR, die, process
 
+pytestmark = pytest.mark.realtime
+
 _MOTOR = """
 import sys
 from gpiozero import Motor, DigitalOutputDevice

@@ -19,6 +19,8 @@ from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import RunningBoard, start_board
 from tests.twin.robots import BUMPER, CAR, ENCODER
 
+pytestmark = pytest.mark.realtime
+
 _SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
 _IMU = SensorPlan("imu", "mpu6050", "imu", {"bus": 1, "address": 0x68})

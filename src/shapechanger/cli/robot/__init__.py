@@ -10,7 +10,7 @@ import tyro
 from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
-from shapechanger.cli.robot.fetch import Fetch
+from shapechanger.cli.robot.fetch import FetchEpisodes
 from shapechanger.cli.robot.find import Find, Forget, Remember
 from shapechanger.cli.robot.init import Home, Init
 from shapechanger.cli.robot.key import Key
@@ -37,7 +37,7 @@ class Robot:
         | Annotated[Remember, tyro.conf.subcommand("remember")]
         | Annotated[Forget, tyro.conf.subcommand("forget")]
         | Annotated[Drive, tyro.conf.subcommand("drive")]
-        | Annotated[Fetch, tyro.conf.subcommand("fetch")]
+        | Annotated[FetchEpisodes, tyro.conf.subcommand("fetch")]
         | Annotated[Stop, tyro.conf.subcommand("stop")]
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
         | Annotated[Selftest, tyro.conf.subcommand("selftest")]

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from shapechanger.link.messages import EpisodeSummary
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["Fetch", "episodes_there", "fetch_episode", "recorded"]
+__all__ = ["FetchEpisodes", "episodes_there", "fetch_episode", "recorded"]
 
 
 @dataclass(frozen=True)
-class Fetch:
+class FetchEpisodes:
     """Download a robot's recordings to this machine, or only what is new."""
 
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from shapechanger.robot.profile.profile import Profile
     from shapechanger.twin.robot import RunningRobot
 
-__all__ = ["Check", "Selftest", "check_jumper", "check_robot"]
+__all__ = ["Selftest", "SelftestResult", "check_jumper", "check_robot"]
 
 # Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES = 2
@@ -149,7 +149,7 @@ _STANDS_MPS: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class SelftestResult:
     """Result of one check.
 
     Attributes:
@@ -215,7 +215,7 @@ class _Person:
         return dict(zip(self._state.names, seen.state, strict=True)).get("speed")
 
 
-def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Check]:
+def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[SelftestResult]:
     """Check a robot with its wheels off the ground.
 
     Args:
@@ -232,7 +232,7 @@ def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[C
         yield _boots_disarmed(person)
         client.arm()
         if not person.moves:
-            yield Check("drives", "unknown", "Nothing of this robot propels.")
+            yield SelftestResult("drives", "unknown", "Nothing of this robot propels.")
             return
         yield _drives(person)
         yield _silence(person, profile)
@@ -256,52 +256,54 @@ def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[C
         )
 
 
-def _judged(name: str, good: bool, sentence: str) -> Check:
-    return Check(name, "good" if good else "bad", sentence)
+def _judged(name: str, good: bool, sentence: str) -> SelftestResult:
+    return SelftestResult(name, "good" if good else "bad", sentence)
 
 
-def _boots_disarmed(person: _Person) -> Check:
+def _boots_disarmed(person: _Person) -> SelftestResult:
     seen = person.push(0.3)
     good = not seen.armed and person.at_rest(seen)
     return _judged("boots disarmed", good, f"Commands before arming: {seen.stop_reason}")
 
 
-def _drives(person: _Person) -> Check:
+def _drives(person: _Person) -> SelftestResult:
     seen = person.push(_DRIVES_S)
     if person.at_rest(seen):
-        return Check("drives", "bad", f"It did not drive: {seen.stop_reason}")
+        return SelftestResult("drives", "bad", f"It did not drive: {seen.stop_reason}")
     speed = person.speed(seen)
     if speed is None:
-        return Check("drives", "unknown", "Outputs moved; nothing measures whether wheels did.")
+        return SelftestResult(
+            "drives", "unknown", "Outputs moved; nothing measures whether wheels did."
+        )
     words = f"The encoder says {speed:+.2f} m/s for forward."
     return _judged("drives", speed > 0.0, words)
 
 
-def _silence(person: _Person, profile: Profile) -> Check:
+def _silence(person: _Person, profile: Profile) -> SelftestResult:
     """Stop commanding and measure how long the outputs continue, on the robot's clock."""
     before = person.push(0.5)
     told_ns = before.command_ns
     seen = person.watch(person.at_rest, _COASTS_S)
     if seen is None or told_ns is None:
-        return Check("stops by silence", "bad", "It did not stop.")
+        return SelftestResult("stops by silence", "bad", "It did not stop.")
     stopped_ms = (seen.state_ns - told_ns) / 1e6
     limit_ms = profile.limits.deadline_ms + _SLACK_MS + 1e3 / profile.control_hz
     words = f"At rest at most {stopped_ms:.0f} ms after the last command."
     return _judged("stops by silence", stopped_ms <= limit_ms, words)
 
 
-def _coasts(person: _Person) -> Iterator[Check]:
+def _coasts(person: _Person) -> Iterator[SelftestResult]:
     """Measure how long the wheels coast."""
     begin_s = time.monotonic()
     if person.speed(person.look()) is None:
-        yield Check("wheels stand", "unknown", "No encoder measures the wheels.")
+        yield SelftestResult("wheels stand", "unknown", "No encoder measures the wheels.")
         return
     seen = person.watch(lambda o: abs(person.speed(o) or 0.0) < _STANDS_MPS, _COASTS_S)
     took_s = time.monotonic() - begin_s if seen else math.inf
     yield _judged("wheels stand", seen is not None, f"The wheels stood {took_s:.2f} s later.")
 
 
-def _emergency(client: RobotClient, person: _Person) -> Check:
+def _emergency(client: RobotClient, person: _Person) -> SelftestResult:
     person.push(0.3)
     client.emergency_stop("A self-test.")
     seen = person.watch(lambda o: o.emergency, 1.0)
@@ -311,7 +313,7 @@ def _emergency(client: RobotClient, person: _Person) -> Check:
     return _judged("emergency stop", good, words)
 
 
-def _disarms(client: RobotClient, person: _Person) -> Check:
+def _disarms(client: RobotClient, person: _Person) -> SelftestResult:
     client.disarm()
     seen = person.watch(lambda o: not o.armed and person.at_rest(o), 1.0)
     words = seen.stop_reason if seen else "It did not."

@@ -369,7 +369,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
     try:
         from shapechanger.bodies.vehicles import VEHICLES, require_fit
         from shapechanger.worlds.layout import WORLDS
-        from shapechanger.worlds.lens import lens as find_lens
+        from shapechanger.worlds.lens import find_lens
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "mujoco", "sim") from error
 
