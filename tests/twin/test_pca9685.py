@@ -110,7 +110,7 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
             servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),
         ),
     )
-    with start_board(plan, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         drive, steer = (open_output(output, hardware) for output in plan.outputs)
         wiring = TwinWiring(plan)
@@ -130,7 +130,7 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
 def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:
     """A PCA9685 keeps pulsing for ever; its output enable, with a pull-up, ends that."""
     with (
-        start_board(_SERVO_CAR, "real", tmp_path) as board,
+        start_board(_SERVO_CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,
     ):
         with process(_AWAKE_50_HZ, board.socket_path) as robot:
