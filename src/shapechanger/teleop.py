@@ -1,4 +1,4 @@
-"""A person at the workstation who drives: what keys mean, without sockets or pins."""
+"""Keyboard teleoperation: the meaning of keys, without sockets or pins."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = [
 
 
 FIRST_HOLD_S: Final = 0.6
-"""How long a first press holds, s: terminals begin to repeat after up to 0.5 s. No press holds for
+"""Hold time of a first press, s: terminals start repeating after up to 0.5 s. No press holds
 longer."""
 
 REPEAT_HOLD_S: Final = 0.2
-"""How long a repeated press holds, s: terminals repeat some 30 times a second. Where another
-direction arrives meanwhile, it holds as long as a first press."""
+"""Hold time of a repeated press, s: terminals repeat about 30 times a second. If another direction
+arrives meanwhile, it holds as long as a first press."""
 
 DIRECTIONS: Final = {
     "w": ("throttle", 1.0),
@@ -41,7 +41,7 @@ DIRECTIONS: Final = {
     "d": ("steering", 1.0),
     "right": ("steering", 1.0),
 }
-"""What each key moves, and which way: -1 is left and backward."""
+"""Action and direction of each key: -1 is left and backward."""
 
 
 @dataclass(slots=True)
@@ -52,7 +52,7 @@ class _Held:
 
 
 class HeldKeys:
-    """The values that the keys hold at the moment.
+    """Values held by the keys.
 
     >>> keys = HeldKeys()
     >>> keys.press("w", now_s=0.0)
@@ -65,10 +65,10 @@ class HeldKeys:
         self._held: dict[str, _Held] = {}
 
     def press(self, key: str, now_s: float) -> bool:
-        """Take note of a key.
+        """Register a key press.
 
         Returns:
-            Whether it is a direction.
+            Whether it is a direction key.
         """
         if key not in DIRECTIONS:
             return False
@@ -76,22 +76,22 @@ class HeldKeys:
         held = self._held.get(action)
         repeats = held is not None and held.value == value and now_s <= held.until_s
         until_s = now_s + (REPEAT_HOLD_S if repeats else FIRST_HOLD_S)
-        # The first repeat may come long before the first hold is over: never shorten it.
+        # The first repeat may come long before the first hold ends: never shorten it.
         if repeats and held is not None:
             until_s = max(until_s, held.until_s)
         for other in self._held.values():
-            if now_s <= other.until_s:  # Its own repeats may end here, because this key has begun.
+            if now_s <= other.until_s:  # Its own repeats may stop here, because this key started.
                 other.until_s = max(other.until_s, other.pressed_s + FIRST_HOLD_S)
         self._held[action] = _Held(value, now_s, until_s)
         return True
 
     def value(self, action: str, now_s: float) -> float:
-        """What the keys hold of an action: -1, 0 or 1."""
+        """Return the held value of an action: -1, 0 or 1."""
         held = self._held.get(action)
         return held.value if held is not None and now_s <= held.until_s else 0.0
 
     def let_go(self) -> None:
-        """Forget all keys."""
+        """Release all keys."""
         self._held.clear()
 
 
@@ -100,11 +100,11 @@ _ESCAPE: Final = "\x1b"
 
 
 class NoTerminal(ShapechangerError, RuntimeError):
-    """There is no terminal to read keys from."""
+    """No terminal to read keys from."""
 
 
 def keys_in(text: str) -> list[str]:
-    r"""The keys behind what a terminal sent: letters in lower case, "up", "space", "escape".
+    r"""Parse terminal input into keys: letters in lower case, "up", "space", "escape".
 
     >>> keys_in("wW\x1b[A \x1b")
     ['w', 'w', 'up', 'space', 'escape']
@@ -122,10 +122,10 @@ def keys_in(text: str) -> list[str]:
 
 
 class Terminal:
-    """The terminal with its echo and its line editing switched off; Ctrl-C still interrupts.
+    """Terminal without echo and line editing; Ctrl-C still interrupts.
 
     Raises:
-        NoTerminal: If the standard input is none.
+        NoTerminal: If the standard input is not a terminal.
     """
 
     def __init__(self) -> None:
@@ -135,19 +135,19 @@ class Terminal:
         self._before = termios.tcgetattr(self._fd)
 
     def __enter__(self) -> Self:
-        """Switch echo and line editing off."""
+        """Disable echo and line editing."""
         tty.setcbreak(self._fd)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Put the terminal back as it was."""
+        """Restore the terminal."""
         termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
     def keys(self, wait_s: float) -> list[str]:
-        """The keys that were pressed since the last call; waits so long for the first one.
+        """Return the keys pressed since the last call, waiting up to `wait_s` seconds for one.
 
         Raises:
-            NoTerminal: If the terminal has gone away.
+            NoTerminal: If the terminal was closed.
         """
         if not select.select([self._fd], [], [], max(0.0, wait_s))[0]:
             return []

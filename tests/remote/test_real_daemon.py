@@ -146,8 +146,8 @@ def test_a_person_takes_the_robot_from_a_program(serve: Callable[..., Served]) -
         person.take()
         *_, truncated, info = env.step(np.zeros(2, np.float32))
         assert truncated
-        assert info["truncated_because"].startswith("Grace commands the robot now")
-        with pytest.raises(RobotRefused, match="Grace commands"):
+        assert info["truncated_because"].startswith("Grace has control of the robot now")
+        with pytest.raises(RobotRefused, match="Grace has control"):
             env.reset()
     env.close()
 

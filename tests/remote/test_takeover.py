@@ -98,7 +98,7 @@ def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) ->
     with _made(robot) as env, robot.client(role="person") as person:
         env.reset()
         person.take()
-        assert "commands the robot now" in _cut(env)
+        assert "has control of the robot now" in _cut(env)
 
 
 def _cut(env: gym.Env[Any, Any]) -> str:

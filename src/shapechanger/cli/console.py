@@ -1,4 +1,4 @@
-"""What the commands print with."""
+"""Consoles and progress bars of the commands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Interrupted", "StudyProgress", "plain_console"]
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
-    """A console that prints names as they are: `a[b]` is no markup, and `:a:` no emoji.
+    """Return a console without markup or emoji, so that `a[b]` and `:a:` print verbatim.
 
     Args:
         stderr: Whether to print on the standard error.
@@ -34,11 +34,11 @@ _ENOUGH_TO_TELL: Final = 0.05
 
 
 class StudyProgress:
-    """Shows how far a number of runs are, by their steps.
+    """Progress of several runs, by their steps.
 
     Args:
-        steps: For each run's name the steps that it takes, at least 1.
-        console: Where to show it; None for the standard error.
+        steps: Number of steps of each run by its name, at least 1.
+        console: The console; None for standard error.
     """
 
     def __init__(self, steps: dict[str, int], console: Console | None = None) -> None:
@@ -63,7 +63,7 @@ class StudyProgress:
             self._task = self._bar.add_task("env steps", total=sum(steps.values()))
 
     def __enter__(self) -> Self:
-        """Begin to show."""
+        """Start the display."""
         if self._bar is not None:
             self._bar.start()
         return self
@@ -74,12 +74,12 @@ class StudyProgress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         if self._bar is not None:
             self._bar.stop()
 
     def __call__(self, run: str, steps: int, ended: bool) -> None:
-        """Take in that `run` has done `steps` steps."""
+        """Report that `run` has done `steps` steps."""
         self._done[run] = self._steps[run] if ended else min(steps, self._steps[run])
         if ended:
             self._ended.add(run)
@@ -93,18 +93,18 @@ class StudyProgress:
             self._console.print(self._line(run, ended, now - self._began), soft_wrap=True)
 
     def _line(self, run: str, ended: bool, elapsed: float) -> str:
-        """How far it all is, and how long it takes yet."""
+        """Format the progress and the estimated time left."""
         done, total = sum(self._done.values()), sum(self._steps.values())
         state = "ended" if ended else "at work"
         line = (
             f"{run} {state}; {len(self._ended)} of {len(self._steps)} runs, "
             f"{100 * done // total} % of the steps"
         )
-        # The first steps wait for everything to be loaded, and say nothing of the rest.
+        # The first steps include loading, so they do not predict the rest.
         if done < _ENOUGH_TO_TELL * total:
             return line
         return f"{line}, about {elapsed * (total - done) / done:.0f} s left"
 
 
 class Interrupted(KeyboardInterrupt):
-    """The user stopped long work; the message says how to go on with it."""
+    """Long work was interrupted; the message tells how to resume it."""

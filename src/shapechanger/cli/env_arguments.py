@@ -1,4 +1,4 @@
-"""From what a user types to an env."""
+"""Parsing of env ids, bodies, options and seeds."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "options_of", "require_seed"]
 
-# The largest that PyTorch and NumPy both take.
+# The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
-    """The env of an id, with another body if one is given.
+    """Return a reference to an env, optionally with another body.
 
     Args:
         env_id: An id of the catalogue, its name alone, or any id registered with Gymnasium.
         body: Name of a body of the env's family, or edits as JSON; empty for the env's own.
 
     Raises:
-        UnknownName: If no env has this id.
-        MorphologyError: If a body is given to an env that takes none.
-        RenderError: If `MUJOCO_GL` keeps every env from being made.
+        UnknownName: If the id is unknown.
+        MorphologyError: If the env has no bodies.
+        RenderError: If `MUJOCO_GL` prevents every env from being made.
     """
     require_known_gl()
     task = find_task(env_id)
@@ -46,7 +46,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
     try:
         full = task or find(env_id).id
     except UnknownName:
-        # Envs of others count too, as `module:id` or once registered; `make` looks again.
+        # Third-party envs count too, as `module:id` or once registered; `make` checks again.
         if not _has_module(env_id) and env_id not in gym.registry:
             raise
         full = env_id
@@ -56,7 +56,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
 
 
 def default_learner(env: EnvRef) -> str:
-    """The learner that was tuned on the env's family; that of the ant for any other."""
+    """Return the learner tuned on the env's family; for other envs, that of the ant."""
     if env.id in VEHICLE_ENVS:
         return "cloning"
     if env.id == REMOTE_FINGER:
@@ -66,14 +66,14 @@ def default_learner(env: EnvRef) -> str:
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
-    """A vehicle's env as studies use it: who runs into something is put back and drives on.
+    """Return a vehicle's env as studies use it, which resets the vehicle after a collision.
 
     Args:
-        env: Any env; what is no vehicle's stays as it is.
-        lenses: What is wrong with its camera.
+        env: Any env; those without vehicles are returned unchanged.
+        lenses: Disturbances of its camera.
 
     Raises:
-        StudyError: If it has no camera that anything could be wrong with.
+        StudyError: If it has no camera.
     """
     if env.id not in VEHICLE_ENVS:
         if lenses:
@@ -86,10 +86,10 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
 
 
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
-    """What an env offers beyond Gymnasium's own, such as "picture".
+    """Return a method that an env offers beyond Gymnasium's, such as "picture".
 
     Raises:
-        MorphologyError: If it does not.
+        MorphologyError: If it does not offer it.
     """
     offered = getattr(env.unwrapped, ability, None)
     if offered is None:
@@ -100,10 +100,10 @@ def asked(env: gym.Env[Any, Any], ability: str) -> Any:
 
 @contextmanager
 def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
-    """An env that is closed again.
+    """Make an env and close it afterwards.
 
     Raises:
-        UnknownName: If no env has this id, or its body names what is not there.
+        UnknownName: If the id, or a name in its body, is unknown.
     """
     made = env.make(**more)
     try:
@@ -113,14 +113,14 @@ def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
 
 
 def options_of(given: str, flag: str) -> dict[str, Any]:
-    """More arguments of an env, as a user types them.
+    """Parse further arguments of an env.
 
     Args:
         given: A JSON object; empty for none.
-        flag: The option of the command.
+        flag: Name of the option, for messages.
 
     Raises:
-        StudyError: If it is no JSON object.
+        StudyError: If it is not a JSON object.
     """
     if not given:
         return {}
@@ -134,7 +134,7 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
 
 
 def require_seed(seed: int) -> None:
-    """Refuse a seed that not everything random takes.
+    """Refuse a seed that a random generator does not accept.
 
     Raises:
         StudyError: If it is negative or too large.
@@ -144,7 +144,7 @@ def require_seed(seed: int) -> None:
 
 
 def _has_module(env_id: str) -> bool:
-    """Whether an id is written `module:id`."""
+    """Return whether an id has the form `module:id`."""
     module, _, name = env_id.partition(":")
     named = all(part.isidentifier() for part in module.split("."))
     return named and bool(name) and ":" not in name

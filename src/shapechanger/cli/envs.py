@@ -1,4 +1,4 @@
-"""`shapechanger envs`: what there is, what its numbers mean, what a shift changes."""
+"""`shapechanger envs`: list, show, compare, check and render environments."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class ListEnvs:
 
 
 @dataclass(frozen=True)
-class Show:
-    """Show what each number of an env's observation and action means."""
+class ShowEnv:
+    """Show the name, unit and range of each number of an env's observation and action."""
 
     env: _EnvId
     """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
@@ -47,7 +47,7 @@ class Show:
     """Another body of the family: its name, or edits as JSON."""
 
     def run(self) -> None:
-        """Print both layouts and what follows from the body."""
+        """Print both layouts and the properties of the body."""
         with opened(env_ref(self.env, self.body)) as env:
             observation, action = layouts_of(env)
             console = plain_console()
@@ -61,7 +61,7 @@ class Show:
 
 @dataclass(frozen=True)
 class Compare:
-    """Say what changes from one env to another, in words and numbers."""
+    """Compare two envs: what the shift from one to the other changes."""
 
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Id of the env to come from."""
@@ -84,8 +84,8 @@ class Compare:
 
 
 @dataclass(frozen=True)
-class Check:
-    """Check that an env keeps the promises that learners rely on."""
+class CheckEnv:
+    """Check that an env satisfies the contract that learners rely on."""
 
     env: _EnvId
     """Id of the env."""
@@ -93,7 +93,7 @@ class Check:
     """Another body of the family: its name, or edits as JSON."""
 
     def run(self) -> None:
-        """Put the env through its exam."""
+        """Run the exam on the env."""
         from shapechanger.testing import examine
 
         ref = env_ref(self.env, self.body)
@@ -103,7 +103,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Render:
-    """Draw an env's body as it stands."""
+    """Render an env's body in its start pose."""
 
     env: _EnvId
     """Id of the env."""
@@ -117,7 +117,7 @@ class Render:
     """Height of the picture in pixels."""
 
     def run(self) -> None:
-        """Write the picture."""
+        """Write the image."""
         from shapechanger.cli.pictures import write_picture
 
         with opened(env_ref(self.env, self.body)) as env:
@@ -132,19 +132,19 @@ class Envs:
 
     command: (
         Annotated[ListEnvs, tyro.conf.subcommand("list")]
-        | Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[ShowEnv, tyro.conf.subcommand("show")]
         | Annotated[Compare, tyro.conf.subcommand("compare")]
-        | Annotated[Check, tyro.conf.subcommand("check")]
+        | Annotated[CheckEnv, tyro.conf.subcommand("check")]
         | Annotated[Render, tyro.conf.subcommand("render")]
     )
 
     def run(self) -> None:
-        """Do what was asked."""
+        """Run the subcommand."""
         self.command.run()
 
 
 def _layout_table(side: str, layout: Layout) -> Table:
-    """A layout as a table, one line for each feature."""
+    """Format a layout as a table, one row per feature."""
     title = f"{side}: {layout.size} numbers"
     table = Table(
         "#", "name", "unit", "low", "high", "belongs to", title=title, title_justify="left"
@@ -169,7 +169,7 @@ def _layout_table(side: str, layout: Layout) -> Table:
 
 
 def _in_words(value: Any) -> str:
-    """Numbers rounded for reading, edits as they are written."""
+    """Format a value: rounded numbers, edits as JSON."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, tuple):

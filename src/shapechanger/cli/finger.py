@@ -1,4 +1,4 @@
-"""`shapechanger finger`: record how a finger moves, and find out what it is like."""
+"""`shapechanger finger`: record and identify a finger."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Finger", "Identify", "RecordFinger"]
 
 @dataclass(frozen=True)
 class Identify:
-    """Find out what a finger is like from a log, with intervals."""
+    """Identify a finger's parameters from a log, with confidence intervals."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
     """The log, as `shapechanger finger record` writes it."""
@@ -33,7 +33,7 @@ class Identify:
     """The page to write; beside the log if not given."""
 
     def run(self) -> None:
-        """Print the parameters, and write them and the page."""
+        """Print the parameters, and write them and the report."""
         from shapechanger.identify import identify, load_log
         from shapechanger.reports.finger import finger_html, summary_line
         from shapechanger.transfer.files import make_folder, write_atomic
@@ -71,7 +71,7 @@ def _table(found: IdentifiedFinger) -> Table:
 
 @dataclass(frozen=True)
 class RecordFinger:
-    """Move all joints of a finger about, and keep a log of it."""
+    """Excite all joints of a finger and log the motion."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as Finger."""
@@ -92,7 +92,7 @@ class RecordFinger:
     """More arguments of the env as JSON, such as '{"robot": "my-finger"}'."""
 
     def run(self) -> None:
-        """Record, and say what came of it."""
+        """Record and print a summary."""
         from shapechanger.envs.finger.identification import record_babble
         from shapechanger.identify import save_log
         from shapechanger.transfer.env_ref import EnvRef
@@ -127,7 +127,7 @@ class RecordFinger:
 
 @dataclass(frozen=True)
 class Finger:
-    """Record how a finger moves, and find out what it is like."""
+    """Record and identify a finger."""
 
     command: (
         Annotated[RecordFinger, tyro.conf.subcommand("record")]
@@ -135,5 +135,5 @@ class Finger:
     )
 
     def run(self) -> None:
-        """Do what was asked."""
+        """Run the subcommand."""
         self.command.run()

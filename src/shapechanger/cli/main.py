@@ -1,4 +1,4 @@
-"""Where the command line begins, and where every error of a user becomes one sentence."""
+"""Entry point of the command line; turns every user error into one sentence."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import Annotated, Final, NoReturn
 
 from shapechanger.errors import MissingExtra, ShapechangerError
 
-# What shells give for a program that Ctrl-C has ended (128 plus SIGINT), and for wrong usage.
+# Exit codes of shells for Ctrl-C (128 plus SIGINT) and for wrong usage.
 _INTERRUPTED: Final = 130
 _WRONG_USAGE: Final = 2
 
-# Ctrl-C may come while all this loads.
+# Ctrl-C may arrive during the imports.
 try:
     import gymnasium as gym
 
@@ -23,7 +23,7 @@ try:
         import tyro
 
         from shapechanger.cli.console import plain_console
-    except ImportError:  # pragma: no cover  # Seen by a process of its own in the tests.
+    except ImportError:  # pragma: no cover  # Tested in a subprocess.
         sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
 
     from shapechanger.cli.console import Interrupted
@@ -35,7 +35,7 @@ try:
     from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
     from shapechanger.cli.transfer import Transfer
-except KeyboardInterrupt:  # pragma: no cover  # Seen by a process of its own in the tests.
+except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
     print("Stopped.", file=sys.stderr)
     sys.exit(_INTERRUPTED)
 
@@ -54,13 +54,13 @@ _Command = (
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Do what the command line says.
+    """Run the command line.
 
-    Exits with 0 when it was done, 2 with one sentence on the standard error when it was asked
-    wrongly or cannot be done here, and 130 after Ctrl-C.
+    Exits with 0 on success, with 2 and one sentence on standard error for wrong usage or a missing
+    requirement, and with 130 after Ctrl-C.
     """
     for stream in (sys.stdout, sys.stderr):
-        # Where the encoding lacks a letter, a question mark is better than no answer.
+        # Characters that the encoding lacks become question marks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except ShapechangerError as error:
         _stop(f"error: {error}", _WRONG_USAGE)
     except gym.error.Error as error:
-        # Of the envs of others, such as one that draws with a package that is not there.
+        # From third-party envs, such as one whose renderer is not installed.
         _stop(
             f"error: {(str(error).strip().splitlines() or [type(error).__name__])[0]}", _WRONG_USAGE
         )
@@ -85,17 +85,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         _stop("Stopped.", _INTERRUPTED)
     except OSError as error:
-        # With a file's name it is about that file, and a defect if nobody said it in words.
+        # With a file name it should have been translated before: a defect.
         if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:
             raise
-        # Python tries to write what is left once more at its end.
+        # Python flushes stdout again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if error.errno == errno.EPIPE:  # Whoever read has enough.
+        if error.errno == errno.EPIPE:  # The reader closed the pipe.
             sys.exit(1)
         _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
 
 
 def _stop(message: str, code: int) -> NoReturn:
-    """Say why, and end."""
+    """Print a message and exit."""
     plain_console(stderr=True).print(message, soft_wrap=True)
     sys.exit(code)

@@ -1,4 +1,4 @@
-"""Writing pictures and films."""
+"""Write images and videos."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4")
 
 
 def require_film(path: Path) -> None:
-    """Refuse a file that no film can be written to, before there is one.
+    """Check that a video can be written to a path.
 
     Raises:
-        OutputError: If it is a folder, its folder cannot be written, or its name has no ending of
-            a film.
+        OutputError: If it is a folder, its folder is not writable, or its suffix is not that of a
+            video.
     """
     if path.is_dir():
         raise OutputError(f"Cannot write {path}: it is a folder.")
@@ -35,7 +35,7 @@ def require_film(path: Path) -> None:
 
 
 def write_picture(picture: NDArray[Any], path: Path) -> None:
-    """Write a picture, shape (height, width, 3), in the format that the file's name ends with.
+    """Write an image, shape (height, width, 3), in the format of the file's suffix.
 
     Raises:
         OutputError: If it cannot be written.
@@ -44,7 +44,7 @@ def write_picture(picture: NDArray[Any], path: Path) -> None:
 
 
 def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
-    """Write a film of pictures.
+    """Write frames as a video.
 
     Raises:
         OutputError: If it cannot be written.
@@ -57,6 +57,6 @@ def _write(path: Path, content: Any, **options: Any) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         cast("Any", iio).imwrite(path, content, **options)
     except (OSError, ValueError) as error:
-        # The encoder adds its command and all that it printed.
+        # The encoder's message includes its command and its output.
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
         raise OutputError(f"Cannot write {path}: {reason}.") from error

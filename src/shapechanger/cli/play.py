@@ -1,4 +1,4 @@
-"""`shapechanger play`: watch a policy, in a window or as a film."""
+"""`shapechanger play`: watch a policy in a window or as a video."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Play"]
 
 @dataclass(frozen=True)
 class Play:
-    """Watch a policy in an env: in a window, or as a film where there is no screen."""
+    """Watch a policy in an env, in a window or as a video."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
@@ -39,7 +39,7 @@ class Play:
     """Longest episode to show."""
 
     def run(self) -> None:
-        """Play, and say what it was worth."""
+        """Play and print the returns."""
         require_seed(self.seed)
         if self.episodes < 1 or self.max_steps < 1:
             raise StudyError("Playing takes at least one episode of one step.")
@@ -71,7 +71,7 @@ class Play:
                 console.print(f"wrote {out}")
 
     def _policy(self, env: Any) -> tuple[Any, Any]:
-        """The env to act in, and what acts."""
+        """Return the env and the policy."""
         from shapechanger.transfer.learners.evaluation import random_actions
 
         if self.policy is None:

@@ -1,4 +1,4 @@
-"""`shapechanger suite`: studies that belong together, and what they say together."""
+"""`shapechanger suite`: several studies with a joint table."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _FILE_WIDTH: Final = 200
 
 @dataclass(frozen=True)
 class Suite:
-    """Run studies that belong together: a study for each pair, one report each, and a table.
+    """Run a suite of studies: one study and report per pair, and a joint table.
 
-    Stopped half-way, the same command goes on where it was; with more seeds it adds to them.
+    Run the same command again to resume, or with more seeds to add to it.
     """
 
     name: Annotated[Literal["vehicles", "lenses"], tyro.conf.Positional]
@@ -51,7 +51,7 @@ class Suite:
     """Runs at a time; one for each core if not given."""
 
     def run(self) -> None:
-        """Do the studies, write their reports, and print what they say together."""
+        """Run the studies, write their reports, and print the joint table."""
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.files import write_json
         from shapechanger.transfer.learners.settings import learner_settings
@@ -61,7 +61,7 @@ class Suite:
         require_seed(self.seed)
         out = self.out or Path("results", self.name)
         command = shlex.join(["shapechanger", *sys.argv[1:]])
-        # A file has no width of its own; a table in it should not be folded.
+        # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
         settings = learner_settings("cloning")
@@ -112,7 +112,7 @@ class Suite:
 
 
 def _table(found: list[StudyOutcome]) -> Table:
-    """What each study says: returns and minutes first, then gains with their intervals."""
+    """Format the results: returns and minutes, then gains with intervals."""
     from shapechanger.reports.numbers import estimate_text
 
     table = Table(

@@ -1,4 +1,4 @@
-"""`shapechanger train`: a policy for one env."""
+"""`shapechanger train`: train a policy in one env."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["Train"]
 
 @dataclass(frozen=True)
 class Train:
-    """Train a policy in one env, and write it to a file that `play` and `transfer` take."""
+    """Train a policy in one env and write it to a file for `play` and `transfer`."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
@@ -44,7 +44,7 @@ class Train:
     """Folder for TensorBoard's logs; none are written if not given."""
 
     def run(self) -> None:
-        """Train, showing the evaluations as they come."""
+        """Train and print evaluations as they complete."""
         from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
@@ -58,7 +58,7 @@ class Train:
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
         out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
-        # The policy is written last; what would keep it from being written is said first.
+        # The policy is written last; check first that it can be.
         with opened(env) as made:
             layouts_of(made)
         if out.is_dir():
@@ -109,7 +109,7 @@ def _learn_to_drive(
     show: Callable[[Evaluation], None],
     progress: StudyProgress,
 ) -> None:
-    """Learn from the demonstrator of an env, and write the policy and what it learned from."""
+    """Clone the demonstrator of an env, and write the policy and its demonstrations."""
     from shapechanger.transfer.learners.cloning import DemonstrationFile
     from shapechanger.transfer.learners.sac import train_camera_policy
 
@@ -128,10 +128,10 @@ def _learn_to_drive(
 
 
 def _require_tensorboard() -> None:
-    """Refuse to write logs without what writes them.
+    """Check that TensorBoard is installed.
 
     Raises:
-        MissingExtra: If it is not installed.
+        MissingExtra: If it is not.
     """
     try:
         import_module("torch.utils.tensorboard")

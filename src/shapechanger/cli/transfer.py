@@ -1,4 +1,4 @@
-"""`shapechanger transfer`: a whole transfer study in one command."""
+"""`shapechanger transfer`: a complete transfer study."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Transfer", "run_steps", "write_study_report"]
 
-# What --quick divides the budget by, and the seeds it does with: enough to see that all works.
+# Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
 _QUICK_SEEDS: Final = 2
 _FILE_WIDTH: Final = 120
@@ -42,9 +42,9 @@ _FILE_WIDTH: Final = 120
 
 @dataclass(frozen=True)
 class Transfer:
-    """Learn in SOURCE, move to TARGET, and measure what the move was worth.
+    """Train in SOURCE, transfer to TARGET, and compare with training from scratch.
 
-    Stopped half-way, the same command goes on where it was.
+    Run the same command again to resume.
     """
 
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
@@ -93,14 +93,14 @@ class Transfer:
     """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
     def run(self) -> None:
-        """Do the study, print its table, and write its report."""
+        """Run the study, print its table, and write its report."""
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.study import is_folder_of, run_study, unfinished_runs
 
         self._require_sense()
-        # The report comes last; if what draws it is missing, say so before the work.
+        # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
-        # A file has no width of its own; a table in it should not be folded.
+        # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         plan = self._plan()
         executor = Processes(1 if plan.exclusive else self.workers)
@@ -127,10 +127,10 @@ class Transfer:
         console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
 
     def _require_sense(self) -> None:
-        """Refuse options that contradict one another, or of which one would be dropped.
+        """Refuse contradictory or unused options.
 
         Raises:
-            StudyError: If a seed or an arm cannot be.
+            StudyError: If a seed or an arm is invalid.
             MapError: If the body map is given twice.
         """
         require_seed(self.seed)
@@ -144,7 +144,7 @@ class Transfer:
             )
 
     def _plan(self) -> Plan:
-        """What to do."""
+        """Return the plan of the study."""
         from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
         from shapechanger.transfer.methods import default_arms
         from shapechanger.transfer.plan import TransferTask
@@ -185,7 +185,7 @@ class Transfer:
 
 
 def write_study_report(study: Study, out: Path) -> Path:
-    """Write the report; a machine that cannot draw bodies gets one without their pictures."""
+    """Write the report, without pictures of the bodies if they cannot be rendered."""
     from shapechanger.reports.study import write_report
 
     path = out / "report.html"
@@ -199,7 +199,7 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """The steps of each run, for the progress; an evaluation counts as one."""
+    """Return the number of steps of each run for the progress; an evaluation counts as one."""
     from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS
 
     steps = {"scratch": plan.steps, "fine-tune": plan.steps}
@@ -208,7 +208,7 @@ def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
 
 
 def _require_options(env: EnvRef) -> None:
-    """Refuse options that an env does not take.
+    """Refuse options that an env does not accept.
 
     Raises:
         StudyError: If there is one.
@@ -223,10 +223,10 @@ def _require_options(env: EnvRef) -> None:
 
 
 def _split_rule(text: str) -> tuple[str, str]:
-    """The name and the rule of `NAME=RULE`.
+    """Split `NAME=RULE`.
 
     Raises:
-        MapError: If it is not of that form.
+        MapError: If it has another form.
     """
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
@@ -235,7 +235,7 @@ def _split_rule(text: str) -> tuple[str, str]:
 
 
 def _read(path: Path) -> str:
-    """The text of a file.
+    """Read a text file.
 
     Raises:
         MapError: If it cannot be read.
@@ -247,7 +247,7 @@ def _read(path: Path) -> str:
 
 
 def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
-    """Both bodies as they start, to one scale; None if the envs draw none."""
+    """Render both bodies in their start poses at one scale; None if the envs cannot."""
     with opened(source) as one, opened(target) as other:
         both: list[Any] = [one.unwrapped, other.unwrapped]
         if not all(hasattr(env, "picture") for env in both):
@@ -257,12 +257,12 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 
 def _name(env: EnvRef) -> str:
-    """A short name for a folder."""
+    """Return a short folder name."""
     return env.id.split("/")[-1].removesuffix("-v1")
 
 
 def _way_on(plan: Plan, out: Path) -> str:
-    """What is kept of a study that was cut off, and how to go on; empty if it had not begun."""
+    """Tell how to resume an interrupted study; empty if it had not started."""
     from shapechanger.transfer.study import is_folder_of, unfinished_runs
 
     if not is_folder_of(plan, out):
@@ -273,16 +273,16 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 
 def _command() -> str:
-    """The command as it was typed."""
+    """Return the command line."""
     return shlex.join(["shapechanger", *sys.argv[1:]])
 
 
 def _print(console: Console, study: Study) -> None:
-    """The table of measures, and what they come to."""
+    """Print the table of measures and the verdict."""
     from shapechanger.reports.verdict import measure_rows, verdict
 
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
-    # What an arm leaves undefined, as zero-shot does most, is in the report with the reason.
+    # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
     for row in [row for row in measure_rows(study) if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     console.print(table)

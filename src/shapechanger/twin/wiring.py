@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.gpio import Duty
+from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.twin.signals import Levels, Pulse, PwmChannel

@@ -211,7 +211,7 @@ def test_options_that_are_none_are_refused(
         ({"gap": "reel-like"}, UnknownName, "'reel-like'. Did you mean 'real-like'"),
         ({"gap": "wide", "parameters": NOMINAL}, FingerError, "Give either parameters or a gap"),
         ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
-        ({"parameters": "{}x"}, FingerError, "These are no parameters of a finger"),
+        ({"parameters": "{}x"}, FingerError, "Invalid finger parameters"),
         ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),
         ({"render_mode": "rgb"}, UnknownName, "No render mode matches 'rgb'"),
     ],

@@ -211,7 +211,7 @@ def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
 
     console.page.click("#browse")
     console.page.locator("#episode-list button").first.click()
-    console.await_words("#episodes-state", "All of it is here.")
+    console.await_words("#episodes-state", "Loaded.")
     console.page.fill("#scrub", str(len(episode.steps) - 1))
     console.await_words("#step-state", "person:")
     console.page.click("#range-from")

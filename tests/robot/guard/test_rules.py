@@ -452,6 +452,7 @@ def test_a_low_battery_is_believed_after_a_while_and_then_for_good() -> None:
     _sense(rules, _T0, battery=6.0)
     _sense(rules, _T0 + 400 * MS, battery=6.5)
     _sense(rules, _T0 + 500 * MS, battery=6.0)
+    _sense(rules, _T0 + 999 * MS, battery=6.0)  # 499 ms: not believed yet.
     assert _ask(rules, 2, _T0 + 999 * MS, 0.5) == (0.5, "")
     _sense(rules, _T0 + 1_000 * MS, battery=6.05)
     words = "The battery has 6.05 V, less than 6.4 V."

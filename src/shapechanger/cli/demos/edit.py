@@ -1,4 +1,4 @@
-"""From what a user types to an episode."""
+"""`shapechanger demos cut | bad | good | mark | merge | repair`: edit recordings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Bad",
-    "Cut",
+    "CutEpisode",
     "Good",
     "MarkStep",
     "Merge",
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def episode_path(path: Path) -> Path:
-    """The folder of one episode; that of a recording will do where it has only one.
+    """Resolve a path to the folder of one episode, or of a recording with a single episode.
 
     Raises:
         DemosError: If there is none, or more than one.
@@ -45,10 +45,10 @@ def episode_path(path: Path) -> Path:
 
 
 def episode_at(path: Path) -> Episode:
-    """One episode, see `episode_path`.
+    """Load one episode, see `episode_path`.
 
     Raises:
-        BrokenEpisode: If it is not whole.
+        BrokenEpisode: If it is incomplete.
         DemosError: If there is none, or more than one, or it has no steps.
     """
     episode = read_episode(episode_path(path))
@@ -58,7 +58,7 @@ def episode_at(path: Path) -> Episode:
 
 
 def range_of(episode: Episode, first: int | None, last: int | None) -> tuple[int, int]:
-    """The steps from `first` to `last`, each of which is that of the episode where it is None.
+    """Return the range from `first` to `last`; None stands for the episode's own end.
 
     Raises:
         DemosError: If there are no such steps.
@@ -76,8 +76,8 @@ _To = Annotated[int | None, tyro.conf.arg(name="to", metavar="STEP")]
 
 
 @dataclass(frozen=True)
-class Cut:
-    """Let only a part of an episode count: what is before and after it does not any more."""
+class CutEpisode:
+    """Keep a range of steps of an episode and drop the rest."""
 
     episode: _Episode
     """Folder of the episode."""
@@ -87,7 +87,7 @@ class Cut:
     """The last step that counts; that of the episode if not given."""
 
     def run(self) -> None:
-        """Cut, and say what counts now."""
+        """Cut and print what is kept."""
         episode = episode_at(self.episode)
         first, last = range_of(episode, self.first, self.last)
         least, most = episode.steps[0].index, episode.steps[-1].index
@@ -100,7 +100,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class Bad:
-    """Let steps of an episode, or all of them, not count."""
+    """Drop steps of an episode, or all of them."""
 
     episode: _Episode
     """Folder of the episode."""
@@ -110,7 +110,7 @@ class Bad:
     """The last step; that of the episode if not given."""
 
     def run(self) -> None:
-        """Drop them, and say what counts now."""
+        """Drop the steps and print what is kept."""
         episode = episode_at(self.episode)
         drop(episode.path, *range_of(episode, self.first, self.last), "bad")
         _tell(episode.path)
@@ -118,7 +118,7 @@ class Bad:
 
 @dataclass(frozen=True)
 class Good:
-    """Let steps of an episode, or all of them, count again, whatever they were dropped for."""
+    """Restore dropped steps of an episode, or all of them."""
 
     episode: _Episode
     """Folder of the episode."""
@@ -128,7 +128,7 @@ class Good:
     """The last step; that of the episode if not given."""
 
     def run(self) -> None:
-        """Keep them, and say what counts now."""
+        """Restore the steps and print what is kept."""
         episode = episode_at(self.episode)
         keep(episode.path, *range_of(episode, self.first, self.last))
         _tell(episode.path)
@@ -136,7 +136,7 @@ class Good:
 
 @dataclass(frozen=True)
 class MarkStep:
-    """Mark a step of an episode, to find it again."""
+    """Mark a step of an episode."""
 
     episode: _Episode
     """Folder of the episode."""
@@ -146,7 +146,7 @@ class MarkStep:
     """A few words."""
 
     def run(self) -> None:
-        """Mark it."""
+        """Mark the step."""
         episode = episode_at(self.episode)
         mark(episode.path, self.step, self.text)
         plain_console().print(f"marked step {self.step} of {episode.path}", soft_wrap=True)
@@ -175,7 +175,7 @@ class Merge:
     """Folder of the recording that they come into."""
 
     def run(self) -> None:
-        """Copy, and say what came of it."""
+        """Merge and print a summary."""
         from shapechanger.demos.merging import merge
 
         done = merge(self.data, self.out)
@@ -195,13 +195,13 @@ class Merge:
 
 @dataclass(frozen=True)
 class RepairEpisodes:
-    """Keep every complete step of a recording after a crash; what is not is moved aside."""
+    """Repair a recording after a crash: keep complete steps and move the rest aside."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """Folder of the recording, or of one episode."""
 
     def run(self) -> None:
-        """Repair each episode, and say what was done."""
+        """Repair each episode and print what was done."""
         console = plain_console()
         refused: list[DemosError] = []
         for path in episodes_of(self.data):
@@ -217,7 +217,7 @@ class RepairEpisodes:
 
 
 def _told(done: Repair) -> str:
-    """What was done, in words."""
+    """Describe a repair."""
     if not done.changed:
         return f"was whole, with {done.kept} steps"
     parts = [f"kept {done.kept} steps"]
@@ -231,7 +231,7 @@ def _told(done: Repair) -> str:
 
 
 def _why(reasons: tuple[str, ...]) -> str:
-    """The first reason, and how many more there are."""
+    """Return the first reason and the number of others."""
     rest = len(reasons) - 1
     return f"{reasons[0]}{f', and so on ({rest} more)' if rest else ''}"
 

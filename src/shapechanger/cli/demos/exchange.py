@@ -1,4 +1,4 @@
-"""`shapechanger demos import`: a recording from what others recorded."""
+"""`shapechanger demos import | export`: convert between recordings and other formats."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Export", "Import", "counted"]
 
 @dataclass(frozen=True)
 class Import:
-    """Make a recording of what others recorded; what is read stays as it is."""
+    """Import a recording from another format, leaving the source unchanged."""
 
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]
     """The folder to read."""
@@ -25,7 +25,7 @@ class Import:
     """Format of the folder: 2017, tub, minari or csv; auto looks for itself."""
 
     def run(self) -> None:
-        """Import, and say what came."""
+        """Import and print a summary."""
         from shapechanger.demos.exchange import import_recording
 
         done = import_recording(self.source, self.out, self.format)
@@ -37,13 +37,13 @@ class Import:
 
 
 def counted(number: int, what: str) -> str:
-    """Such as "1 step" and "2 steps"."""
+    """Format a count, such as "1 step" or "2 steps"."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 @dataclass(frozen=True)
 class Export:
-    """Write a recording in a format of others; the recording stays as it is."""
+    """Export a recording to another format, leaving the recording unchanged."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, or one episode of it."""
@@ -55,7 +55,7 @@ class Export:
     """Write the steps that were dropped, too, and that they were; only minari and csv can."""
 
     def run(self) -> None:
-        """Export, and say what went."""
+        """Export and print a summary."""
         from shapechanger.demos.exchange import export_recording
 
         done = export_recording(self.data, self.out, self.to, dropped=self.dropped)

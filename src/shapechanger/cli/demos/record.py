@@ -1,4 +1,4 @@
-"""`shapechanger demos record`: an expert or a policy drives in an env, and it is recorded."""
+"""`shapechanger demos record`: record an expert or a policy in an env."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ if TYPE_CHECKING:
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["EXPERT", "Record", "pilot_of"]
+__all__ = ["EXPERT", "RecordEpisodes", "pilot_of"]
 
 EXPERT: Final = "expert"
 
-# A vehicle that hardly moves, or whose throttle is not above this, does not drive into anything.
+# Below this throttle a vehicle does not collide.
 _CRAWLS_MPS: Final = 0.05
 _BRAKES: Final = 0.0
 
 
 def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> EpisodeDriver:
-    """Whoever is asked for.
+    """Return the requested driver.
 
     Args:
-        env: Where.
-        driver: "expert", or the file of a policy.
-        corrected_by: "expert" to correct the policy; "" for nobody.
-        seed: Of the expert's mistakes.
+        env: The env.
+        driver: "expert", or a policy file.
+        corrected_by: "expert" to correct the policy, or "".
+        seed: Seed of the expert's errors.
 
     Raises:
-        DemosError: If there is no such driver, or the env has no expert.
-        PolicyError: If the file is no policy.
+        DemosError: If the driver is unknown, or the env has no expert.
+        PolicyError: If the file is not a policy.
     """
     from shapechanger.demos.drivers import CorrectedPilot, ExpertPilot, Gate, GateRule, PolicyPilot
 
@@ -62,7 +62,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
     from shapechanger.transfer.learners.ppo import use_one_thread
 
-    use_one_thread()  # A policy of one picture at a time is slower on more.
+    use_one_thread()  # Inference on single frames is slower with more threads.
     act = _policy(Path(driver), env)
     if not corrected_by:
         return PolicyPilot(act)
@@ -83,7 +83,7 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
 
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
-    """A policy that takes the observations of this env, and whose actions fit it."""
+    """Load a policy and check that its observations and actions fit the env."""
     from shapechanger.transfer.learners.cloning import is_clone, load_clone
 
     box = cast("gym.spaces.Box", env.action_space)
@@ -108,11 +108,11 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
 
 
 class _Danger:
-    """What is about to go wrong, as far as the env's world tells.
+    """Danger signal from the env's world.
 
     Args:
-        env: The env; without a world there is never any danger.
-        near_s: How much time before something is hit counts as near, s.
+        env: The env; without a world there is no danger.
+        near_s: Time to collision that counts as danger, s.
     """
 
     def __init__(self, env: gym.Env[Any, Any], near_s: float) -> None:
@@ -134,11 +134,11 @@ class _Danger:
 def _parts(
     clone: CameraPolicy, path: Path, env: gym.Env[Any, Any]
 ) -> Callable[[Any, str], NDArray[Any] | None]:
-    """Gives of an observation the part that a clone takes, one row of it; None for none.
+    """Return the function that extracts a clone's part of an observation; None if there is none.
 
     Raises:
-        DemosError: If the env shows no pictures and it drives by them.
-        PolicyError: If it feels or moves something else.
+        DemosError: If the clone needs frames and the env has none.
+        PolicyError: If its state or actions differ from the env's.
     """
     from shapechanger.demos.recording import QUALITY, Sight
 
@@ -160,8 +160,8 @@ def _name(env: gym.Env[Any, Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Record:
-    """Record how an expert or a policy drives in an env."""
+class RecordEpisodes:
+    """Record an expert or a policy in an env."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as Car."""
@@ -188,7 +188,7 @@ class Record:
     """Seed of the first episode; each later one has the next whole number."""
 
     def run(self) -> None:
-        """Record, and say what came of it."""
+        """Record and print a summary."""
         from gymnasium.wrappers import TimeLimit
 
         from shapechanger.demos.drivers import record_steps
@@ -220,7 +220,7 @@ class Record:
         console.print(_told(env, self.out), soft_wrap=True)
 
     def _ref(self) -> EnvRef:
-        """The env, with what is asked of it."""
+        """Return the env with the requested options."""
         from shapechanger.transfer.env_ref import EnvRef
 
         ref = env_ref(self.env, self.body)
@@ -240,7 +240,7 @@ class Record:
         return EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
 
     def _about(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
-        """What the header says beyond what the env says."""
+        """Return further fields of the header."""
         world = getattr(env.unwrapped, "world", None)
         who = self.driver if self.driver == EXPERT else Path(self.driver).name
         notes: dict[str, Any] = {"driver": self.driver}
@@ -257,10 +257,10 @@ class Record:
 
 
 def _made(ref: EnvRef) -> gym.Env[Any, Any]:
-    """The env, without its own longest episode.
+    """Make the env without its time limit.
 
     Raises:
-        DemosError: If it takes no such arguments.
+        DemosError: If it does not accept the arguments.
     """
     try:
         return ref.make(max_episode_steps=-1)
@@ -270,7 +270,7 @@ def _made(ref: EnvRef) -> gym.Env[Any, Any]:
 
 
 def _told(env: RecordEpisodes, out: Path) -> str:
-    """What was recorded, and what can be done with it."""
+    """Describe the recording and the next commands."""
     seconds = env.steps / env.control_hz
     episodes = f"{env.episodes} episode{'' if env.episodes == 1 else 's'}"
     return (

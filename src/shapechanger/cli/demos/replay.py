@@ -1,4 +1,4 @@
-"""`shapechanger demos replay`: what was recorded again, as a film, in an env or on a robot."""
+"""`shapechanger demos replay`: replay an episode as a video, in an env or on a robot."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = ["Replay", "film", "play_in_env", "play_on_robot"]
 
 @dataclass(frozen=True)
 class Replay:
-    """Play an episode again: as a film, in an env, or on a robot."""
+    """Replay an episode as a video, in an env or on a robot."""
 
     episode: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]
     """Folder of the episode."""
@@ -49,7 +49,7 @@ class Replay:
     arms it, and any key stops it."""
 
     def run(self) -> None:
-        """Play it where it was asked for."""
+        """Replay the episode."""
         asked = [bool(self.film), bool(self.env), bool(self.robot)]
         if sum(asked) != 1:
             raise DemosError("An episode is played with one of --film, --env and --robot.")
@@ -65,14 +65,14 @@ class Replay:
 
 
 def play_in_env(episode: Episode, env_id: str) -> None:
-    """Play an episode in an env, from the seed that was recorded, and say how it differs.
+    """Replay an episode in an env from the recorded seed and report differences.
 
-    What the outputs did is what is played, where that is known: it is what the pictures follow
-    from, while an expert may have meant something else.
+    The applied actions are replayed where they are known, because the frames follow from them; the
+    expert's intended actions may differ.
 
     Raises:
-        DemosError: If the env takes other actions.
-        UnknownName: If there is no such env.
+        DemosError: If the env has other actions.
+        UnknownName: If the env is unknown.
     """
     from shapechanger.demos.recording import Sight
 
@@ -115,7 +115,7 @@ def play_in_env(episode: Episode, env_id: str) -> None:
 
 
 def _ref(episode: Episode, env_id: str) -> EnvRef:
-    """The env, with the arguments that were recorded where it is the same one."""
+    """Return the env, with the recorded arguments if it is the recorded one."""
     from shapechanger.transfer.env_ref import EnvRef
 
     ref, header = env_ref(env_id), episode.header
@@ -124,7 +124,7 @@ def _ref(episode: Episode, env_id: str) -> EnvRef:
 
 
 def _caveats(episode: Episode) -> list[str]:
-    """Why an episode cannot come out the same."""
+    """Return reasons why a replay cannot be identical."""
     told: list[str] = []
     if episode.header.seed is None:
         told.append("it was recorded without a seed, so it began somewhere else")
@@ -137,7 +137,7 @@ def _caveats(episode: Episode) -> list[str]:
 
 
 class _Apart:
-    """How far a replay comes apart from what was recorded."""
+    """Differences between a replay and its recording."""
 
     def __init__(self) -> None:
         self._states: list[NDArray[np.float64]] = []
@@ -145,7 +145,7 @@ class _Apart:
         self._rewards: list[tuple[float, float]] = []
 
     def look(self, episode: Episode, step: Step, seen: Seen, *, states: bool) -> None:
-        """Compare what is seen now with what was seen before this step."""
+        """Compare the observation before a step with the recorded one."""
         from shapechanger.demos.dataset import decode_picture
 
         if states:
@@ -158,12 +158,12 @@ class _Apart:
             self._pictures.append(float(np.abs(old.astype(float) - new).mean()))
 
     def earn(self, step: Step, reward: float) -> None:
-        """Take in what the step was worth, then and now."""
+        """Compare the reward of a step with the recorded one."""
         if step.reward is not None:
             self._rewards.append((step.reward, reward))
 
     def told(self, layout: Layout | None) -> list[str]:
-        """The differences, a line each."""
+        """Describe the differences, one per line."""
         lines: list[str] = []
         if self._pictures and not any(self._pictures):
             lines.append("the pictures are the same in every step")
@@ -193,11 +193,11 @@ _WITHOUT_CAMERA: Final = (480, 40)
 
 
 def film(episode: Episode, path: Path) -> None:
-    """Write the steps of an episode that count as a film.
+    """Write the kept steps of an episode as a video.
 
     Raises:
         OutputError: If it cannot be written.
-        DemosError: If a picture is damaged.
+        DemosError: If a frame is damaged.
         MissingExtra: If the encoder is not installed.
     """
     from shapechanger.cli.pictures import require_film, write_film
@@ -215,7 +215,7 @@ def film(episode: Episode, path: Path) -> None:
         )
         frame = overlay(picture, step, layout)
         size = size or frame.shape
-        if frame.shape == size:  # A film has one size; a camera that changed it is left out.
+        if frame.shape == size:  # A video has one frame size; other frames are skipped.
             frames.append(frame)
     write_film(frames, path, episode.header.control_hz)
     left = len(episode.kept) - len(frames)
@@ -231,15 +231,14 @@ _LOOK_S: Final = 0.5
 
 
 def play_on_robot(episode: Episode, name: str) -> None:
-    """Play an episode on a robot, once a person at this terminal has armed it.
+    """Replay an episode on a robot after a person at this terminal has armed it.
 
-    The robot's own caps, reflexes and deadline hold as for anybody who drives it. Any key stops it,
-    and so does everything that goes wrong.
+    The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
 
     Raises:
-        DemosError: If the robot moves something else, or at another rate.
+        DemosError: If the robot has other actions or another rate.
         LinkError: If it cannot be reached, or is lost.
-        NoTerminal: If there is no terminal for a person to stop it from.
+        NoTerminal: If there is no terminal to stop it from.
     """
     from shapechanger.remote.client import RobotClient
     from shapechanger.remote.known_robots import recall
@@ -273,10 +272,10 @@ def play_on_robot(episode: Episode, name: str) -> None:
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:
-    """Refuse a robot that would do something else than was recorded.
+    """Refuse a robot that does not fit the recording.
 
     Raises:
-        DemosError: If it moves other things, in other units or ranges, or at another rate.
+        DemosError: If its actions, units, ranges or rate differ.
     """
     recorded = Layout.from_json(episode.header.action_layout)
     moved = Layout.from_json(welcome.action_layout)
@@ -299,16 +298,16 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
 
 
 def _agreed(robot: RobotClient, terminal: Terminal) -> bool:
-    """Whether the person presses E, and nothing else."""
+    """Return whether the person confirms with E; any other key declines."""
     while True:
-        robot.acknowledge()  # So that the link is not lost while somebody thinks.
+        robot.acknowledge()  # Keeps the link alive meanwhile.
         keys = terminal.keys(_LOOK_S)
         if keys:
             return keys == ["e"]
 
 
 def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
-    """Command step after step until the end or a key; what came of it, in words."""
+    """Send step after step until the end or a key press, and describe the outcome."""
     period_s = 1.0 / robot.welcome.control_hz
     steps = episode.kept
     seen = robot.ask().message
@@ -320,7 +319,7 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
         if not (seen.mine and seen.armed):
             why = seen.stop_reason or f"{seen.holder or 'nobody'} commands it now"
             return f"stopped after {number} of {len(steps)} steps: {why}"
-        # What it did then is what the recording shows; it has the caps of then, and gets its own.
+        # The applied actions include the caps at that time; the current caps apply on top.
         robot.command(step.action if step.applied is None else step.applied, answers=seen.seq)
         try:
             seen = robot.observation(seen.seq).message
@@ -328,9 +327,9 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
             raise
         except LinkError as error:
             raise LinkError(f"After {number} of {len(steps)} steps: {error}") from error
-        # It never hurries to catch up: what is late stays late.
+        # Late steps are not caught up.
         due_s = max(due_s + period_s, time.monotonic())
-    terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command has its period, too.
+    terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command gets a full period, too.
     return f"played {len(steps)} steps"
 
 

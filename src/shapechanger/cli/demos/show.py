@@ -1,4 +1,4 @@
-"""`shapechanger demos list`: the episodes of a recording."""
+"""`shapechanger demos list | show`: summaries of a recording."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapechanger.cli.console import plain_console
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = ["ListEpisodes", "Show", "shares", "told_length"]
+__all__ = ["ListEpisodes", "ShowEpisodes", "shares", "told_length"]
 
 _WIDEST: Final = 400
 
@@ -28,7 +28,7 @@ class ListEpisodes:
     """Folder of the recording, or of one episode."""
 
     def run(self) -> None:
-        """Print a line for each, and what they are together."""
+        """Print a line per episode and the totals."""
         from shapechanger.demos.statistics import summary
 
         table = Table(
@@ -60,7 +60,7 @@ class ListEpisodes:
                 one.outcome if one.closed else "not closed",
             )
         console = plain_console()
-        # A name that is cut off cannot be typed: rather let the terminal break the line.
+        # Truncated names could not be typed; let the terminal wrap the line.
         needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
         plain_console(width=max(console.width, needed)).print(table)
         many = f"{len(paths)} episode{'' if len(paths) == 1 else 's'}"
@@ -70,7 +70,7 @@ class ListEpisodes:
 
 
 def told_length(seconds: float) -> str:
-    """A time as people say it.
+    """Format a duration.
 
     >>> told_length(4.25), told_length(59.97), told_length(754.0)
     ('4.2 s', '1:00 min', '12:34 min')
@@ -82,7 +82,7 @@ def told_length(seconds: float) -> str:
 
 
 def shares(counts: dict[str, int]) -> str:
-    """Who did how much.
+    """Format shares in percent.
 
     >>> shares({"policy": 30, "expert": 10}), shares({"expert": 4})
     ('policy 75 %, expert 25 %', 'expert')
@@ -94,8 +94,8 @@ def shares(counts: dict[str, int]) -> str:
 
 
 @dataclass(frozen=True)
-class Show:
-    """Say what is in a recording in numbers, or show it as a page with pictures."""
+class ShowEpisodes:
+    """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """Folder of the recording, or of one episode."""
@@ -103,7 +103,7 @@ class Show:
     """The page to write, such as page.html; it needs no other file."""
 
     def run(self) -> None:
-        """Print the numbers, and write the page."""
+        """Print the summary and write the page."""
         from shapechanger.reports.demonstrations import distributions
 
         if self.out is not None and self.out.is_dir():
@@ -138,7 +138,7 @@ class Show:
 
 
 def _told(episodes: Sequence[Episode]) -> list[str]:
-    """What a recording is, in a few lines."""
+    """Describe a recording in a few lines."""
     counts: Counter[str] = Counter(step.driver for one in episodes for step in one.kept)
     seconds = sum(one.seconds for one in episodes)
     many = f"{len(episodes)} episode{'' if len(episodes) == 1 else 's'}"

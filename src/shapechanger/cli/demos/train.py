@@ -1,4 +1,4 @@
-"""`shapechanger demos train`: a policy from demonstrations."""
+"""`shapechanger demos train | evaluate`: learn a policy from demonstrations and evaluate it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Evaluate", "Shrinking", "Train", "print_judgement"]
+__all__ = ["Evaluate", "Shrinking", "TrainClone", "print_judgement"]
 
 
 @dataclass(frozen=True)
-class Train:
-    """Learn to do what a driver did, and write the policy and a report beside it."""
+class TrainClone:
+    """Clone a driver from demonstrations; write the policy and a report."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, one episode of it, or anything that `demos import` reads."""
@@ -54,9 +54,9 @@ class Train:
     """Also write it as a file that `stable_baselines3.PPO.load` reads."""
 
     def run(self) -> None:
-        """Train, judge, and write."""
+        """Train, evaluate and write the files."""
         self._require_files()
-        # The report comes last; if what draws it is missing, say so before the work.
+        # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.clone")
         from shapechanger.demos.cloning.demonstrations import judged_steps
         from shapechanger.demos.cloning.judge import judge
@@ -68,7 +68,7 @@ class Train:
         console = plain_console()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
         if settings.members > 1:
-            use_one_thread()  # Networks this small lose by more, and on a busy machine a lot.
+            use_one_thread()  # More threads slow down networks this small.
         shrinking = Shrinking(settings.framing)
         data = load_dataset(self.data, shrink=shrinking)
         judged = judged_steps(data.episodes, self.split, self.held_out)
@@ -112,11 +112,11 @@ class Train:
         print_judgement(console, judgement)
 
     def _require_files(self) -> None:
-        """Refuse what would keep the files from being written before the work, not after.
+        """Check before the work that the files can be written.
 
         Raises:
-            OutputError: If a file cannot be written, or two have one name.
-            StudyError: If there is no such seed.
+            OutputError: If a file cannot be written, or two have the same name.
+            StudyError: If the seed is invalid.
         """
         from shapechanger.transfer.files import make_folder
 
@@ -131,7 +131,7 @@ class Train:
             make_folder(path.parent)
 
     def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> list[Path]:
-        """Write what Stable-Baselines3 reads, if it is asked for."""
+        """Write a Stable-Baselines3 file if requested."""
         written: list[Path] = []
         if self.sac is None and self.ppo is None:
             return written
@@ -140,7 +140,7 @@ class Train:
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
             if path is not None:
-                whole = io.BytesIO()  # Stable-Baselines3 would write it bit by bit, to FILE.zip.
+                whole = io.BytesIO()  # Stable-Baselines3 would write incrementally, to FILE.zip.
                 make(policy, size, seed=self.seed).save(whole)
                 write_atomic(path, whole.getvalue())
                 written.append(path)
@@ -149,12 +149,12 @@ class Train:
 
 @dataclass
 class Shrinking:
-    """Makes pictures as a policy sees them while they are read, and remembers what they were.
+    """Convert frames to a policy's view while they are read, and record their digests.
 
     Attributes:
-        framing: What the policy sees.
-        size: Rows and columns of the raw pictures; None before the first.
-        seen: Digest of each picture.
+        framing: Framing of the policy's view.
+        size: Rows and columns of the raw frames; None before the first.
+        seen: Digest of each frame.
     """
 
     framing: Framing
@@ -162,7 +162,7 @@ class Shrinking:
     seen: list[bytes] = field(default_factory=list[bytes])
 
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """What is seen of a picture."""
+        """Return the policy's view of a frame."""
         import hashlib
 
         from shapechanger.demos.cloning.pictures import prepare
@@ -173,21 +173,21 @@ class Shrinking:
         return small
 
     def digest(self, actions: NDArray[np.float32]) -> str:
-        """What tells these demonstrations from others."""
+        """Return a digest of the demonstrations."""
         import hashlib
 
         return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
 
 
 class _Progress(StudyProgress):
-    """Shows how far each network is."""
+    """Progress of each network."""
 
     def __init__(self, members: int, steps: int) -> None:
         super().__init__({self._name(member): steps for member in range(members)})
         self._at = 0
 
     def __call__(self, check: MemberCheck) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Take in a check."""
+        """Report a validation score."""
         if check.member > self._at:
             super().__call__(self._name(self._at), check.step, True)
             self._at = check.member
@@ -199,7 +199,7 @@ class _Progress(StudyProgress):
 
 
 def print_judgement(console: Console, judgement: Judgement) -> None:
-    """Print how good a policy was; the last line is its accuracy."""
+    """Print an evaluation; the last line is the accuracy."""
     always = f"always the same: {judgement.always:.3f}"
     console.print(f"{judgement.steps} steps; {always}", soft_wrap=True)
     if judgement.head == "class":
@@ -223,7 +223,7 @@ def print_judgement(console: Console, judgement: Judgement) -> None:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Compare what a policy does with what a driver did; the last line is the accuracy."""
+    """Compare a policy with a driver's demonstrations; the last line is the accuracy."""
 
     policy: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
     """A policy that `demos train` or `train` wrote."""
@@ -233,7 +233,7 @@ class Evaluate:
     """A page to write, with the worst frames as pictures; the numbers come beside it as JSON."""
 
     def run(self) -> None:
-        """Judge, and print."""
+        """Evaluate and print."""
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.policy import CameraPolicy
         from shapechanger.demos.dataset import load_dataset

@@ -1,4 +1,4 @@
-"""Where pictures come from."""
+"""Camera drivers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every camera driver does, and where each is found."""
+"""Camera interface, frames, and the registry of camera drivers."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ CAMERA_DRIVERS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture.
+    """One frame.
 
     Attributes:
-        jpeg: The picture as JPEG.
-        captured_ns: When it was taken, on the robot's monotonic clock.
+        jpeg: The image as JPEG.
+        captured_ns: Time of capture on the robot's monotonic clock, ns.
     """
 
     jpeg: bytes
@@ -39,15 +39,15 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class CameraPlan:
-    """A camera, as a profile has it.
+    """A camera of a profile.
 
     Attributes:
-        driver: Name of its driver.
+        driver: Name of the driver.
         size: Width and height in pixels.
-        fps: Pictures a second.
+        fps: Frames per second.
         jpeg_quality: 1 to 100.
-        flip: Whether the camera hangs upside down.
-        settings: What the driver needs besides.
+        flip: Whether the camera is mounted upside down.
+        settings: Settings of the driver.
     """
 
     driver: str
@@ -59,18 +59,18 @@ class CameraPlan:
 
 
 class Camera(Protocol):
-    """A source of pictures, read by one thread."""
+    """Source of frames, read by one thread."""
 
     def read(self) -> Frame:
-        """Wait for the next picture.
+        """Wait for the next frame.
 
         Raises:
-            RobotError: If the camera does not give one any more, or gave something else.
+            RobotError: If the camera stopped or its data is not a valid frame.
         """
         ...
 
     def close(self) -> None:
-        """Let go of the camera; a `read` that waits in another thread ends with an error."""
+        """Close the camera; a `read` that waits in another thread raises an error."""
         ...
 
 
@@ -79,7 +79,7 @@ def open_camera(plan: CameraPlan) -> Camera:
 
     Raises:
         UnknownName: If there is no such driver.
-        RobotError: If the camera does not answer.
+        RobotError: If the camera does not respond.
     """
     if plan.driver not in CAMERA_DRIVERS:
         raise UnknownName("camera driver", plan.driver, CAMERA_DRIVERS)
@@ -87,20 +87,20 @@ def open_camera(plan: CameraPlan) -> Camera:
 
 
 class Interruption:
-    """Waits for a descriptor until it is ready, or `set` is called in any thread."""
+    """Wait for a file descriptor, interruptible from any thread."""
 
     def __init__(self) -> None:
         self._read, self._write = os.pipe()
         self._is_set = False
 
     def wait(self, fd: int, at_most_s: float | None = None) -> bool:
-        """Wait until a descriptor can be read.
+        """Wait until a descriptor is readable.
 
         Returns:
-            Whether it can; False after `at_most_s`.
+            Whether it is; False after `at_most_s` seconds.
 
         Raises:
-            RobotError: If `set` was or is called.
+            RobotError: If `set` is or was called.
         """
         poll = select.poll()
         poll.register(fd, select.POLLIN)
@@ -111,22 +111,22 @@ class Interruption:
         return bool(ready)
 
     def set(self) -> None:
-        """End all waiting, now and later."""
+        """Interrupt all waits, now and in the future."""
         if not self._is_set:
             self._is_set = True
             os.write(self._write, b"\0")
 
     def __del__(self) -> None:
-        # Not in `set`: another thread may still wait on them.
+        # Not in `set`: another thread may still be waiting on them.
         os.close(self._read)
         os.close(self._write)
 
 
 class Pace:
-    """So many pictures a second.
+    """Pacing at a fixed rate.
 
     Args:
-        fps: How many.
+        fps: Frames per second.
     """
 
     def __init__(self, fps: float) -> None:
@@ -135,9 +135,9 @@ class Pace:
         self._closed = threading.Event()
 
     def wait(self) -> int:
-        """Wait for the time of the next picture, and return it: nanoseconds, monotonic.
+        """Wait until the next frame is due, and return that time: monotonic, ns.
 
-        One that is late is taken at once, and the rest keeps the rate from there.
+        A late frame is due at once, and the rate continues from there.
 
         Raises:
             RobotError: If the camera is closed.
@@ -150,5 +150,5 @@ class Pace:
         return now_ns
 
     def close(self) -> None:
-        """End all waiting, now and later."""
+        """Interrupt all waits, now and in the future."""
         self._closed.set()

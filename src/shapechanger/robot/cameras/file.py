@@ -1,4 +1,4 @@
-"""A folder of JPEG files in place of a camera, one after the other and again from the start."""
+"""Camera driver that replays a folder of JPEG files in a loop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SUFFIXES: Final = (".jpg", ".jpeg")
 
 
 class Folder:
-    """A camera that sees what is in a folder, in the order of the names; see `Camera`."""
+    """Camera that replays the files of a folder in the order of their names; see `Camera`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         folder = Path(str(plan.settings["path"])).expanduser()
@@ -32,7 +32,7 @@ class Folder:
         self._pace = Pace(plan.fps)
 
     def read(self) -> Frame:
-        """Wait for the next picture; see `Camera.read`. A bad file is named, and then left out."""
+        """Wait for the next frame; see `Camera.read`. A bad file is reported once, then skipped."""
         captured_ns = self._pace.wait()
         file = self._files[self._next]
         self._next = (self._next + 1) % len(self._files)
@@ -46,7 +46,7 @@ class Folder:
         return Frame(jpeg, captured_ns)
 
     def close(self) -> None:
-        """End a `read` that waits."""
+        """Interrupt a waiting `read`."""
         self._pace.close()
 
 

@@ -1,4 +1,4 @@
-"""Whether a picture is one, and a new one."""
+"""JPEG frames: validation, freeze detection, rotation and splitting of streams."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from shapechanger.errors import RobotError
 __all__ = ["MAX_JPEG", "FreezeDetector", "JpegSplitter", "captured_ns_of", "check_jpeg", "turned"]
 
 MAX_JPEG: Final = 4 * 1024 * 1024
-"""Bytes of the largest picture; a larger one is garbage, or a camera set up wrongly."""
+"""Size of the largest frame, bytes."""
 
 
 def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
-    """Make sure that this is a whole JPEG of a size, by its header and its end.
+    """Check that a frame is a complete JPEG of the expected size, by its header and its end.
 
     Args:
-        jpeg: What a camera gave.
+        jpeg: The frame.
         size: Width and height in pixels.
 
     Raises:
-        RobotError: If it is something else.
+        RobotError: If it is not.
     """
     if len(jpeg) > MAX_JPEG:
         raise RobotError(f"The camera gave {len(jpeg)} bytes; a picture has {MAX_JPEG} at most.")
@@ -42,27 +42,27 @@ def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
 
 
 class FreezeDetector:
-    """Notices a camera that hands out the same picture again and again.
+    """Detect a camera that repeats its last frame.
 
-    The noise of a sensor makes each picture differ. One that is the same to the last byte is not
-    new, whatever its time of capture says.
+    Sensor noise makes frames differ, so a frame with the same bytes is not new, whatever its time
+    of capture.
     """
 
     def __init__(self) -> None:
         self._last = b""
 
     def is_new(self, jpeg: bytes) -> bool:
-        """Whether a picture differs from the one before."""
+        """Return whether the frame differs from the previous one."""
         new = jpeg != self._last
         self._last = jpeg
         return new
 
 
 def turned(jpeg: bytes, quality: int) -> bytes:
-    """The picture turned by 180 degrees; it is decoded and encoded again.
+    """Rotate a frame by 180 degrees by decoding and encoding it.
 
     Args:
-        jpeg: A whole JPEG, see `check_jpeg`.
+        jpeg: A complete JPEG, see `check_jpeg`.
         quality: 1 to 100.
     """
     image = simplejpeg.decode_jpeg(jpeg, strict=False)
@@ -74,29 +74,29 @@ _START: Final = b"\xff\xd8"
 _END: Final = 0xD9
 _SCAN: Final = 0xDA
 _WITHOUT_LENGTH: Final = frozenset({0x01, *range(0xD0, 0xD8)})
-# Where coded bytes end: FF and neither a stuffed zero, a restart marker nor another FF.
+# End of coded data: FF not followed by a stuffed zero, a restart marker or another FF.
 _AFTER_SCAN: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 _CAPTURED: Final = re.compile(rb"captured_ns=([0-9]{1,20})")
 _COMMENT: Final = 0xFE
 
 
 class JpegSplitter:
-    """Takes bytes as they come, gives whole pictures."""
+    """Split a byte stream into JPEG frames."""
 
     def __init__(self) -> None:
         self._data = bytearray()
-        self._at = 0  # How far the picture at the start has been looked through.
+        self._at = 0  # Position up to which the first frame has been scanned.
         self._in_scan = False
 
     def feed(self, data: bytes) -> None:
-        """Add bytes."""
+        """Append bytes."""
         self._data += data
 
     def next(self) -> bytes | None:
-        """The next whole picture; None until more bytes come.
+        """Return the next complete frame, or None if more bytes are needed.
 
         Raises:
-            RobotError: If there is garbage; the next call goes on after it.
+            RobotError: If there is garbage; the next call continues after it.
         """
         garbage = self._skip_to_start()
         if garbage:
@@ -120,7 +120,7 @@ class JpegSplitter:
             return 0
         start = self._data.find(_START)
         if start < 0:
-            # Its first byte may be there already.
+            # Its first byte may have arrived already.
             start = len(self._data) - int(self._data.endswith(b"\xff"))
         del self._data[:start]
         return start
@@ -162,7 +162,7 @@ class JpegSplitter:
 
 
 def captured_ns_of(jpeg: bytes) -> int | None:
-    """The time of capture in a comment segment `captured_ns=<whole number>`; None without one."""
+    """Return the time in a comment segment `captured_ns=<integer>`, or None."""
     at = len(_START)
     while at + 4 <= len(jpeg) and jpeg[at] == 0xFF and jpeg[at + 1] != _SCAN:
         end = at + 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")

@@ -1,4 +1,4 @@
-"""A test pattern in place of a camera: it moves, and carries its time of capture as a barcode."""
+"""Camera driver with a moving test pattern that encodes its time of capture as a barcode."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ BARCODE_BITS: Final = 48
 _BYTES: Final = BARCODE_BITS // 8
 _COLUMNS: Final = 32
 _ROWS: Final = 2
-_LEAST_WIDTH: Final = 96  # Pixels: a cell of 3 by 4 is the smallest that JPEG leaves readable.
-_LEAST_CELL_HEIGHT: Final = 4  # Pixels: two rows are then one row of JPEG's blocks of 8.
+_LEAST_WIDTH: Final = 96  # Pixels: 3 by 4 is the smallest cell that survives JPEG.
+_LEAST_CELL_HEIGHT: Final = 4  # Pixels: two rows fill one row of 8-pixel JPEG blocks.
 
-# Black or white pictures are no barcode: the check does not start with 0.
+# The check starts at a value other than 0, so that black or white images are not barcodes.
 _CHECK_START: Final = 0xFFFF
 
 
 def barcode_rows(width: int) -> int:
-    """How many rows of pixels a barcode takes in a picture of this width."""
+    """Return the height of a barcode in an image of this width, pixels."""
     return _ROWS * max(_LEAST_CELL_HEIGHT, width // 40)
 
 
 def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
-    """Draw the lowest 48 bits of a number over the first rows of a picture.
+    """Draw the lowest 48 bits of a number over the first rows of an image.
 
     Args:
-        image: The picture, shape (height, width, 3), at least 96 pixels wide. It is changed.
+        image: The image, shape (height, width, 3), at least 96 pixels wide; changed in place.
         number: At least 0.
 
     Raises:
-        ValueError: If the picture is too small, or the number is negative.
+        ValueError: If the image is too small or the number is negative.
     """
     height, width = image.shape[:2]
     rows = barcode_rows(width)
@@ -58,10 +58,10 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
 
 
 def read_barcode(image: NDArray[np.uint8]) -> int | None:
-    """The number that `draw_barcode` drew; None where there is none.
+    """Read the number that `draw_barcode` drew; None if there is none.
 
     Args:
-        image: The picture, shape (height, width, 3).
+        image: The image, shape (height, width, 3).
     """
     height, width = image.shape[:2]
     rows = barcode_rows(width)
@@ -79,7 +79,7 @@ def read_barcode(image: NDArray[np.uint8]) -> int | None:
 
 
 class Pattern:
-    """A camera that sees colours drifting by; see `Camera`."""
+    """Camera with drifting colours; see `Camera`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         self._width, self._height = plan.size
@@ -92,7 +92,7 @@ class Pattern:
         self._pace = Pace(plan.fps)
 
     def read(self) -> Frame:
-        """Wait for the next picture; see `Camera.read`."""
+        """Wait for the next frame; see `Camera.read`."""
         captured_ns = self._pace.wait()
         image = self._drawn(captured_ns)
         draw_barcode(image, captured_ns)
@@ -100,11 +100,11 @@ class Pattern:
         return Frame(jpeg, captured_ns)
 
     def close(self) -> None:
-        """End a `read` that waits."""
+        """Interrupt a waiting `read`."""
         self._pace.close()
 
     def _drawn(self, captured_ns: int) -> NDArray[np.uint8]:
-        shift = captured_ns // 20_000_000  # 50 pixels a second.
+        shift = captured_ns // 20_000_000  # 50 pixels per second.
         across = np.arange(self._width) + shift
         down = np.arange(self._height)[:, np.newaxis]
         image = np.empty((self._height, self._width, 3), np.uint8)
@@ -115,5 +115,5 @@ class Pattern:
 
 
 def open_driver(plan: CameraPlan) -> Pattern:
-    """Open the test pattern; it has no settings, and is never upside down."""
+    """Open the test pattern, which has no settings and ignores `flip`."""
     return Pattern(plan)

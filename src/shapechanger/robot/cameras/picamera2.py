@@ -1,7 +1,7 @@
-"""The Raspberry Pi's camera over picamera2, which comes with the system and not from PyPI.
+"""Camera driver for the Raspberry Pi's camera over picamera2, a system package.
 
-It was run against a recording fake only, and never on a camera. Names and meanings: picamera2's
-source and manual (The Picamera2 Library, sections 4 and 6).
+Tested against a recording fake only, not on a camera. Sources: picamera2's code and manual (The
+Picamera2 Library, sections 4 and 6).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
 __all__ = ["PiCamera", "open_driver"]
 
-_SILENT_S: Final = 2.0  # Some camera stacks stop without a word (picamera2#1004); this one says so.
+_SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 
-# The name is that of a word in memory: "BGR888" is red, green, blue byte by byte, as we want it.
+# The name describes a word in memory: "BGR888" is red, green, blue in byte order.
 _FORMAT: Final = "BGR888"
 
 
 class PiCamera:
-    """A camera on the Pi's own connector; see `Camera`."""
+    """Camera on the Pi's own connector; see `Camera`."""
 
     def __init__(self, plan: CameraPlan, camera: Any, transform: Any) -> None:
         self._plan = plan
         self._camera = camera
-        self._lock = threading.Lock()  # `close` waits until a `read` has its picture.
+        self._lock = threading.Lock()  # `close` waits for a `read` in progress.
         self._closed = False
         period_us = round(1e6 / plan.fps)
         try:
@@ -37,7 +37,7 @@ class PiCamera:
                 camera.create_video_configuration(
                     main={"size": plan.size, "format": _FORMAT},
                     transform=transform,
-                    # Never the picture from before the call (picamera2#787).
+                    # Never a frame from before the call (picamera2#787).
                     queue=False,
                     controls={"FrameDurationLimits": (period_us, period_us)},
                 )
@@ -48,7 +48,7 @@ class PiCamera:
             raise RobotError(f"The Pi's camera does not start: {error}.") from error
 
     def read(self) -> Frame:
-        """Wait for the next picture; see `Camera.read`."""
+        """Wait for the next frame; see `Camera.read`."""
         with self._lock:
             if self._closed:
                 raise RobotError("The camera is closed.")
@@ -74,7 +74,7 @@ class PiCamera:
         return Frame(simplejpeg.encode_jpeg(image, quality, colorsubsampling="420"), captured_ns)
 
     def close(self) -> None:
-        """Stop the camera; a `read` that waits gets its picture first, or its error."""
+        """Stop the camera after a `read` in progress."""
         with self._lock:
             if not self._closed:
                 self._closed = True

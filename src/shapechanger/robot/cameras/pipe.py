@@ -1,9 +1,8 @@
-"""A stream of JPEG pictures from a named pipe, a file or a program, such as rpicam-vid or ffmpeg.
+"""Camera driver for a JPEG stream from a named pipe, a file or a program such as rpicam-vid.
 
-Where a picture says in a comment segment when it was taken (`captured_ns=`, monotonic), that is its
-time; otherwise it is when its last byte was read, which hides the delay of the source. So that
-pictures that have waited in the pipe do not look new, the pipe is emptied before one of these is
-given.
+A frame may carry its time of capture in a comment segment (`captured_ns=`, monotonic). Otherwise
+its time is that of its last byte, which hides the delay of the source; so that frames that waited
+in the pipe do not look new, the pipe is drained first.
 """
 
 from __future__ import annotations
@@ -21,15 +20,15 @@ from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, check_
 
 __all__ = ["Pipe", "open_driver"]
 
-_CHUNK: Final = 64 * 1024  # Bytes; as many as a pipe of Linux holds.
-_MOST_WAITING: Final = 1 << 20  # Bytes; the largest pipe that Linux gives without privileges.
+_CHUNK: Final = 64 * 1024  # Bytes; the default capacity of a Linux pipe.
+_MOST_WAITING: Final = 1 << 20  # Bytes; the largest capacity of a pipe without privileges.
 _PROGRAM_ENDS_S: Final = 2.0
 
 
 class Pipe:
-    """A camera at the other end of a pipe; see `Camera`.
+    """Camera at the other end of a pipe; see `Camera`.
 
-    Of several pictures that have been read, the newest is given, except from a file.
+    Of several buffered frames the newest is returned, except from a file.
     """
 
     def __init__(self, plan: CameraPlan) -> None:
@@ -46,7 +45,7 @@ class Pipe:
         self._live = not stat.S_ISREG(os.fstat(self._fd).st_mode)
 
     def read(self) -> Frame:
-        """Wait for the next picture; see `Camera.read`. After garbage the next call goes on."""
+        """Wait for the next frame; see `Camera.read`. After garbage, the next call continues."""
         jpeg: bytes | None = self._splitter.next()
         while jpeg is None:
             self._feed()
@@ -65,7 +64,7 @@ class Pipe:
         return Frame(jpeg, arrived_ns if captured_ns is None else captured_ns)
 
     def close(self) -> None:
-        """End a `read` that waits, and the program."""
+        """Interrupt a waiting `read`, and end the program."""
         self._interruption.set()
         if self._program is not None and self._program.poll() is None:
             self._program.terminate()
@@ -76,7 +75,7 @@ class Pipe:
                 self._program.wait()
 
     def __del__(self) -> None:
-        # Not in `close`: a `read` in another thread may still wait on it.
+        # Not in `close`: a `read` in another thread may still be waiting on it.
         if self._fd is not None:
             os.close(self._fd)
 
@@ -94,7 +93,7 @@ class Pipe:
                 os.close(its_end)
             os.set_blocking(fd, False)
             return fd
-        # A named pipe would otherwise wait for its writer here.
+        # Opening a named pipe would otherwise block until it has a writer.
         return os.open(os.path.expanduser(self._path), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
 
     def _newest(self, jpeg: bytes) -> bytes:
@@ -103,7 +102,7 @@ class Pipe:
         return jpeg
 
     def _take_waiting(self) -> int:
-        """Take in what waits in the pipe; how many bytes that were, 0 also at its end."""
+        """Read what waits in the pipe and return its size in bytes; 0 also at the end."""
         if not self._live or self._fd is None:
             return 0
         try:
@@ -120,14 +119,14 @@ class Pipe:
         try:
             data = os.read(self._fd, _CHUNK)
         except BlockingIOError:
-            return  # Somebody else has read it; a named pipe may have several readers.
+            return  # Another reader took it; a named pipe may have several.
         if not data:
             self._start_again()
             raise RobotError(f"The stream of {self._path} has ended.")
         self._splitter.feed(data)
 
     def _start_again(self) -> None:
-        # The next read opens the pipe afresh and waits for its next writer.
+        # The next read reopens the pipe and waits for its next writer.
         self._splitter = JpegSplitter()
         if self._program is None and self._live and self._fd is not None:
             os.close(self._fd)
@@ -135,5 +134,5 @@ class Pipe:
 
 
 def open_driver(plan: CameraPlan) -> Pipe:
-    """Open the stream `path`: a named pipe, a file or, after a `|`, a program and its arguments."""
+    """Open the stream at `path`: a pipe, a file, or a program with arguments after `|`."""
     return Pipe(plan)

@@ -1,6 +1,6 @@
-"""A webcam with JPEG pictures, over the kernel's Video4Linux2 and nothing else.
+"""Camera driver for a JPEG webcam over Video4Linux2.
 
-It was run against a fake of the kernel's calls only, and never on a camera.
+Tested against a fake of the kernel's calls only, not on a camera.
 """
 
 from __future__ import annotations
@@ -66,15 +66,15 @@ _REQUEST: Final = struct.Struct("=III8x")  # struct v4l2_requestbuffers, 20 byte
 
 @dataclass(frozen=True, slots=True)
 class Buffer:
-    """What the kernel says of a buffer.
+    """State of a kernel buffer (struct v4l2_buffer).
 
     Attributes:
-        index: Its number.
-        used: Bytes of the picture in it.
-        flags: What it says of its time and of errors.
-        at_ns: When the picture was taken.
-        offset: Where it is, for mmap.
-        length: Its size in bytes.
+        index: Number of the buffer.
+        used: Size of its frame, bytes.
+        flags: Kind of its timestamp, and errors.
+        at_ns: Time of capture, ns.
+        offset: Offset for mmap.
+        length: Size of the buffer, bytes.
     """
 
     index: int
@@ -85,7 +85,7 @@ class Buffer:
     length: int = 0
 
     def pack(self) -> bytearray:
-        """As the kernel takes it."""
+        """Encode for the kernel."""
         seconds, rest_ns = divmod(self.at_ns, 1_000_000_000)
         return bytearray(
             _BUFFER.pack(
@@ -107,7 +107,7 @@ class Buffer:
 
     @classmethod
     def unpack(cls, data: bytes | bytearray) -> Buffer:
-        """As the kernel gives it."""
+        """Decode from the kernel."""
         index, _, used, flags, _, seconds, microseconds, _, _, offset, length, _, _ = (
             _BUFFER.unpack(data)
         )
@@ -116,34 +116,34 @@ class Buffer:
 
 
 def pixel_format(width: int, height: int) -> bytearray:
-    """JPEG pictures of a size."""
+    """Return a request for JPEG frames of a size."""
     return bytearray(_FORMAT.pack(CAPTURE, width, height, MJPEG, _FIELD_NONE))
 
 
 def image_size(data: bytes | bytearray) -> tuple[int, int, int]:
-    """Width, height and pixel format that the camera has taken."""
+    """Return width, height and pixel format as accepted by the camera."""
     _, width, height, kind, _ = _FORMAT.unpack(data)
     return width, height, kind
 
 
 def frame_rate(fps: float) -> bytearray:
-    """So many pictures a second."""
+    """Pacing at a fixed rate."""
     return bytearray(_PARAMETERS.pack(CAPTURE, 1000, round(fps * 1000)))
 
 
 def request(buffers: int) -> bytearray:
-    """So many buffers."""
+    """Return a request for a number of buffers."""
     return bytearray(_REQUEST.pack(buffers, CAPTURE, _MEMORY_MMAP))
 
 
 _BUFFERS: Final = 3
-_SILENT_S: Final = 5.0  # A camera that gives nothing for so long hangs.
+_SILENT_S: Final = 5.0  # Time after which a silent camera counts as hung.
 
 Ioctl = Callable[[int, int, Any], int]
 
 
 class V4l2:
-    """A webcam; see `Camera`. Of several pictures that are ready, the newest is given."""
+    """Webcam; see `Camera`. Of several ready frames the newest is returned."""
 
     def __init__(self, plan: CameraPlan, ioctl: Ioctl = fcntl.ioctl) -> None:
         if struct.calcsize("P") != 8:
@@ -161,7 +161,7 @@ class V4l2:
             raise RobotError(f"The camera {self._device} does not answer: {error}.") from error
 
     def read(self) -> Frame:
-        """Wait for the next picture; see `Camera.read`."""
+        """Wait for the next frame; see `Camera.read`."""
         if not self._interruption.wait(self._fd, _SILENT_S):
             raise RobotError(f"The camera {self._device} has given nothing for {_SILENT_S:g} s.")
         try:
@@ -174,15 +174,15 @@ class V4l2:
         return Frame(jpeg, captured_ns)
 
     def close(self) -> None:
-        """End a `read` that waits."""
+        """Interrupt a waiting `read`."""
         self._interruption.set()
 
     def __del__(self) -> None:
-        # Not in `close`: a `read` in another thread may still look at a buffer.
+        # Not in `close`: a `read` in another thread may still use a buffer.
         for buffer in self._buffers:
             buffer.close()
         if self._fd >= 0:
-            os.close(self._fd)  # The kernel stops the camera then.
+            os.close(self._fd)  # This stops the camera.
 
     def _start(self) -> None:
         wanted = pixel_format(*self._plan.size)
@@ -224,7 +224,7 @@ class V4l2:
             buffer = Buffer.unpack(data)
             if not buffer.flags & BUFFER_FLAG_ERROR:
                 monotonic = buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
-                # Cameras fill up with zeros after the end of a picture.
+                # Cameras pad frames with zeros.
                 jpeg = self._buffers[buffer.index][: buffer.used].rstrip(b"\0")
                 newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()
             self._ioctl(self._fd, QUEUE, data)

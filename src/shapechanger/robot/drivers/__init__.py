@@ -1,4 +1,4 @@
-"""What speaks to the pins and buses: outputs and sensors."""
+"""Drivers of outputs and sensors, one module per chip."""
 
 from __future__ import annotations
 

@@ -36,19 +36,19 @@ _MAGNET_DETECTED: Final = 0x20
 _TOO_WEAK: Final = 0x10
 _TOO_STRONG: Final = 0x08
 
-# So many readings in a row a joint may be missing until the sensor fails, as for a servo on the
-# servo bus: 50 ms of a guard's ticks. Chosen: one disturbed transfer must not drop a finger.
+# Consecutive missed readings of a joint before the sensor fails, as for a servo on the servo bus:
+# 50 ms of a guard's ticks. Chosen so that one disturbed transfer does not release a finger.
 _MOST_MISSED: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
 class JointEncoder:
-    """The encoder of one joint.
+    """Encoder of one joint.
 
     Attributes:
         joint: Name of the joint.
-        channel: Of the multiplexer, 0 to 7.
-        zero: Counts while the joint is straight, 0 to 4095.
+        channel: Channel of the multiplexer, 0 to 7.
+        zero: Counts with a straight joint, 0 to 4095.
         direction: 1 if the counts rise with the angle, -1 if they fall.
     """
 
@@ -58,7 +58,7 @@ class JointEncoder:
     direction: int
 
     def angle(self, counts: int) -> float:
-        """The angle for some counts, rad, within half a turn around the zero."""
+        """Convert counts to an angle, rad, within half a turn of the zero."""
         half = COUNTS_PER_TURN // 2
         turned = (counts - self.zero + half) % COUNTS_PER_TURN - half
         return self.direction * turned * 2.0 * math.pi / COUNTS_PER_TURN
@@ -66,11 +66,11 @@ class JointEncoder:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What an encoder says.
+    """Reading of an encoder.
 
     Attributes:
-        counts: Its raw angle, 0 to 4095.
-        detects_magnet: Whether there is a magnet; the counts mean nothing without.
+        counts: Raw angle, 0 to 4095.
+        detects_magnet: Whether there is a magnet; without one the counts are meaningless.
         too_weak: Whether the magnet is too far away.
         too_strong: Whether it is too near.
     """
@@ -82,16 +82,16 @@ class Measured:
 
 
 class As5600:
-    """The encoders of some joints; see `SensorDriver`.
+    """Encoders of several joints; see `SensorDriver`.
 
     Args:
         bus: The I2C bus.
         mux: Address of the multiplexer.
-        encoders: One for each joint.
-        words: What the multiplexer is called in a sentence.
+        encoders: One encoder per joint.
+        words: Description of the multiplexer for messages.
 
     Attributes:
-        encoders: One for each joint.
+        encoders: One encoder per joint.
     """
 
     def __init__(
@@ -104,10 +104,10 @@ class As5600:
         self.encoders = encoders
 
     def measure(self, encoder: JointEncoder) -> Measured:
-        """Ask one encoder.
+        """Read one encoder.
 
         Raises:
-            RobotError: If it or the multiplexer does not answer.
+            RobotError: If it or the multiplexer does not respond.
         """
         with in_words(self._words):
             self._bus.write_byte(self._mux, 1 << encoder.channel)
@@ -121,10 +121,10 @@ class As5600:
         )
 
     def counts(self, encoder: JointEncoder) -> int:
-        """The raw angle of one encoder, 0 to 4095.
+        """Return the raw angle of one encoder, 0 to 4095.
 
         Raises:
-            RobotError: If it or the multiplexer does not answer, or it detects no magnet.
+            RobotError: If it or the multiplexer does not respond, or it detects no magnet.
         """
         measured = self.measure(encoder)
         if not measured.detects_magnet:
@@ -134,15 +134,15 @@ class As5600:
         return measured.counts
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """The angle of each joint, such as `MCP_flexion/angle`, rad, -pi to pi around its zero.
+        """Return each joint's angle, such as `MCP_flexion/angle`, rad, -pi to pi around its zero.
 
-        A joint that is missing now is left out.
+        Joints without a reading are omitted.
 
         Raises:
-            RobotError: If a joint was missing in several readings in a row, and why.
+            RobotError: If a joint was missing in several consecutive readings.
         """
         said: dict[str, float] = {}
-        failures: dict[str, None] = {}  # A multiplexer that is gone is said once.
+        failures: dict[str, None] = {}  # A missing multiplexer is reported once.
         for encoder in self.encoders:
             try:
                 counts = self.counts(encoder)
@@ -158,15 +158,15 @@ class As5600:
         return said
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         self._bus.close()
 
 
 def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """The encoders, of which none has been asked yet.
+    """Return the encoders without reading them.
 
     Args:
-        plan: Its settings are `bus`, `mux`, and of each joint its name, channel, zero and direction
+        plan: Has the settings `bus` and `mux`, and name, channel, zero and direction of each joint
             in `joints`, `channels`, `zeros` and `directions`.
         hardware: Where the bus is.
 
@@ -183,7 +183,7 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """Open the sensor, and ask each encoder once; see `connect_encoders`."""
+    """Open the sensor and read each encoder once; see `connect_encoders`."""
     sensor = connect_encoders(plan, hardware)
     try:
         for encoder in sensor.encoders:

@@ -1,4 +1,4 @@
-"""The temperature of the computer itself, as the kernel tells it."""
+"""CPU temperature from the kernel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PERIOD_NS: Final = 1_000_000_000
 
 
 class CpuTemperature:
-    """The temperature in a file of the kernel; see `SensorDriver`."""
+    """Temperature in a kernel file; see `SensorDriver`."""
 
     def __init__(self, path: Path, name: str) -> None:
         self._path = path
@@ -25,25 +25,25 @@ class CpuTemperature:
         self._celsius = self._measure()
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """The "temperature" in degrees Celsius, measured once a second."""
+        """Return the "temperature" in degrees Celsius, updated once a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
             self._celsius = self._measure()
             self._read_ns = now_ns
         return {"temperature": self._celsius}
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing: no file stays open."""
 
     def _measure(self) -> float:
         with in_words(self._name):
             written = self._path.read_text()
         try:
-            # Thousandths of a degree: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
+            # Millidegrees: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
             return int(written) / 1000.0
         except ValueError as error:
             raise RobotError(f"{self._name} says {written!r} at {self._path}.") from error
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> CpuTemperature:
-    """Open the file; its `path` is the one setting."""
+    """Open the file at `path`, the only setting."""
     return CpuTemperature(Path(text(plan.settings, "path")), f"Sensor {plan.name!r}")

@@ -7,21 +7,21 @@ import threading
 from collections import deque
 from typing import Any, Final
 
-from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 __all__ = ["Encoder", "open_driver"]
 
-# How long without an edge until the wheel stands.
+# Time without an edge after which the wheel counts as standing.
 _STANDS_AFTER_S: Final = 0.5
 
-# Four edges a count, so that the unequal lengths of a count's four quarters even out.
+# A count has four edges; whole counts even out their unequal lengths.
 _EDGES_PER_COUNT: Final = 4
 
 # Step of the position from one state of (a, b) to the next, forward when a leads: 00, 10, 11, 01.
-# Missing: no change, or two at once, which says nothing about the direction.
+# Missing: no change, or two at once, which leaves the direction unknown.
 _STEPS: Final = {
     (0b00, 0b10): 1,
     (0b10, 0b11): 1,
@@ -35,17 +35,17 @@ _STEPS: Final = {
 
 
 class Encoder:
-    """An encoder with one channel or two; see `SensorDriver`.
+    """Encoder with one or two channels; see `SensorDriver`.
 
-    With two channels (quadrature) it knows the direction, and each edge is a quarter of a count.
-    With one, rising edges are counts, and the direction is that of the propulsion.
+    With two channels (quadrature) it measures the direction, and each edge is a quarter of a count.
+    With one, each rising edge is a count, and the direction is that of the propulsion.
     """
 
     def __init__(self, a: int, b: int | None, count_m: float, factory: Any, name: str) -> None:
         self._name = name
         self._two_channels = b is not None
         self._edge_m = count_m / _EDGES_PER_COUNT if self._two_channels else count_m
-        self._lock = threading.Lock()  # lgpio calls back from a thread of its own.
+        self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._state = 0
         self._edges: deque[tuple[float, int]] = deque(
             maxlen=_EDGES_PER_COUNT + 1 if self._two_channels else 2
@@ -63,7 +63,7 @@ class Encoder:
             self._state = levels[0] << 1 | levels[-1] if self._two_channels else levels[0]
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """The "speed" in m/s, positive forward."""
+        """Return the "speed" in m/s, positive forward."""
         with self._lock:
             edges, count = list(self._edges), self._count
         if direction != 0.0:
@@ -72,7 +72,7 @@ class Encoder:
             self._count_read, self._last_edge_ns = count, now_ns
             self._speed = self._speed_from(edges)
         else:
-            # The next edge has not come yet, so the wheel turns at most this fast.
+            # The next edge is not here yet, which bounds the speed.
             since_s = (now_ns - self._last_edge_ns) / 1e9
             if since_s > _STANDS_AFTER_S:
                 self._speed = 0.0
@@ -82,7 +82,7 @@ class Encoder:
         return {"speed": self._speed if self._two_channels else self._speed * self._sign}
 
     def close(self) -> None:
-        """Let go of the pins."""
+        """Close the pins."""
         for one in self._inputs:
             one.close()
 
@@ -111,7 +111,7 @@ class Encoder:
             self._add(at_s, step)
 
     def _add(self, at_s: float, step: int) -> None:
-        # What was before a turn back, or a stop, says nothing about the speed now.
+        # Edges before a reversal or a stop do not count towards the current speed.
         if self._edges:
             before_s, before_step = self._edges[-1]
             if step != before_step or at_s - before_s > _STANDS_AFTER_S:

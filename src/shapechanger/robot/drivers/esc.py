@@ -1,4 +1,4 @@
-"""A speed controller (ESC): a motor that understands servo pulses, with habits of its own."""
+"""Electronic speed controllers (ESC), driven by servo pulses."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _REVERSES: Final = ("direct", "double", "none")
 
 
 class Esc:
-    """A speed controller; see `OutputDriver`.
+    """Electronic speed controller; see `OutputDriver`.
 
-    It obeys only after it has seen neutral for a while, so nothing else is sent until then. A car's
-    controller brakes at the first pulse below neutral, and reverses at the second one: `reverse`
-    "double" sends brake, neutral and reverse in a row. A pulse at neutral or above is sent at once.
+    It arms after some time at neutral, until which only neutral is sent. A car's controller brakes
+    at the first pulse below neutral and reverses at the second: `reverse` "double" sends brake,
+    neutral and reverse in sequence. Pulses at neutral or above are sent at once.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Esc:
         self._send(0.0)
 
     def write(self, value: float, now_ns: int) -> float:
-        """Drive, and say how much; see `OutputDriver.write`."""
+        """Write a throttle and return the applied one; see `OutputDriver.write`."""
         if self._neutral_since_ns is None:
             self._neutral_since_ns = now_ns
         if now_ns - self._neutral_since_ns < self._arm_ns:
@@ -54,18 +54,18 @@ class Esc:
             return self._backward(value, now_ns)
         self._backward_since_ns = None
         if value > 0.0:
-            self._reverses = False  # It has gone forward, so it will brake first.
+            self._reverses = False  # After forward motion it brakes first.
         return self._send(value)
 
     def release(self) -> None:
-        """No pulse; the controller must see neutral again before it obeys."""
+        """Stop the pulses; the controller then has to see neutral again."""
         self._neutral_since_ns = self._backward_since_ns = None
         self._reverses = False
         with in_words(self._name):
             self._channel.release()
 
     def close(self) -> None:
-        """No pulse, and let go of the channel."""
+        """Stop the pulses and close the channel."""
         with in_words(self._name):
             self._channel.close()
 
@@ -79,7 +79,7 @@ class Esc:
         since_ns = now_ns - self._backward_since_ns
         if since_ns < self._brake_ns:
             self._send(value)
-            return 0.0  # It brakes, and does not go backward.
+            return 0.0  # It brakes and does not reverse.
         if since_ns < 2 * self._brake_ns:
             return self._send(0.0)
         self._reverses = True
@@ -88,12 +88,12 @@ class Esc:
     def _send(self, value: float) -> float:
         with in_words(self._name):
             width_us = self._channel.write_us(self._pulses.width_us(value))
-        # Neutral is neutral, also where a step of the pulses is a little beside it.
+        # Neutral reads as 0, even if the pulse steps do not hit it exactly.
         return self._pulses.value(width_us) if value else 0.0
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> Esc:
-    """Open the controller; it gets neutral.
+    """Open the controller at neutral.
 
     The settings are those of `open_pulse_channel`, `backward_us`, `neutral_us` and `forward_us` (at
     -1, 0 and 1), `arm_s` (neutral before it obeys), `reverse` ("direct", "double" or "none") and

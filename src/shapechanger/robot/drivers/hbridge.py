@@ -1,7 +1,7 @@
-"""A motor on an H-bridge with two inputs, such as L298N, DRV8833 or TB6612FNG.
+"""Motors on an H-bridge with two inputs, such as L298N, DRV8833 or TB6612FNG.
 
-One input turns it forward, the other one backward, each by its share of time (PWM). Some boards
-have a third input that enables both.
+One input turns the motor forward, the other backward, each with PWM. Some boards have a third input
+that enables both.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from contextlib import ExitStack
 
 from gpiozero import DigitalOutputDevice, Motor
 
-from shapechanger.robot.drivers.gpio import Duty
+from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
@@ -20,10 +20,10 @@ __all__ = ["HBridge", "open_driver"]
 
 
 class HBridge:
-    """A motor that goes forward and backward; see `OutputDriver`.
+    """Bidirectional motor; see `OutputDriver`.
 
-    Never both inputs are on: `Motor` turns the one off before it turns the other one on, and on a
-    Pi `LowAtOncePin` makes that off take effect at once.
+    The inputs are never on together: `Motor` turns one off before it turns the other on, and on a
+    Pi `LowAtOncePin` makes that immediate.
     """
 
     def __init__(
@@ -37,10 +37,10 @@ class HBridge:
         self.write(0.0, 0)
 
     def write(self, value: float, now_ns: int) -> float:
-        """Turn the motor, and say how fast; see `OutputDriver.write`."""
+        """Write a speed and return the applied one; see `OutputDriver.write`."""
         drive = math.copysign(self._duty.of(value), value)
         if drive != self._written:
-            self._written = None  # What fails may have taken effect all the same.
+            self._written = None  # A failed write may still have taken effect.
             with in_words(self._name):
                 if drive:
                     self._motor.value = drive
@@ -52,7 +52,7 @@ class HBridge:
         return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
 
     def release(self) -> None:
-        """Both inputs low and the bridge disabled: the motor runs out."""
+        """Set both inputs low and disable the bridge, so that the motor coasts."""
         self._written = None
         with in_words(self._name):
             try:
@@ -62,7 +62,7 @@ class HBridge:
                 self._stop()
 
     def close(self) -> None:
-        """Both inputs low; see `LowAtOncePin.close` for what the pins do then."""
+        """Set both inputs low; see `LowAtOncePin.close` for the pins afterwards."""
         if self._motor.closed:
             return
         with in_words(self._name), ExitStack() as stack:
@@ -72,7 +72,7 @@ class HBridge:
             self.release()
 
     def _stop(self) -> None:
-        # Unlike `Motor.stop`, one input goes low also when the other one fails.
+        # Unlike in `Motor.stop`, one input goes low even if the other fails.
         try:
             self._motor.forward_device.off()
         finally:
@@ -80,7 +80,7 @@ class HBridge:
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> HBridge:
-    """Open the motor; it stands.
+    """Open the motor at rest.
 
     The settings are the BCM pins `forward`, `backward` and `enable` (-1 for none), `pwm_hz`,
     `start` and `full` (see `Duty`).
@@ -94,7 +94,7 @@ def open_driver(plan: OutputPlan, hardware: Hardware) -> HBridge:
         factory = hardware.pin_factory()
         enabling = None
         if enable >= 0:
-            # Ours and not that of `Motor`, which would be on before anything is written.
+            # Not the one of `Motor`, which would be on before the first write.
             enabling = undo.enter_context(DigitalOutputDevice(enable, pin_factory=factory))
         motor = undo.enter_context(Motor(forward, backward, pin_factory=factory))
         for device in (motor.forward_device, motor.backward_device):

@@ -1,4 +1,4 @@
-"""The distance sensor HC-SR04: an echo as long as the sound travels.
+"""Ultrasonic distance sensor HC-SR04.
 
 Times and ranges: ElecFreaks, HC-SR04 ultrasonic ranging module, user guide. Its echo has 5 V; a Pi
 takes 3.3 V, so a divider is needed.
@@ -13,41 +13,41 @@ from typing import Any, Final
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 __all__ = ["Hcsr04", "open_driver"]
 
-_TRIGGER_S: Final = 10e-6  # A pulse of 10 us starts a ping.
+_TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
-_MOST_MISSED: Final = 3  # Pings without an echo: about 200 ms, or 0.2 m at 1 m/s.
+_MOST_MISSED: Final = 3  # Pings without an echo before it fails: about 200 ms, or 0.2 m at 1 m/s.
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 
 class Hcsr04:
-    """A distance sensor; see `SensorDriver`. It never waits for an echo: the next read has it."""
+    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
 
     def __init__(self, trigger: int, echo: int, max_m: float, factory: Any, name: str) -> None:
         self._name = name
         self._max_m = max_m
         self._ticks_diff = factory.ticks_diff
-        self._lock = threading.Lock()  # lgpio calls back from a thread of its own.
+        self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._rise: float | None = None
         self._echo_s: float | None = None
-        self._answered = False  # Whether the line has moved since the last read.
+        self._answered = False  # Whether the line has changed since the last read.
         self._distance_m: float | None = None
         self._pinged_ns: int | None = None
-        self._unanswered = 0  # Pings since the line has moved.
+        self._unanswered = 0  # Pings since the line changed.
         self._trigger = DigitalOutputDevice(trigger, pin_factory=factory)
         self._echo = EdgeInput(echo, "down", factory, self._changed)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """The "distance" in m, at most `max_m`; nothing before the first echo.
+        """Return the "distance" in m, at most `max_m`; empty before the first echo.
 
         Raises:
-            RobotError: If three pings in a row had no answer: what was seen before them is old.
+            RobotError: If three consecutive pings had no echo, so that the last distance is old.
         """
         with self._lock:
             echo_s, self._echo_s = self._echo_s, None
@@ -66,14 +66,17 @@ class Hcsr04:
         return {} if self._distance_m is None else {"distance": self._distance_m}
 
     def close(self) -> None:
-        """Let go of the pins."""
+        """Close the pins."""
         self._trigger.close()
         self._echo.close()
 
     def _ping(self) -> None:
         with in_words(self._name):
             self._trigger.on()
-            time.sleep(_TRIGGER_S)
+            # Spin: the shortest sleep takes several times as long, and the guard waits for it.
+            end_ns = time.perf_counter_ns() + _TRIGGER_NS
+            while time.perf_counter_ns() < end_ns:
+                pass
             self._trigger.off()
 
     def _changed(self, at_s: float, level: int) -> None:
@@ -89,8 +92,8 @@ class Hcsr04:
 def open_driver(plan: SensorPlan, hardware: Hardware) -> Hcsr04:
     """Open the sensor.
 
-    The settings are the BCM pins `trigger` and `echo`, and `max_m`: what it says when nothing is
-    near.
+    The settings are the BCM pins `trigger` and `echo`, and `max_m`, the distance without an
+    obstacle.
     """
     settings = plan.settings
     name = f"Sensor {plan.name!r}"

@@ -1,4 +1,4 @@
-"""The voltage sensor INA219 over I2C.
+"""Voltage sensor INA219 over I2C.
 
 Registers: Texas Instruments, INA219 data sheet, SBOS448G, section 8.6.
 """
@@ -18,11 +18,11 @@ _BUS_VOLTAGE: Final = 0x02
 _CONTINUOUS_32_V: Final = (0x39, 0x9F)  # The value at power-up: 0x399F.
 _V_PER_STEP: Final = 0.004
 _STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
-_PERIOD_NS: Final = 100_000_000  # A battery is slow; the bus has better things to do.
+_PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shared.
 
 
 class Ina219:
-    """A voltage sensor; see `SensorDriver`."""
+    """Voltage sensor; see `SensorDriver`."""
 
     def __init__(self, bus: I2cBus, address: int, name: str) -> None:
         self._bus = bus
@@ -34,7 +34,7 @@ class Ina219:
             bus.write_i2c_block_data(address, _CONFIGURATION, _CONTINUOUS_32_V)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """The voltage of the "battery" in V, measured ten times a second."""
+        """Return the voltage of the "battery" in V, updated ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
             with in_words(self._name):
                 high, low = self._bus.read_i2c_block_data(self._address, _BUS_VOLTAGE, 2)
@@ -43,7 +43,7 @@ class Ina219:
         return {"battery": self._volts}
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         self._bus.close()
 
 

@@ -1,15 +1,14 @@
-"""The pins of a Raspberry Pi over lgpio, made to be low at once, and to stay low.
+"""Pins of a Raspberry Pi over lgpio that go low immediately and stay low.
 
-What lgpio does by itself, from the source of its transmitting thread (lg 0.2.2, `lgPthTx.c` and
+Behaviour of lgpio, from the source of its transmitting thread (lg 0.2.2, `lgPthTx.c` and
 `xSetAsPwm` in `lgGpio.c`):
 
-* A new duty cycle, 0 too, acts from the next cycle on: up to 20 ms late at 50 Hz. The cycles of two
-  pins begin at different times, so both inputs of an H-bridge could be high for a while.
-* Ending PWM (`tx_pwm` with 0 Hz) forgets the pin without writing it: it keeps the level of that
-  moment.
+* A new duty cycle, including 0, takes effect in the next cycle, up to 20 ms late at 50 Hz. Cycles
+  of two pins start at different times, so both inputs of an H-bridge could be high for a while.
+* Ending PWM (`tx_pwm` with 0 Hz) releases the pin without writing it: it keeps its current level.
 
-After a duty of 0 was asked for, the thread never writes a 1 again. So writing a plain 0 after it
-makes the pin low at once.
+After a duty of 0 the thread never writes a 1 again, so writing a plain 0 then makes the pin low
+immediately.
 """
 
 from __future__ import annotations
@@ -26,13 +25,13 @@ _MOST_CHIPS: Final = 32
 
 
 class LowAtOncePin(LGPIOPin):
-    """A pin that is low as soon as it is told so."""
+    """Pin that goes low immediately."""
 
     def close(self) -> None:
-        """Leave an output an output, at its level; one with PWM goes low first.
+        """Keep an output an output at its level; one with PWM goes low first.
 
-        gpiozero would make it an input, which floats where no resistor pulls it. An output is
-        freed when the chip is closed; the kernel then keeps its level, or, with
+        gpiozero would make it an input, which floats without a pull resistor. An output is freed
+        when the chip is closed; the kernel then keeps its level or, with
         `dtparam=strict_gpiod`, makes it an input.
         """
         if self.factory._handle is None or self.function != "output":
@@ -41,7 +40,7 @@ class LowAtOncePin(LGPIOPin):
             self.frequency = None
 
     def output_with_state(self, state: bool) -> None:
-        """Become an output at this level; gpiozero's would be low for a moment first."""
+        """Become an output at this level, without gpiozero's short low pulse first."""
         lgpio.gpio_claim_output(self.factory._handle, self._number, int(state))
         self.state = state
 
@@ -60,7 +59,7 @@ class LowAtOncePin(LGPIOPin):
 
 
 class LowAtOnceFactory(LGPIOFactory):
-    """The factory of such pins."""
+    """Factory of `LowAtOncePin`."""
 
     def __init__(self, chip: int | None = None) -> None:
         super().__init__(chip)
@@ -68,7 +67,7 @@ class LowAtOnceFactory(LGPIOFactory):
 
 
 def open_gpio_chip() -> int:
-    """A handle of the chip that the header's pins are on.
+    """Open the GPIO chip of the header's pins.
 
     Its number differs between models and kernels; its label does not: pinctrl-bcm2835,
     pinctrl-bcm2711 or pinctrl-rp1.
@@ -91,7 +90,7 @@ def open_gpio_chip() -> int:
 
 
 class LgpioServoPins:
-    """Pins that send servo pulses; see `ServoPins`.
+    """Servo pulses on pins; see `ServoPins`.
 
     Their timing jitters, as lgpio's own documentation says; a PCA9685 or the kernel's PWM
     (`over = "sysfs"`) is steadier. lgpio takes 500 to 2500 us at 40 to 500 Hz.
@@ -102,7 +101,7 @@ class LgpioServoPins:
         self._pins: set[int] = set()
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses of this width from the next cycle on; 0 for none, at once."""
+        """Send pulses of this width from the next cycle on; 0 stops them immediately."""
         if self._handle is None:
             raise OSError("the servo pins are closed")
         if pin not in self._pins:
@@ -110,11 +109,11 @@ class LgpioServoPins:
             self._pins.add(pin)
         lgpio.tx_servo(self._handle, pin, width_us, frequency_hz)
         if width_us == 0:
-            # lgpio forgets the pin at the level of that moment, see `lgpio_pins`.
+            # lgpio releases the pin at its current level, see the module.
             lgpio.gpio_write(self._handle, pin, 0)
 
     def close(self) -> None:
-        """End all pulses; the pins stay low outputs until the chip is closed."""
+        """Stop all pulses; the pins stay low outputs until the chip is closed."""
         if self._handle is None:
             return
         with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""The motion sensor MPU-6050 over I2C.
+"""Inertial sensor MPU-6050 over I2C.
 
 Registers: InvenSense, MPU-6000 and MPU-6050 register map and descriptions, RM-MPU-6000A, rev. 4.2.
 It is mounted with x forward, y left and z up.
@@ -26,23 +26,23 @@ _ACCEL_XOUT_H: Final = (
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 
-_IDENTITY: Final = 0x68  # Of an MPU-6050, at both of its addresses.
+_IDENTITY: Final = 0x68  # Identity of an MPU-6050, at both of its addresses.
 _LOW_PASS_44_HZ: Final = 3  # CONFIG, DLPF_CFG.
 _RANGE_500_DEG_PER_S: Final = 1 << 3  # GYRO_CONFIG, FS_SEL.
 _RANGE_4_G: Final = 1 << 3  # ACCEL_CONFIG, AFS_SEL.
-_AWAKE: Final = 1  # PWR_MGMT_1: not asleep, clock from the gyroscope of x.
+_AWAKE: Final = 1  # PWR_MGMT_1: awake, clock from the x gyroscope.
 
 _M_PER_S2: Final = 9.80665 / 8192.0  # 8192 LSB/g at 4 g.
 _RAD_PER_S: Final = math.radians(1.0) / 65.5  # 65.5 LSB/(deg/s) at 500 deg/s.
 
-# A gyroscope at rest says up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"). So
-# while the robot is not told to move, what it says slowly becomes its zero.
+# A gyroscope at rest reads up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"). So
+# its zero follows its readings slowly while the robot is not commanded to move.
 _MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
 _ZERO_SHARE: Final = 0.02
 
 
 class Mpu6050:
-    """A motion sensor; see `SensorDriver`."""
+    """Inertial sensor; see `SensorDriver`."""
 
     def __init__(self, bus: I2cBus, address: int, name: str) -> None:
         self._bus = bus
@@ -62,17 +62,17 @@ class Mpu6050:
             bus.write_byte_data(address, _ACCEL_CONFIG, _RANGE_4_G)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Acceleration forward and left in m/s2, and yaw rate to the left in rad/s.
+        """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
 
         Gravity is part of the acceleration.
 
         Raises:
-            RobotError: If it does not answer, or sleeps, as after a loss of power.
+            RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
         with in_words(self._name):
             data = self._bus.read_i2c_block_data(self._address, _ACCEL_XOUT_H, 14)
         x, y, z, _, _, _, yaw = struct.unpack(">7h", bytes(data))
-        if x == y == z == 0:  # Not even gravity.
+        if x == y == z == 0:  # Not even gravity is measured.
             raise RobotError(f"{self._name} sleeps: it has lost its power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
@@ -85,7 +85,7 @@ class Mpu6050:
         }
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         self._bus.close()
 
 

@@ -1,4 +1,4 @@
-"""What every output driver does, and where each is found."""
+"""Interface of output drivers, and their registry."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from shapechanger.robot.hardware import Hardware
 
 __all__ = ["OUTPUT_DRIVERS", "OutputDriver", "SharedDevice", "open_output"]
 
-# Each module has `open_driver(plan, hardware)`. They are loaded when they are needed, so that the
-# guard holds only its own drivers.
+# Each module has `open_driver(plan, hardware)` and is loaded on demand, so that the guard loads
+# only its own drivers.
 OUTPUT_DRIVERS: Final = {
     "hbridge": "shapechanger.robot.drivers.hbridge",
     "phase_enable": "shapechanger.robot.drivers.phase_enable",
@@ -24,69 +24,69 @@ OUTPUT_DRIVERS: Final = {
 
 
 class OutputDriver(Protocol):
-    """One motor, servo or controller."""
+    """Driver of one motor, servo or controller."""
 
     def write(self, value: float, now_ns: int) -> float:
-        """Move.
+        """Write a value.
 
         Args:
             value: From -1, full left or backward, to 1, full right or forward; 0 is rest.
-            now_ns: The time, for a controller that must wait before it obeys.
+            now_ns: Monotonic time, ns, for controllers with sequences.
 
         Returns:
-            The value that the output really has now.
+            The applied value.
         """
         ...
 
     def release(self) -> None:
-        """Let go: no torque, no pulse."""
+        """Release the output: no torque, no pulse."""
         ...
 
     def close(self) -> None:
-        """Go to the safest level and let go of the pins."""
+        """Set the safest level and close the pins."""
         ...
 
 
 class SharedDevice(Protocol):
-    """What several outputs are on, where it acts on all of them at once: a servo bus.
+    """Device shared by several outputs and written once for all of them: a servo bus.
 
-    Drivers on one have it as their attribute `device`.
+    Its drivers refer to it by their attribute `device`.
     """
 
     def begin(self) -> None:
-        """Make it ready, once all of its outputs are open; nothing moves.
+        """Start the device once all of its outputs are open, without moving anything.
 
         Raises:
-            RobotError: If it does not answer, or is not what it should be.
+            RobotError: If it does not respond, or is not the expected device.
         """
         ...
 
     def ready(self) -> None:
-        """Forget what was wrong, before the robot is armed; nothing moves.
+        """Clear faults before the robot is armed, without moving anything.
 
         Raises:
-            RobotError: If something still is.
+            RobotError: If a fault persists.
         """
         ...
 
     def flush(self, *, grip: bool) -> None:
-        """Do what was written to its outputs.
+        """Send what was written to its outputs.
 
         Args:
-            grip: Whether outputs that have let go take hold.
+            grip: Whether released outputs are energised again.
 
         Raises:
-            RobotError: If they do not.
+            RobotError: If an output does not obey.
         """
         ...
 
 
 def open_output(plan: OutputPlan, hardware: Hardware) -> OutputDriver:
-    """Open an output; it is at rest.
+    """Open an output at rest.
 
     Raises:
         UnknownName: If there is no such driver.
-        RobotError: If the device does not answer.
+        RobotError: If the device does not respond.
     """
     if plan.driver not in OUTPUT_DRIVERS:
         raise UnknownName("output driver", plan.driver, OUTPUT_DRIVERS)

@@ -1,8 +1,7 @@
-"""The PCA9685: sixteen servo pulses over I2C, with a timing of its own.
+"""PCA9685: sixteen servo channels over I2C with hardware timing.
 
 Registers and formulas: NXP, PCA9685 product data sheet, rev. 4 (2015-04-16), sections 7.3.1 to
-7.3.5. A PCA9685 keeps its last pulses for ever when nobody speaks to it; hence the pin for its OE
-input.
+7.3.5. A PCA9685 repeats its last pulses for ever without commands; hence the pin for its OE input.
 """
 
 from __future__ import annotations
@@ -30,19 +29,19 @@ _AUTO_INCREMENT: Final = 0x20  # MODE1, AI.
 _SLEEP: Final = 0x10  # MODE1; the prescaler can be written only then.
 _TOTEM_POLE: Final = 0x04  # MODE2, OUTDRV; outputs change at the stop of a transfer (OCH = 0).
 
-_OSCILLATOR_MHZ: Final = 25.0  # The internal oscillator; boards deviate, so calibrate the widths.
+_OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator, Hz; boards deviate, so calibrate the widths.
 _STEPS: Final = 4096
-_NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulse at all.
+_NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulses.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
 _PRESCALE_RANGE: Final = (3, 255)
 
-# Unchanged pulses are not written again; now and then the chip is asked whether it still runs,
-# because one that lost its power for a moment sleeps.
+# Unchanged pulses are not rewritten; the chip is polled now and then, because it sleeps after a
+# short loss of power.
 _UNCHANGED_PER_CHECK: Final = 50
 
 
 def prescale_for(hz: float) -> int:
-    """The value of the prescaler for a frequency: round(25 MHz / (4096 hz)) - 1, section 7.3.5."""
+    """Return the prescaler for a frequency: round(25 MHz / (4096 hz)) - 1, section 7.3.5."""
     prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1
     low, high = _PRESCALE_RANGE
     if not low <= prescale <= high:
@@ -51,11 +50,11 @@ def prescale_for(hz: float) -> int:
 
 
 class Pca9685:
-    """One chip, shared by its channels in this process.
+    """One chip, shared by its channels within the process.
 
-    It remembers what each channel does for sure, and sends nothing twice. A transfer that failed
-    may have taken effect all the same, or in part; after one, all channels are in doubt: the
-    outputs are off, where there is a pin for that, until all channels have been written again.
+    The known state of each channel is cached, so that nothing is sent twice. A failed transfer may
+    have taken partial effect; after one, all channels are in doubt, and the outputs are disabled,
+    if there is a pin for it, until all channels have been rewritten.
     """
 
     def __init__(
@@ -68,7 +67,7 @@ class Pca9685:
         self._hardware = hardware
         self._address = address
         self._prescale = prescale_for(hz)
-        self._steps: dict[int, int] = {}  # By channel; none for a channel in doubt.
+        self._steps: dict[int, int] = {}  # By channel; missing for a channel in doubt.
         self._must_start = False
         self._unchanged = 0
         self._enable: DigitalOutputDevice | None = None
@@ -83,16 +82,16 @@ class Pca9685:
             undo.callback(self._bus.close)
             self._start()
             if self._enable is not None:
-                # What a dead process left on a channel must not come back with our first pulse.
+                # Pulses left by a dead process must not return with the first pulse.
                 self._bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
             undo.pop_all()
 
     def step_us(self) -> float:
-        """Width of one step: 4.88 us at 50 Hz."""
+        """Width of one step, µs: 4.88 µs at 50 Hz."""
         return (self._prescale + 1) / _OSCILLATOR_MHZ
 
     def send(self, channel: int, steps: int) -> None:
-        """Send pulses of so many steps."""
+        """Send pulses of `steps` steps."""
         if self._steps.get(channel) != steps:
             self._write(channel, steps)
             return
@@ -102,16 +101,16 @@ class Pca9685:
             self._check()
 
     def stop(self, channel: int) -> None:
-        """Send none; without any, the outputs of the chip are off too."""
+        """Stop the pulses of a channel; after the last one, disable the outputs."""
         self._steps.pop(channel, None)
         try:
             if not self._sends():
-                self._switch(False)  # First, since a bus that hangs takes a second to say so.
+                self._switch(False)  # First, because a hanging bus takes a second to fail.
         finally:
             self._write(channel, _NO_PULSE)
 
     def leave(self, channel: int) -> None:
-        """One channel less; the last one lets go of the chip."""
+        """Remove a channel; the last one closes the chip."""
         self.channels.discard(channel)
         self._steps.pop(channel, None)
         if not self.channels:
@@ -124,7 +123,7 @@ class Pca9685:
         mode = bus.read_byte_data(address, _MODE1)
         asleep = mode & _SLEEP or bus.read_byte_data(address, _PRESCALE) != self._prescale
         if asleep:
-            # First no pulses, so that nothing starts again with the oscillator.
+            # No pulses first, so that none restart with the oscillator.
             bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
             bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT | _SLEEP)
             bus.write_byte_data(address, _PRESCALE, self._prescale)
@@ -135,10 +134,10 @@ class Pca9685:
         self._must_start = False
 
     def _check(self) -> None:
-        """Make sure that the chip still runs.
+        """Check that the chip is awake.
 
         Raises:
-            RobotError: If it does not answer, or sleeps, as after a loss of power.
+            RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
         with self._doubt_on_failure():
             if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
@@ -174,7 +173,7 @@ class Pca9685:
 
 
 class Pca9685Channel:
-    """One of the sixteen; see `PulseChannel`."""
+    """One channel; see `PulseChannel`."""
 
     def __init__(self, chip: Pca9685, channel: int) -> None:
         if not 0 <= channel < 16:
@@ -186,18 +185,18 @@ class Pca9685Channel:
         self._channel = channel
 
     def write_us(self, width_us: float) -> float:
-        """Send pulses of this width, in whole steps; see `PulseChannel.write_us`."""
+        """Send pulses of this width, rounded to steps; see `PulseChannel.write_us`."""
         chip = self._open_chip()
         steps = min(max(round(width_us / chip.step_us()), 0), _STEPS - 1)
         chip.send(self._channel, steps)
         return steps * chip.step_us()
 
     def release(self) -> None:
-        """Send none."""
+        """Stop the pulses."""
         self._open_chip().stop(self._channel)
 
     def close(self) -> None:
-        """Send none, and let go, also when the chip does not answer."""
+        """Stop the pulses and close, even if the chip does not respond."""
         if (chip := self._chip) is not None:
             try:
                 chip.stop(self._channel)
@@ -216,11 +215,11 @@ _OPEN: Final[dict[tuple[int, int, int], tuple[Hardware, Pca9685]]] = {}
 
 
 def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685Channel:
-    """Open a channel; it sends nothing yet.
+    """Open a channel without pulses.
 
     Raises:
-        RobotError: If the chip does not answer, the channel is used twice, or another channel of
-            the chip wants another frequency or enable pin.
+        RobotError: If the chip does not respond, the channel is used twice, or another channel of
+            the chip has another frequency or enable pin.
     """
     bus, address = whole(settings, "bus"), whole(settings, "address")
     hz, output_enable = whole(settings, "hz"), whole(settings, "output_enable")
@@ -243,6 +242,6 @@ def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685C
     try:
         channel.release()
     except Exception:
-        chip.leave(whole(settings, "channel"))  # Whoever tries again finds it free.
+        chip.leave(whole(settings, "channel"))  # A retry finds the channel free.
         raise
     return channel

@@ -1,4 +1,4 @@
-"""A motor on a driver with a direction and a speed input, such as DRV8835 as phase/enable."""
+"""Motors on a driver with direction and speed inputs, such as DRV8835 in phase/enable mode."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 from gpiozero import PhaseEnableMotor
 
-from shapechanger.robot.drivers.gpio import Duty
+from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
@@ -16,10 +16,10 @@ __all__ = ["PhaseEnable", "open_driver"]
 
 
 class PhaseEnable:
-    """A motor that goes forward and backward; see `OutputDriver`.
+    """Bidirectional motor; see `OutputDriver`.
 
-    The speed is zero while the direction changes: `PhaseEnableMotor` sees to that, and on a Pi
-    `LowAtOncePin` makes it take effect at once.
+    The speed is zero while the direction changes: `PhaseEnableMotor` ensures that, and on a Pi
+    `LowAtOncePin` makes it immediate.
     """
 
     def __init__(self, motor: PhaseEnableMotor, duty: Duty, name: str) -> None:
@@ -30,11 +30,11 @@ class PhaseEnable:
         self.write(0.0, 0)
 
     def write(self, value: float, now_ns: int) -> float:
-        """Turn the motor, and say how fast; see `OutputDriver.write`."""
+        """Write a speed and return the applied one; see `OutputDriver.write`."""
         drive = math.copysign(self._duty.of(value), value)
         if drive != self._written:
             written = self._written
-            self._written = None  # What fails may have taken effect all the same.
+            self._written = None  # A failed write may still have taken effect.
             with in_words(self._name):
                 # gpiozero turns the motor off before each new speed, also in the same direction,
                 # which would make it stutter.
@@ -46,13 +46,13 @@ class PhaseEnable:
         return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
 
     def release(self) -> None:
-        """No speed; such drivers brake then, and cannot let go."""
+        """Set the speed to zero; such drivers then brake and cannot coast."""
         self._written = None
         with in_words(self._name):
             self._motor.stop()
 
     def close(self) -> None:
-        """Both inputs low; see `LowAtOncePin.close` for what the pins do then."""
+        """Set both inputs low; see `LowAtOncePin.close` for the pins afterwards."""
         if self._motor.closed:
             return
         with in_words(self._name), ExitStack() as stack:
@@ -62,7 +62,7 @@ class PhaseEnable:
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> PhaseEnable:
-    """Open the motor; it stands.
+    """Open the motor at rest.
 
     The settings are the BCM pins `phase` (high is backward) and `enable` (speed), `pwm_hz`, `start`
     and `full` (see `Duty`).

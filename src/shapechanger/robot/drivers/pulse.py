@@ -1,4 +1,4 @@
-"""Pulses for servos and speed controllers: how wide for which value, and what sends them."""
+"""Pulses for servos and speed controllers: their widths and their sources."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["PulseChannel", "PulseRange", "SysfsPwm", "open_pulse_channel"]
 
 @dataclass(frozen=True, slots=True)
 class PulseRange:
-    """The widths of the pulses at -1, 0 and 1, with straight lines between them.
+    """Pulse widths at -1, 0 and 1, with linear interpolation.
 
     Attributes:
         low_us: Width at -1: left, or backward.
@@ -38,12 +38,12 @@ class PulseRange:
             )
 
     def width_us(self, value: float) -> float:
-        """The width for a value; beyond -1 to 1 it stays at the ends."""
+        """Return the width for a value, which is clipped to -1 to 1."""
         end_us = self.high_us if value > 0.0 else self.low_us
         return self.middle_us + (end_us - self.middle_us) * min(abs(value), 1.0)
 
     def value(self, width_us: float) -> float:
-        """The value that a width stands for."""
+        """Return the value of a width."""
         up = (width_us - self.middle_us) / (self.high_us - self.middle_us)
         if up >= 0.0:
             return up
@@ -51,23 +51,23 @@ class PulseRange:
 
 
 class PulseChannel(Protocol):
-    """What sends the pulses of one servo."""
+    """Source of the pulses of one servo."""
 
     def write_us(self, width_us: float) -> float:
-        """Send pulses of this width from now on, and say which width they really have."""
+        """Send pulses of this width from now on, and return the applied width."""
         ...
 
     def release(self) -> None:
-        """Send none."""
+        """Stop the pulses."""
         ...
 
     def close(self) -> None:
-        """Send none, and let go."""
+        """Stop the pulses and close."""
         ...
 
 
 class _PinChannel:
-    """Pulses on a pin, see `ServoPins`."""
+    """Pulses on a pin; see `ServoPins`."""
 
     def __init__(self, settings: Mapping[str, object], hardware: Hardware) -> None:
         self._pin = whole(settings, "pin")
@@ -90,7 +90,7 @@ class _PinChannel:
 
     def _send(self, width_us: int) -> None:
         if width_us != self._width_us:
-            self._width_us = None  # What fails may have taken effect all the same.
+            self._width_us = None  # A failed write may still have taken effect.
             self._pins.pulse(self._pin, width_us, self._hz)
             self._width_us = width_us
 
@@ -118,7 +118,7 @@ _SENDERS: Final[dict[str, Callable[[Mapping[str, object], Hardware], PulseChanne
 
 
 def open_pulse_channel(settings: Mapping[str, object], hardware: Hardware) -> PulseChannel:
-    """Open what sends the pulses; it sends none yet.
+    """Open a source of pulses without sending any.
 
     Args:
         settings: `over` says by what: "pca9685" (with `bus`, `address`, `channel` and
@@ -127,7 +127,7 @@ def open_pulse_channel(settings: Mapping[str, object], hardware: Hardware) -> Pu
         hardware: Where the buses and pins are.
 
     Raises:
-        UnknownName: If there is no such way.
+        UnknownName: If there is no such source.
         RobotError: If pulses of gpiozero are wanted: over lgpio they have steps of 200 us, and
             1.5 ms, where most controllers stand, becomes 1.4 ms (gpiozero#1209).
     """
@@ -143,7 +143,7 @@ def open_pulse_channel(settings: Mapping[str, object], hardware: Hardware) -> Pu
 
 
 _ROOT: Final = Path("/sys/class/pwm")
-_EXPORT_S: Final = 1.0  # udev takes a moment to give a new channel to the group gpio.
+_EXPORT_S: Final = 1.0  # udev takes a moment to assign a new channel to the group gpio.
 
 
 class SysfsPwm:
@@ -167,12 +167,12 @@ class SysfsPwm:
         return float(round(width_us))
 
     def release(self) -> None:
-        """Send none: the pin stays low."""
+        """Stop the pulses; the pin stays low."""
         with in_words(self._name):
             self._send(0)
 
     def close(self) -> None:
-        """Send none, and switch the channel off."""
+        """Stop the pulses and disable the channel."""
         with in_words(self._name):
             try:
                 self._send(0)
@@ -181,7 +181,7 @@ class SysfsPwm:
 
     def _send(self, width_us: int) -> None:
         if width_us != self._width_us:
-            self._width_us = None  # What fails may have taken effect all the same.
+            self._width_us = None  # A failed write may still have taken effect.
             self._write("duty_cycle", width_us * 1000)
             self._width_us = width_us
 

@@ -1,4 +1,4 @@
-"""What every sensor driver does, and where each is found."""
+"""Interface of sensor drivers, and their registry."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ SENSOR_DRIVERS: Final = {
 
 
 class SensorDriver(Protocol):
-    """One sensor. It never blocks longer than a few milliseconds, and has no thread of its own."""
+    """Driver of one sensor, without threads, that blocks for at most a few milliseconds."""
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """What it measures now, by name and in SI units, as in `GuardState.quantities`.
+        """Return the measurements by name, in SI units, as in `GuardState.quantities`.
 
         Args:
             now_ns: The time.
             direction: Sign of the propulsion, for a sensor that cannot tell forward from backward.
 
         Raises:
-            RobotError: If the sensor does not answer.
+            RobotError: If the sensor does not respond.
         """
         ...
 
     def close(self) -> None:
-        """Let go of the pins."""
+        """Close the pins."""
         ...
 
 
@@ -49,7 +49,7 @@ def open_sensor(plan: SensorPlan, hardware: Hardware) -> SensorDriver:
 
     Raises:
         UnknownName: If there is no such driver.
-        RobotError: If the device does not answer.
+        RobotError: If the device does not respond.
     """
     if plan.driver not in SENSOR_DRIVERS:
         raise UnknownName("sensor driver", plan.driver, SENSOR_DRIVERS)

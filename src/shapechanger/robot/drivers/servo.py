@@ -1,4 +1,4 @@
-"""A servo: a position for each pulse width."""
+"""Hobby servos: one position per pulse width."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from shapechanger.robot.hardware import Hardware
 
 __all__ = ["ServoDriver", "open_driver"]
 
-_DEG_PER_VALUE: Final = 90.0  # From end to end, a value of 2, it is taken to turn by 180 degrees.
+_DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.
 
 
 class ServoDriver:
-    """A servo; see `OutputDriver`. Until it is first told a position it gets no pulse."""
+    """Servo; see `OutputDriver`. It gets no pulse before the first position."""
 
     def __init__(
         self, channel: PulseChannel, pulses: PulseRange, speed_per_s: float, name: str
@@ -29,7 +29,7 @@ class ServoDriver:
         self._written_ns = 0
 
     def write(self, value: float, now_ns: int) -> float:
-        """Go to a position, no faster than it may; see `OutputDriver.write`."""
+        """Move towards a position at the permitted speed; see `OutputDriver.write`."""
         value = min(max(value, -1.0), 1.0)
         if self._value is not None and math.isfinite(self._speed_per_s):
             most = self._speed_per_s * (now_ns - self._written_ns) / 1e9
@@ -40,19 +40,19 @@ class ServoDriver:
         return self._pulses.value(width_us)
 
     def release(self) -> None:
-        """No pulse: most servos let go then."""
+        """Stop the pulses, which releases most servos."""
         self._value = None
         with in_words(self._name):
             self._channel.release()
 
     def close(self) -> None:
-        """No pulse, and let go of the channel."""
+        """Stop the pulses and close the channel."""
         with in_words(self._name):
             self._channel.close()
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> ServoDriver:
-    """Open the servo; it gets no pulse yet.
+    """Open the servo without pulses.
 
     The settings are those of `open_pulse_channel`, `left_us`, `centre_us` and `right_us` (at -1, 0
     and 1), and `travel_deg_per_s`: how fast it is moved, at most; infinite for as fast as it can.

@@ -1,4 +1,4 @@
-"""Reads the settings of a driver out of its plan."""
+"""Typed access to the settings of a driver, and translation of device errors."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from typing import TypeVar, cast
-
-from gpiozero import GPIOZeroError
 
 from shapechanger.errors import RobotError
 
@@ -17,36 +15,36 @@ _T = TypeVar("_T")
 
 
 def whole(settings: Mapping[str, object], key: str) -> int:
-    """A whole number, such as a pin."""
+    """Return an integer setting, such as a pin."""
     return _of_type(settings, key, int, "a whole number")
 
 
 def number(settings: Mapping[str, object], key: str) -> float:
-    """Any number, such as a length."""
+    """Return a number, such as a length."""
     if isinstance(value := settings.get(key), int) and not isinstance(value, bool):
         return float(value)
     return _of_type(settings, key, float, "a number")
 
 
 def text(settings: Mapping[str, object], key: str) -> str:
-    """A word."""
+    """Return a string."""
     return _of_type(settings, key, str, "a word")
 
 
 def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
-    """Several whole numbers, such as pins."""
+    """Return a tuple of integers, such as pins."""
     values = cast("list[object]", _of_type(settings, key, list, "a list of whole numbers"))
     return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
 def numbers(settings: Mapping[str, object], key: str) -> tuple[float, ...]:
-    """Several numbers, such as tensions."""
+    """Return a tuple of numbers, such as tensions."""
     values = cast("list[object]", _of_type(settings, key, list, "a list of numbers"))
     return tuple(number({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
 def texts(settings: Mapping[str, object], key: str) -> tuple[str, ...]:
-    """Several words, such as names of tendons."""
+    """Return a tuple of strings, such as names of tendons."""
     values = cast("list[object]", _of_type(settings, key, list, "a list of words"))
     return tuple(text({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
@@ -60,22 +58,27 @@ def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: st
 
 @contextmanager
 def in_words(device: str) -> Generator[None]:
-    """Give the errors of gpiozero, lgpio and the kernel as `RobotError`.
+    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError`.
 
     Args:
-        device: What it is, such as "The motor on GPIO22 and GPIO27".
+        device: Description of the device, such as "The motor on GPIO22 and GPIO27".
 
     Raises:
-        RobotError: If the device does not answer.
+        RobotError: If the device does not respond.
     """
     try:
         yield
-    except _errors() as error:
+    except _device_errors() as error:
         raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
 
 
-def _errors() -> tuple[type[BaseException], ...]:
-    # lgpio has an exception of its own, and is not everywhere; what was never loaded never raises.
-    lgpio = sys.modules.get("lgpio")
-    own: tuple[type[BaseException], ...] = () if lgpio is None else (lgpio.error,)
-    return (GPIOZeroError, OSError, ImportError, *own)
+def _device_errors() -> tuple[type[BaseException], ...]:
+    """Return what gpiozero, lgpio and the kernel raise.
+
+    Profiles read settings where neither library is installed, and a library that was never loaded
+    raises nothing.
+    """
+    names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
+    loaded = [(sys.modules.get(module), name) for module, name in names]
+    own = tuple(getattr(module, name) for module, name in loaded if module is not None)
+    return (OSError, ImportError, *own)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final, Literal
 
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.gpio import EdgeInput
+from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.settings import in_words, text, wholes
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
@@ -17,7 +17,7 @@ _PULLS: Final = ("up", "down")
 
 
 class Switch:
-    """One or more switches; see `SensorDriver`. A push between two reads is not missed."""
+    """One or more switches; see `SensorDriver`. Pushes between two reads are not missed."""
 
     def __init__(
         self, pins: Sequence[int], pull: Literal["up", "down"], factory: Any, name: str
@@ -28,7 +28,7 @@ class Switch:
         self._inputs = [EdgeInput(pin, pull, factory, self._changed) for pin in pins]
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Whether any is pressed, or was since the last time: "bump", 0 or 1."""
+        """Return "bump", 1 if any switch is or was pressed since the last read, else 0."""
         # Cleared before the levels are read, so that a push in between counts.
         was_pressed, self._was_pressed = self._was_pressed, False
         with in_words(self._name):
@@ -36,7 +36,7 @@ class Switch:
         return {"bump": float(pressed or was_pressed)}
 
     def close(self) -> None:
-        """Let go of the pins."""
+        """Close the pins."""
         for one in self._inputs:
             one.close()
 

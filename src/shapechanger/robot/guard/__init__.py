@@ -1,4 +1,4 @@
-"""The process that owns every output, and the rules by which it moves them."""
+"""Guard: the process that owns every output, and its safety rules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The guard's end of the sockets to daemon and supervisor; nothing here ever blocks."""
+"""Non-blocking sockets between the guard, the daemon and the supervisor."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ _DESCRIPTOR = socket.CMSG_SPACE(_FD_BYTES)
 
 
 class GuardChannel(Protocol):
-    """Orders in, states out."""
+    """Duplex channel: orders in, states out."""
 
     @property
     def lost(self) -> bool:
-        """Whether whoever gives the orders is gone."""
+        """Return whether the sender of orders has disconnected."""
         ...
 
     def filenos(self) -> list[int]:
-        """The descriptors to wait for."""
+        """Return the file descriptors to wait for."""
         ...
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """All orders that have arrived, and why others were none, in words."""
+        """Return the orders that have arrived, and a reason for each datagram that is not one."""
         ...
 
     def send(self, state: GuardState) -> bool:
-        """Hand over a state; whether it was taken."""
+        """Send a state and return whether it was accepted."""
         ...
 
 
 class DaemonChannel:
-    """Orders from the daemon's socket, and states into it.
+    """Channel over the daemon's socket.
 
     Args:
-        fd: Descriptor of the socket; this object owns it.
+        fd: Descriptor of the socket, owned by this object.
     """
 
     def __init__(self, fd: int) -> None:
@@ -59,17 +59,17 @@ class DaemonChannel:
 
     @property
     def lost(self) -> bool:
-        """Whether the daemon is gone."""
+        """Return whether the daemon has disconnected or died."""
         return self._lost
 
     def filenos(self) -> list[int]:
-        """The descriptors to wait for: the socket, and one that ends when the daemon dies."""
+        """Return the socket and the lifeline, which closes when the daemon dies."""
         life = [] if self._life is None else [self._life]
         return [self._socket.fileno(), *life]
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """All orders that have arrived, and why others were none, in words."""
-        if self._life is not None and self._dead.poll(0):  # It never says anything.
+        """Return the orders that have arrived, and a reason for each datagram that is not one."""
+        if self._life is not None and self._dead.poll(0):  # The lifeline carries no data.
             self._lost = True
         orders: list[Order] = []
         malformed: list[str] = []
@@ -83,7 +83,7 @@ class DaemonChannel:
             if sent:
                 self._watch(sent)
                 continue
-            if not data:  # The end, or an empty datagram, which nobody sends.
+            if not data:  # End of stream; no sender uses empty datagrams.
                 self._lost = True
                 break
             try:
@@ -95,7 +95,7 @@ class DaemonChannel:
         return orders, malformed
 
     def send(self, state: GuardState) -> bool:
-        """Send a state; one for which there is no room is dropped.
+        """Send a state, or drop it if the socket is full.
 
         Returns:
             Whether it was sent.
@@ -110,7 +110,7 @@ class DaemonChannel:
         return True
 
     def _watch(self, sent: list[tuple[int, int, bytes]]) -> None:
-        """Take the descriptor that ends when the daemon dies; see `daemon.life`."""
+        """Adopt the lifeline, whose end closes when the daemon dies."""
         kind = (socket.SOL_SOCKET, socket.SCM_RIGHTS)
         for level, number, data in sent:
             whole = len(data) - len(data) % _FD_BYTES
@@ -119,7 +119,7 @@ class DaemonChannel:
                 if self._life is None:
                     self._life = fd
                     self._dead.register(fd, select.POLLIN)
-                else:  # One is enough, and nobody sends two.
+                else:  # The first is kept; the daemon sends one.
                     os.close(fd)
 
     def close(self) -> None:
@@ -131,10 +131,10 @@ class DaemonChannel:
 
 
 class Heartbeat:
-    """Shows the supervisor that this process lives, and notices when the supervisor does not.
+    """Heartbeat to the supervisor, which also detects the supervisor's death.
 
     Args:
-        fd: Descriptor of the socket; this object owns it.
+        fd: Descriptor of the socket, owned by this object.
         period_s: Real seconds between two beats.
     """
 
@@ -150,29 +150,29 @@ class Heartbeat:
         """Whether the supervisor is gone."""
 
     def fileno(self) -> int:
-        """The descriptor, to wait for."""
+        """Return the file descriptor to wait for."""
         return self._socket.fileno()
 
     def beat(self) -> None:
-        """Send a beat if one is due, and look whether the supervisor is there."""
-        if self._poll.poll(0):  # It never says anything; so this is the end.
+        """Send a beat if one is due, and return whether the supervisor is alive."""
+        if self._poll.poll(0):  # The supervisor sends no data, so this is the end of the stream.
             self.lost = True
         now_ns = time.monotonic_ns()
         if self.lost or now_ns - self._beaten_ns < self._period_ns:
             return
         self._beaten_ns = now_ns
         try:
-            # A supervisor that does not read is no reason to stop; its socket is then full.
+            # A full socket means that the supervisor does not read, which does not stop the robot.
             with contextlib.suppress(BlockingIOError):
                 self._socket.send(b".")
         except (BrokenPipeError, ConnectionResetError):
             self.lost = True
 
     def leave(self) -> int:
-        """Beat no more, and leave the socket open until the process is gone.
+        """Stop beating, but keep the socket open until the process exits.
 
-        Its end tells the supervisor that the process is gone; told too early, it would kill one
-        that is about to end by itself.
+        The supervisor takes its end as the death of the process: closed too early, it would kill a
+        process that is about to exit by itself.
 
         Returns:
             The descriptor.

@@ -1,4 +1,4 @@
-"""Which commands are new enough to act."""
+"""Acceptance of commands: age, order, caps and slew."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from shapechanger.robot.guard.plan import ActionPlan
 __all__ = ["FUTURE_NS", "Freshness", "aimed", "clipped", "slewed"]
 
 FUTURE_NS = 50_000_000
-"""How far a time may lie in the future, ns: two processes read one clock, so this is generous."""
+"""Tolerance for times in the future, ns. Both processes read one clock, so this is generous."""
 
 _NS_PER_MS = 1_000_000
 
 
 class Freshness:
-    """Refuses commands that are repeated, out of order, too old or from the future.
+    """Refuse commands that are repeated, out of order, too old or from the future.
 
-    A command counts as the newest one even when it is refused for another reason: whoever sent
-    it had done with the ones before.
+    A command replaces its predecessors even when it is refused for another reason, because its
+    sender has superseded them.
 
     Args:
-        deadline_ms: How long a command acts at most.
+        deadline_ms: Longest time for which a command acts, ms.
     """
 
     def __init__(self, deadline_ms: int) -> None:
@@ -30,7 +30,7 @@ class Freshness:
         self._newest = (-1, -1)
 
     def refusal(self, order: Order, now_ns: int) -> str:
-        """Why a command that arrives now must not act; empty when it may."""
+        """Return why a command that arrives now is refused, or an empty string."""
         if (order.session, order.seq) <= self._newest:
             session, seq = self._newest
             return (
@@ -47,16 +47,16 @@ class Freshness:
         return ""
 
     def expiry_ns(self, order: Order, arrived_ns: int) -> int:
-        """When a command stops acting, ns."""
+        """Return the time at which a command expires, ns."""
         start_ns = min(order.issued_ns, arrived_ns)
         return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
 
 
-_SAME = 1e-6  # A cap that went through a 32-bit float is still the cap.
+_SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
 
 
 def aimed(action: ActionPlan, value: float) -> float:
-    """What a value of a command aims at: within the caps, and one of the levels."""
+    """Return the target of a command's value: clipped to the caps and rounded to a level."""
     if action.levels == "three":
         if value >= action.threshold:
             return action.high
@@ -65,23 +65,22 @@ def aimed(action: ActionPlan, value: float) -> float:
 
 
 def clipped(action: ActionPlan, value: float) -> bool:
-    """Whether a value of a command lies outside the caps."""
+    """Return whether a command's value lies outside the caps."""
     is_inside = action.low - _SAME <= value <= action.high + _SAME
     return action.levels == "any" and not is_inside
 
 
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
-    """The next value on the way to what is aimed at.
+    """Return the next value on the way to the target.
 
-    Towards rest it jumps, away from rest it keeps to the slew, and to the other side of rest it
-    passes through rest, where it is for one step. A motor that knows three levels only has no
-    slew.
+    It jumps towards rest, is limited by the slew away from rest, and pauses at rest for one step
+    when it changes sides. A three-level motor has no slew.
 
     Args:
         action: The action.
-        now: Its value now.
-        aim: Where to.
-        elapsed_s: Time since it got its value, s.
+        now: Current value.
+        aim: Target value.
+        elapsed_s: Time since the current value was set, s.
     """
     is_away, will_be_away = now - action.rest, aim - action.rest
     if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:

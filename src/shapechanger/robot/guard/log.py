@@ -1,7 +1,7 @@
-"""How guard and supervisor say what happens: one line a fact, on standard error.
+"""Log of the guard and the supervisor: one line per event, on standard error.
 
-Nobody may read what they say: a terminal that was stopped, a pipe that is full. Then lines are
-lost, and the robot goes on.
+The reader may be stalled, such as a stopped terminal or a full pipe. Lines are then dropped and the
+robot continues.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ _STDERR: Final = 2
 
 
 class _Lines(logging.Handler):
-    """Writes a line only where there is room for it at once, and counts those that are lost.
+    """Write lines without blocking, and count those that are dropped.
 
-    The descriptor is shared with other processes, so it stays as it is: O_NONBLOCK would be theirs
-    too. A line has no more bytes than a pipe that can be written takes without waiting.
+    The descriptor is shared with other processes, so it must not become O_NONBLOCK. A line is no
+    longer than what a writable pipe accepts without blocking.
     """
 
     def __init__(self, fd: int) -> None:
@@ -47,15 +47,15 @@ class _Lines(logging.Handler):
             if not ready or not ready[0][1] & select.POLLOUT:
                 return False
             os.write(self._fd, line)
-        except OSError:  # A full disk, or nobody at the other end any more.
+        except OSError:  # A full disk, or a closed pipe.
             return False
         return True
 
 
 def log_to_stderr(program: str) -> logging.Logger:
-    """The log of a program, whose lines begin with its name."""
-    logging.raiseExceptions = False  # What cannot be formatted must not stop the guard.
-    # Without standard error its number may be that of anything.
+    """Return the log function of a program, which prefixes each line with the program's name."""
+    logging.raiseExceptions = False  # An unprintable message must not stop the guard.
+    # Without standard error, its number may belong to any file.
     handler = logging.NullHandler() if sys.__stderr__ is None else _Lines(_STDERR)
     handler.setFormatter(logging.Formatter(f"{program}: %(message)s"))
     log = logging.getLogger(f"shapechanger.robot.{program}")
@@ -66,7 +66,7 @@ def log_to_stderr(program: str) -> logging.Logger:
 
 
 def shortened(text: str, most_bytes: int = 200) -> str:
-    """The beginning of a text, as far as it fits into so many bytes of UTF-8."""
+    """Return the longest prefix of `text` that fits into `most_bytes` bytes of UTF-8."""
     data = text.encode(errors="replace")
     if len(data) <= most_bytes:
         return data.decode()

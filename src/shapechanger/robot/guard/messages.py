@@ -1,7 +1,7 @@
-"""What the daemon and the guard say to each other: one JSON object a datagram.
+"""Messages between the daemon and the guard: one JSON object per datagram.
 
-They are on one machine, connected by a pair of sockets (`SOCK_SEQPACKET`, which keeps messages
-apart), and share one monotonic clock. The guard loads nothing but the standard library, hence JSON.
+Both run on one machine, connected by a pair of `SOCK_SEQPACKET` sockets, which preserve message
+boundaries, and share one monotonic clock. JSON, because the guard loads only the standard library.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any, Final, Literal, cast
 __all__ = ["MAX_DATAGRAM", "GuardState", "Order", "decode_order", "decode_state", "encode"]
 
 MAX_DATAGRAM: Final = 16 * 1024
-"""Bytes of the largest datagram."""
+"""Size of the largest datagram, bytes."""
 
 _KINDS: Final = ("command", "halt", "arm", "disarm", "emergency", "end")
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the daemon asks of the guard.
+    """Request from the daemon to the guard.
 
     Attributes:
         kind: "command" moves; "halt" takes the newest command back and leaves the robot armed;
@@ -54,19 +54,19 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class GuardState:
-    """What the guard does and senses.
+    """Report from the guard: what it applies and senses.
 
     Attributes:
-        at_ns: When.
+        at_ns: Time of the report, ns.
         armed: Whether commands move anything.
         emergency: Whether an emergency stop is in force.
         emergencies: How many there were since the guard started; see `Order.emergency`.
-        stop_reason: Why it does not do what it was told, in words; empty when it does.
-        applied: What the outputs do, one number for each action.
-        applied_session: Session of the command behind it.
-        applied_seq: Its number; None while the robot stands still by itself.
+        stop_reason: Why the command is not applied; empty if it is.
+        applied: Applied value of each action.
+        applied_session: Session of the underlying command.
+        applied_seq: Its sequence number; None while the robot is at rest without a command.
         applied_ns: When it reached the outputs.
-        refused: Why the newest command was refused, in words; empty for none since the last state.
+        refused: Why the newest command was refused; empty if none was since the last state.
         refused_seq: Its number.
         outputs: Value of each output by name, -1 to 1.
         quantities: What was sensed, by name and in SI units: "speed" m/s signed, "distance" m,
@@ -94,16 +94,16 @@ class GuardState:
 
 
 def encode(said: Order | GuardState) -> bytes:
-    """One datagram."""
+    """Encode a message as one datagram."""
     text = json.dumps(asdict(said), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.encode(errors="replace")  # Half of a surrogate pair has no bytes.
 
 
 def decode_order(data: bytes) -> Order:
-    """What the daemon asked.
+    """Decode an order from the daemon.
 
     Raises:
-        ValueError: If this is no order, or one of its numbers is none.
+        ValueError: If the datagram is not an order, or a number in it is not finite.
     """
     fields = _fields(data)
     try:
@@ -126,10 +126,10 @@ def decode_order(data: bytes) -> Order:
 
 
 def decode_state(data: bytes) -> GuardState:
-    """What the guard does.
+    """Decode a state from the guard.
 
     Raises:
-        ValueError: If this is no state.
+        ValueError: If the datagram is not a state.
     """
     fields = _fields(data)
     try:
@@ -144,7 +144,7 @@ def _is_finite(value: object) -> bool:
         return False
     try:
         return math.isfinite(cast("float", value))
-    except OverflowError:  # A whole number that no float can hold.
+    except OverflowError:  # An integer beyond the range of a float.
         return False
 
 

@@ -1,4 +1,4 @@
-"""All outputs of a robot as one."""
+"""Outputs of a robot: opening, writing, stopping, and what they really do."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ __all__ = [
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
-    """The pin that triggers the one-shot, low."""
-    from gpiozero import OutputDevice  # Not for a robot without such pins.
+    """Open the pin that triggers the one-shot, low."""
+    from gpiozero import OutputDevice  # Robots without such pins do not need gpiozero.
 
     return OutputDevice(pin, initial_value=False, pin_factory=hardware.pin_factory())
 
 
 class Switches:
-    """Toggles the enable pin, and reads the button.
+    """Enable pin and emergency stop button.
 
     The enable pin feeds a one-shot that holds the enable line of the motors for some ticks after
-    each edge. Whatever ends the edges, also a guard that is gone together with its supervisor, cuts
-    the motors.
+    each edge. When the edges end for any reason, even the death of both guard and supervisor, the
+    motors lose power.
 
     Args:
         plan: The robot.
@@ -56,7 +56,7 @@ class Switches:
         if plan.stop_pin is not None:
             from gpiozero import InputDevice
 
-            # To ground when pressed; a button whose wire is cut is not noticed.
+            # Closes to ground; a cut wire is not detected.
             factory = hardware.pin_factory()
             self._button = InputDevice(plan.stop_pin, pull_up=True, pin_factory=factory)
         if plan.enable_pin is not None:
@@ -64,7 +64,7 @@ class Switches:
 
     @property
     def pressed(self) -> bool:
-        """Whether the emergency button is pressed."""
+        """Return whether the emergency stop button is pressed."""
         return self._button is not None and bool(self._button.is_active)
 
     def toggle(self) -> None:
@@ -73,7 +73,7 @@ class Switches:
             self._enable.toggle()
 
     def close(self) -> None:
-        """Enable nothing any more, and let go of the pins."""
+        """Stop enabling the motors and release the pins."""
         if self._enable is not None:
             self._enable.off()
         for device in (self._enable, self._button):
@@ -93,11 +93,11 @@ _WHY: Final = {
 
 
 class Done(NamedTuple):
-    """What the outputs do.
+    """Applied outputs.
 
     Attributes:
         actions: One number for each action.
-        reason: Which outputs do something else than they were told, and why, in words.
+        reason: Outputs that differ from the decision, and why; empty if none does.
     """
 
     actions: tuple[float, ...]
@@ -105,7 +105,7 @@ class Done(NamedTuple):
 
 
 class Truth:
-    """Tells from the values of the outputs which actions they are.
+    """Reconstruct the applied actions from the values of the outputs.
 
     Args:
         plan: The robot.
@@ -121,12 +121,12 @@ class Truth:
         ]
 
     def done(self, actions: Sequence[float], told: Sequence[float], has: Sequence[float]) -> Done:
-        """What the outputs do.
+        """Return the applied outputs.
 
         Args:
-            actions: What was decided, one number for each action.
-            told: The value that each output was told.
-            has: The value that it has.
+            actions: Decided value of each action.
+            told: Requested value of each output.
+            has: Actual value of each output.
         """
         others = {i for i, (a, b) in enumerate(zip(told, has, strict=True)) if abs(a - b) > _STEP}
         if not others:
@@ -140,7 +140,7 @@ class Truth:
         return Done(done, " ".join(reasons))
 
     def _action(self, index: int, value: float, others: set[int], has: Sequence[float]) -> float:
-        """One action: the furthest from rest that an output of its own does."""
+        """Return one action: the value farthest from rest among the outputs of it alone."""
         moved = self._moved[index]
         if others.isdisjoint(moved):
             return value
@@ -156,25 +156,25 @@ class Truth:
 
 
 def drives_first(plan: GuardPlan) -> GuardPlan:
-    """The robot with the outputs that propel it first: a slow servo must not delay their stop."""
+    """Return the plan with propelling outputs first: a slow servo must not delay them."""
     propelling = {action.name for action in plan.actions if action.propels}
     outputs = sorted(plan.outputs, key=lambda output: propelling.isdisjoint(output.mix))
     return replace(plan, outputs=tuple(outputs))
 
 
 class OutputBank:
-    """Opens all outputs at rest, writes to them, and puts each to rest whatever the others do.
+    """All outputs: opened at rest, written together, and stopped independently of each other.
 
     Attributes:
-        values: The value that each output really has, by name.
-        released: Whether they let go.
+        values: Actual value of each output, by name.
+        released: Whether the outputs are released.
 
     Args:
         plan: The robot.
         hardware: Where the outputs are.
 
     Raises:
-        RobotError: If an output does not answer; those opened before are closed.
+        RobotError: If an output does not respond; outputs opened before it are closed.
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
@@ -195,10 +195,10 @@ class OutputBank:
             undo.pop_all()
 
     def write(self, actions: Sequence[float], now_ns: int) -> Done:
-        """Move all outputs, also those that have their value: some controllers need time.
+        """Write all outputs, including unchanged ones: some controllers need several writes.
 
         Returns:
-            What they really do.
+            The applied outputs.
         """
         values = output_values(self._plan, actions)
         for (output, driver), value in zip(self._drivers, values, strict=True):
@@ -209,10 +209,10 @@ class OutputBank:
         return self._truth.done(actions, values, tuple(self.values.values()))
 
     def ready(self) -> str:
-        """Make ready for commands what has had a fault.
+        """Reset outputs that had a fault.
 
         Returns:
-            Why it cannot be, in words; empty where all outputs can move.
+            Why an output cannot be reset; empty if all can move.
         """
         try:
             for device in self._devices:
@@ -222,7 +222,7 @@ class OutputBank:
         return ""
 
     def release(self) -> None:
-        """Let all outputs go, once."""
+        """Release all outputs, once."""
         if self.released:
             return
         for output, driver in self._drivers:
@@ -231,17 +231,17 @@ class OutputBank:
         self.released = True
 
     def rest(self, now_ns: int) -> list[str]:
-        """Put every output to rest, also after one of them failed.
+        """Put every output to rest, even after one of them failed.
 
         Returns:
-            What failed, in words.
+            Description of the failures.
         """
         failures: list[str] = []
         values = output_values(self._plan, self._rest)
         for (output, driver), value in zip(self._drivers, values, strict=True):
             try:
                 self.values[output.name] = driver.write(value, now_ns)
-            except Exception as error:  # Whatever it is, the next output must rest too.
+            except Exception as error:  # Whatever the error, the next output must rest too.
                 failures.append(_words(output, error))
         for device in self._devices:
             try:
@@ -255,9 +255,9 @@ class OutputBank:
         """Put every output to rest and close it.
 
         Returns:
-            What failed, in words.
+            Description of the failures.
         """
-        # What was let go must not be gripped once more.
+        # A released output must not be energised again.
         failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
             try:
@@ -269,7 +269,7 @@ class OutputBank:
 
 
 def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
-    """The devices that these drivers are on, each once."""
+    """Return the distinct devices that the drivers share."""
     found: list[SharedDevice] = []
     for driver in drivers:
         device: SharedDevice | None = getattr(driver, "device", None)
@@ -282,18 +282,18 @@ def _words(output: OutputPlan, error: Exception) -> str:
     return f"Output {output.name}: {str(error) or type(error).__name__}"
 
 
-# Servos with a watchdog of their own let go when the bus is silent; whoever spoke to them now would
-# only keep them awake.
+# Servos with a watchdog of their own release when the bus is silent; talking to them now would only
+# keep them energised.
 _STOPS_ITSELF: Final = ("dynamixel",)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-    """Open every output, which is at rest then, and close it; one that fails keeps no other.
+    """Put every output to rest by opening and closing it, independently of the others.
 
-    Nobody else may have the outputs open.
+    No other process may have the outputs open.
 
     Returns:
-        What failed, in words.
+        Description of the failures.
     """
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []
@@ -302,7 +302,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
             continue
         try:
             opened.append((output.name, open_output(output, hardware)))
-        except Exception as error:  # Whatever it is, the next output must be safe too.
+        except Exception as error:  # Whatever the error, the next output must be made safe too.
             failures.append(f"Output {output.name}: {str(error) or type(error).__name__}")
     # Closed only when all are at rest: lgpio takes 100 ms for each handle that it closes.
     for name, driver in opened:
@@ -319,7 +319,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
 
 
 def preload(plan: GuardPlan, source: str) -> None:
-    """Load everything that `make_safe` needs, and open nothing: later there is no time for it.
+    """Import everything that `make_safe` needs without opening anything, to save time later.
 
     Args:
         plan: The robot.

@@ -1,4 +1,4 @@
-"""What the guard needs to know of a robot: its actions, outputs, sensors and limits.
+"""The guard's plan of a robot: its actions, outputs, sensors and limits.
 
 These are the tables of a profile (`shapechanger.robot.profile`), as plain dataclasses, because the
 guard loads nothing but the standard library and its drivers. They cross from the command line to
@@ -28,21 +28,20 @@ Setting = bool | int | float | str | list[int] | list[float] | list[str]
 
 @dataclass(frozen=True, slots=True)
 class ActionPlan:
-    """One number of a command.
+    """One action of a robot.
 
     Attributes:
-        name: Its name, such as "steering".
-        low: Smallest value that the robot takes: its own cap. Smaller ones are clipped.
-        high: Largest value that the robot takes. The whole range of an action is -1 to 1, or 0 to 1
-            where `one_sided`.
-        rest: The value at rest, where a stop leads to.
-        slew_per_s: How fast it may move away from rest, 1/s. Towards rest it may jump.
-        levels: "any", or "three" for a motor that knows full left, off and full right only.
-        threshold: Size from which on a value counts as full, where `levels` is "three".
-        propels: Whether it makes the robot go. Such an action goes to rest at once at a stop.
+        name: Name, such as "steering".
+        low: Lower cap; smaller values are clipped.
+        high: Upper cap. The full range of an action is -1 to 1, or 0 to 1 if `one_sided`.
+        rest: Value at rest, the end of every stop.
+        slew_per_s: Fastest change away from rest, 1/s. Changes towards rest are immediate.
+        levels: "any", or "three" for a motor with only full left, off and full right.
+        threshold: Magnitude from which a value counts as full if `levels` is "three".
+        propels: Whether it propels the robot; such an action rests at once in a stop.
         one_sided: Whether the range is 0 to 1.
-        unit: Unit of the quantity that it moves, where it is an angle or a length.
-        gain: What one unit of the action does, in `unit`.
+        unit: Unit of the quantity that it moves, if that is an angle or a length.
+        gain: Effect of one unit of the action, in `unit`.
     """
 
     name: str
@@ -60,18 +59,18 @@ class ActionPlan:
 
 @dataclass(frozen=True, slots=True)
 class OutputPlan:
-    """One motor, servo or controller, and how much of each action it gets.
+    """One motor, servo or controller, with its weight of each action.
 
     Its value is `offset` plus the weighted sum of the actions, clipped to -1 to 1.
 
     Attributes:
-        name: Its name, such as "left".
+        name: Name, such as "left".
         driver: Name of its driver, such as "hbridge".
-        part: What it moves, such as "wheels" or "left track"; "" for something else.
+        part: The part that it moves, such as "wheels" or "left track"; may be empty.
         mix: Weight of each action.
         offset: Value where all actions are 0.
-        settings: What the driver needs: pins, channels, pulse widths; all of its keys, those with
-            their default too.
+        settings: Settings of the driver, such as pins and pulse widths, with all defaults filled
+            in.
     """
 
     name: str
@@ -84,14 +83,14 @@ class OutputPlan:
 
 @dataclass(frozen=True, slots=True)
 class SensorPlan:
-    """One sensor that the guard reads.
+    """One sensor of the guard.
 
     Attributes:
-        name: Its name, such as "bumper".
+        name: Name, such as "bumper".
         driver: Name of its driver, such as "switch".
         measures: What it measures: "speed", "bump", "distance", "imu", "battery",
             "temperature", "tendons" or "joints".
-        settings: What the driver needs; all of its keys, those with their default too.
+        settings: Settings of the driver, with all defaults filled in.
     """
 
     name: str
@@ -102,20 +101,20 @@ class SensorPlan:
 
 @dataclass(frozen=True, slots=True)
 class LimitPlan:
-    """When the robot stops by itself.
+    """Limits beyond which the robot stops by itself.
 
     Attributes:
-        deadline_ms: How long the newest command acts; then the robot stops.
-        camera_stale_ms: Age of the newest picture from which on the robot is blind, and stops; 0
-            for a robot without a camera.
-        bump_hold_ms: How long a bump keeps the robot from going forward. All bumpers count as front
-            bumpers: touched from behind, it may still go backward.
-        stop_distance_m: Distance ahead below which it does not go forward, nor does it while
-            a sensor knows none; 0 for never.
-        stall_s: How long it may push without moving before it stops; 0 for ever.
-        stall_throttle: Propulsion above which it should move.
-        low_battery_v: Voltage below which it stops; 0 for none.
-        high_temperature_c: Temperature of the computer above which it stops; 0 for none.
+        deadline_ms: Time for which the newest command acts before the robot stops, ms.
+        camera_stale_ms: Age of the newest frame from which the robot stops, ms; 0 for a robot
+            without a camera.
+        bump_hold_ms: Time for which a bump blocks forward motion, ms. All bumpers count as front
+            bumpers, so the robot may still reverse.
+        stop_distance_m: Distance ahead below which forward motion is blocked, as it is while a
+            sensor has no reading; 0 to disable.
+        stall_s: Longest push without motion before the robot stops, s; 0 to disable.
+        stall_throttle: Propulsion above which motion is expected.
+        low_battery_v: Voltage below which the robot stops, V; 0 to disable.
+        high_temperature_c: CPU temperature above which the robot stops, °C; 0 to disable.
     """
 
     deadline_ms: int = 250
@@ -130,12 +129,12 @@ class LimitPlan:
 
 @dataclass(frozen=True, slots=True)
 class StopPlan:
-    """What a stop does with the actions that do not propel.
+    """Course of a stop for the actions that do not propel.
 
     Attributes:
-        hold_ms: How long they keep their value.
-        ramp_ms: How long they then take to their rest.
-        then: Whether the outputs then hold the rest, or let go.
+        hold_ms: Time for which they hold their value, ms.
+        ramp_ms: Duration of the ramp to rest after that, ms.
+        then: Whether the outputs then hold at rest or are released.
     """
 
     hold_ms: int = 0
@@ -145,19 +144,19 @@ class StopPlan:
 
 @dataclass(frozen=True, slots=True)
 class GuardPlan:
-    """Everything that the guard needs to know.
+    """Everything that the guard needs.
 
     Attributes:
         name: Name of the robot.
         actions: The numbers of a command, in order.
-        outputs: What they move.
-        sensors: What the guard reads.
-        limits: When it stops by itself.
-        stop: How it stops.
+        outputs: The outputs that they move.
+        sensors: The sensors that it reads.
+        limits: When the robot stops by itself.
+        stop: Course of a stop.
         enable_pin: BCM pin that is toggled while the guard lives, for the one-shot that holds the
             enable line of the motors; None without one.
         stop_pin: BCM pin of an emergency stop button to ground; None without one.
-        tick_hz: How often the rules are looked at without anything happening.
+        tick_hz: Rate at which the rules run when nothing happens, Hz.
         enable_hold_ms: How long the one-shot holds the enable line after the last toggle of
             `enable_pin`. The guard does not need it; a twin of the wiring does.
     """
@@ -174,12 +173,12 @@ class GuardPlan:
     enable_hold_ms: int = 100
 
     def to_json(self) -> str:
-        """The plan as JSON."""
+        """Return the plan as JSON."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> GuardPlan:
-        """Read what `to_json` wrote; for nothing else, since it checks nothing."""
+        """Read the output of `to_json`. The text is trusted and not validated."""
         data: dict[str, Any] = json.loads(text)
         return cls(
             name=data["name"],
@@ -196,14 +195,14 @@ class GuardPlan:
 
 
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:
-    """The value of each output, -1 to 1: its offset plus the weighted sum of the actions, clipped.
+    """Return the value of each output: its offset plus the weighted sum of the actions, in [-1, 1].
 
     Args:
         plan: The robot.
         actions: One number for each of its actions, in order.
 
     Raises:
-        ValueError: If these are not as many numbers as the robot has actions.
+        ValueError: If the number of actions is wrong.
     """
     if len(actions) != len(plan.actions):
         names = ", ".join(action.name for action in plan.actions)

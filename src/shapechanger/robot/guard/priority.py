@@ -1,4 +1,4 @@
-"""Lets a process run before others, where that is allowed."""
+"""Process priorities, where the system permits them."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ GUARD = 5
 """Real-time priority of the guard."""
 
 SUPERVISOR = 10
-"""Real-time priority of the supervisor: it ends a guard that does nothing but run."""
+"""Real-time priority of the supervisor, above the guard's, so that it can end a busy loop."""
 
 _NICENESS = -10
-# µs that a real-time process may run without ever waiting; then the kernel ends it (SIGXCPU), and
-# the supervisor starts another. A round of the guard takes a few thousand.
+# Longest uninterrupted run of a real-time process, µs; the kernel then ends it (SIGXCPU) and the
+# supervisor restarts it. A round of the guard takes a few thousand.
 _MOST_RUN_US = 500_000
 
 
 def run_early() -> None:
-    """Ask for more of the processor."""
-    # Without the right to it everything works as well, only behind a busy neighbour a little later;
-    # the systemd unit gives the right.
+    """Raise this process above normal priority."""
+    # Without the permission, a busy neighbour can delay the process a little; the systemd unit
+    # grants it.
     with contextlib.suppress(PermissionError):
         os.nice(_NICENESS)
 
 
 def run_promptly(priority: int) -> None:
-    """Run before everything that is not real-time, and keep what is loaded out of collection.
+    """Switch this process to real-time scheduling and freeze its objects out of garbage collection.
 
-    A machine that is busy with fourteen other things delayed stops by up to 50 ms where the guard
-    was merely a nice process. What it starts is not real-time.
+    On a machine with fourteen busy processes, stops were up to 50 ms late when the guard merely had
+    a better nice value. Child processes are not real-time.
 
     Args:
         priority: `GUARD` or `SUPERVISOR`.
     """
     run_early()
-    # `os` has neither where there is no Linux; who has no right to it goes on as it is.
+    # Missing outside Linux, and not permitted to every user; both are fine.
     with contextlib.suppress(AttributeError, PermissionError):
         resource.setrlimit(resource.RLIMIT_RTTIME, (_MOST_RUN_US, _MOST_RUN_US))
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))

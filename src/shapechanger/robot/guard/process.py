@@ -1,10 +1,10 @@
-"""The guard: the one process that owns the outputs of a robot.
+"""Guard process: the only owner of a robot's outputs.
 
-It trusts nobody. The daemon asks, `shapechanger.robot.guard.rules.Rules` decides, and this loop
-writes. It ends, with all outputs at rest, when it is told to (SIGTERM or the order "end"), when the
-supervisor is gone, and when anything goes wrong in it. A daemon that is gone disarms it.
+The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends,
+with all outputs at rest, on SIGTERM, on the order "end", when the supervisor dies, and on any error
+of its own. The death of the daemon disarms it.
 
-Exit codes: 0 when it was told to end or the supervisor is gone, 1 when something went wrong.
+Exit codes: 0 if it was asked to end or the supervisor died, 1 after an error.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from shapechanger.robot.hardware import Hardware, connect
 __all__ = ["BEAT_S", "Guard", "main"]
 
 BEAT_S: Final = 0.01
-"""Real seconds between two heartbeats; the supervisor allows `guard_silence_ms` between two."""
+"""Interval between heartbeats, s of real time; the supervisor allows `guard_silence_ms`."""
 
-_WAIT_S: Final = 0.01  # Real seconds of one wait at most, while a twin's time stands still.
-_STATE_EVERY_NS: Final = 20_000_000  # 50 states a second at least.
-_MOST_REASON_BYTES: Final = 1000  # Several reasons may come together; a datagram holds 16 kB.
+_WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
+_STATE_EVERY_NS: Final = 20_000_000  # At least 50 states per second.
+_MOST_REASON_BYTES: Final = 1000  # Several reasons may be joined; a datagram holds 16 kB.
 
 
 class Guard:
-    """The loop of the guard.
+    """Main loop of the guard.
 
     Args:
         plan: The robot.
         hardware: Its pins, buses and time.
-        daemon: Where orders come from.
-        log: Where to say what happens.
-        after_failure: Whether it follows processes of this robot that failed. Then it begins with
-            an emergency stop, so that only a person lets it move again.
+        daemon: Source of orders.
+        log: Receives one line per event.
+        after_failure: Whether it replaces processes that failed. It then starts in an emergency
+            stop, which only a person can end.
     """
 
     def __init__(
@@ -66,14 +66,14 @@ class Guard:
         self._period_ns = round(1e9 / plan.tick_hz)
         now_ns = self._clock.now_ns()
         with contextlib.ExitStack() as undo:
-            # Outputs first: until they are open, whatever their pins did goes on.
+            # Outputs first: until they are open, their pins keep doing what they did.
             self._outputs = OutputBank(plan, hardware)
             undo.callback(self._close_outputs)
             self._switches = Switches(plan, hardware)
             undo.callback(self._switches.close)
             self._sensors = Sensors(plan, hardware)
             undo.callback(self._sensors.close)
-            # The first thing at the end: pins take their time to be closed.
+            # First at the end, because closing the pins takes time.
             undo.callback(self._rest_outputs)
             self._opened = undo.pop_all()
         self._rules = Rules(plan, now_ns)
@@ -94,15 +94,15 @@ class Guard:
         """Why it ends, in words; empty while it does not."""
 
     def run(self, heartbeat: Heartbeat) -> None:
-        """Guard until told to end.
+        """Run until asked to end.
 
         Args:
-            heartbeat: How the supervisor knows that this lives.
+            heartbeat: Sign of life to the supervisor.
         """
         until_ns = self._clock.now_ns()
         while not self.ended:
             fds = [heartbeat.fileno()]
-            if not self._daemon.lost:  # The end of a stream can be read for ever.
+            if not self._daemon.lost:  # A closed stream stays readable.
                 fds += self._daemon.filenos()
             has_something = self._clock.wait(fds, until_ns, _WAIT_S)
             heartbeat.beat()
@@ -112,12 +112,12 @@ class Guard:
                 until_ns = self.round(self._clock.now_ns())
 
     def close(self) -> None:
-        """Put all outputs to rest and let go of everything."""
+        """Put all outputs to rest and release everything."""
         self._opened.close()
 
     def _rest_outputs(self) -> None:
         if not self._outputs.released:
-            self._outputs.rest(self._clock.now_ns())  # Whoever fails is told of when it is closed.
+            self._outputs.rest(self._clock.now_ns())  # Failures are reported on closing.
 
     def _close_outputs(self) -> None:
         for failure in self._outputs.close(self._clock.now_ns()):
@@ -125,15 +125,15 @@ class Guard:
             self._log.error("%s", failure)
 
     def round(self, now_ns: int) -> int:
-        """Do what there is to do, and say when there is something to do again."""
+        """Run one round and return the time of the next."""
         self._obey()
         if is_tick := now_ns >= self._next_tick_ns:
             self._next_tick_ns = max(self._next_tick_ns, now_ns - self._period_ns)
             self._next_tick_ns += self._period_ns
             if self._applied[1] is not None and self._rules.stands(now_ns):
-                self._apply(now_ns)  # No stop waits for a sensor.
+                self._apply(now_ns)  # Stops do not wait for sensors.
             self._sense(now_ns)
-        now_ns = self._clock.now_ns()  # Orders and sensors took their time.
+        now_ns = self._clock.now_ns()  # Reading orders and sensors took time.
         decision = self._apply(now_ns)
         if is_tick and self._healthy:
             self._switches.toggle()
@@ -151,7 +151,7 @@ class Guard:
             if order.kind == "end":
                 self.ended = "the daemon ended it"
         if malformed:
-            self._rules.halt()  # Whoever said it had done with the command before.
+            self._rules.halt()  # Its sender has superseded the previous command.
             self._malformed += len(malformed)
             self._refused = (malformed[-1], None)
             words = shortened(malformed[-1])
@@ -178,7 +178,7 @@ class Guard:
                 self._outputs.release()
             else:
                 decision = self._truly(decision, self._outputs.write(decision.actions, now_ns))
-        except Exception as error:  # Whatever a driver raises: everything else must rest.
+        except Exception as error:  # Whatever a driver raises, the other outputs must rest.
             self._healthy = False
             self._rules.fail(str(error) or type(error).__name__, now_ns)
             return self._recover(decision, now_ns)
@@ -188,15 +188,15 @@ class Guard:
         return decision
 
     def _truly(self, decision: OutputDecision, done: Done) -> OutputDecision:
-        """The decision as the outputs carry it out."""
+        """Return the decision as the outputs applied it."""
         self._rules.learn(done.actions)
         reason = decision.stop_reason
-        if decision.seq is not None:  # A robot at rest does what it was told, if a little later.
+        if decision.seq is not None:  # A robot at rest obeys, if slightly later.
             reason = f"{reason} {done.reason}".strip()
         return replace(decision, actions=done.actions, stop_reason=reason)
 
     def _recover(self, decision: OutputDecision, now_ns: int) -> OutputDecision:
-        """Put all outputs to rest, again and again until each of them obeys."""
+        """Put all outputs to rest, retrying until each of them obeys."""
         failures = self._outputs.rest(now_ns)
         self._healthy = not failures
         if failures and not self._rules.arming.emergency:
@@ -285,7 +285,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         opened.callback(hardware.close)
         guard = Guard(plan.guard, hardware, daemon, log, after_failure=after_failure)
         opened.callback(guard.close)
-        if told:  # While it was being set up.
+        if told:  # During set-up.
             guard.ended = told[0]
         run_promptly(GUARD)
         log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))

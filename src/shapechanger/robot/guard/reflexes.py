@@ -1,4 +1,4 @@
-"""What the robot does without being told: reflexes on its sensors."""
+"""Reflexes: automatic reactions to bumps, stalls, battery, temperature and failed sensors."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = [
 
 
 class Persistence:
-    """A condition that counts once it has held without a break.
+    """Condition that counts once it has held without interruption.
 
     Args:
-        for_s: How long it must hold, s.
+        for_s: Time for which it must hold, s.
     """
 
     def __init__(self, for_s: float) -> None:
@@ -30,7 +30,7 @@ class Persistence:
         self._since_ns: int | None = None
 
     def holds(self, condition: bool, now_ns: int) -> bool:
-        """Whether the condition, which is so now, has been so for long enough."""
+        """Update with the current condition and return whether it has held for long enough."""
         if not condition:
             self._since_ns = None
             return False
@@ -40,21 +40,21 @@ class Persistence:
 
 
 STANDS_M_PER_S = 0.01
-"""Speed below which a robot stands still, m/s; one count of a coarse wheel encoder a second."""
+"""Speed below which a robot stands still, m/s: one count per second of a coarse encoder."""
 
-# How long a battery must be low, or a computer hot, before it is believed: one noisy reading, and
-# the dip when a motor starts, must not stop the robot.
+# Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
+# starts, must not stop the robot.
 _BELIEVED_AFTER_S = 0.5
 
 
 class Bump:
-    """Keeps the robot from going forward while something is touched, and some time after.
+    """Block forward motion during a contact and for some time after it.
 
     Attributes:
-        count: How many bumps there were.
+        count: Number of bumps.
 
     Args:
-        hold_ms: How long after.
+        hold_ms: Time after the contact, ms.
     """
 
     def __init__(self, hold_ms: int) -> None:
@@ -65,7 +65,7 @@ class Bump:
         """When the robot may go forward again; None if it never bumped."""
 
     def sense(self, quantities: Mapping[str, float], now_ns: int) -> None:
-        """Take in a sensing."""
+        """Update with a new sensing."""
         touches = quantities.get("bump", 0.0) > 0.0
         if touches:
             self.count += not self._touches
@@ -73,22 +73,22 @@ class Bump:
         self._touches = touches
 
     def blocks(self, now_ns: int) -> bool:
-        """Whether the robot must not go forward."""
+        """Return whether forward motion is blocked."""
         return self._touches or (self.until_ns is not None and now_ns < self.until_ns)
 
 
 class Stall:
-    """Notices that the robot pushes without moving, and keeps it from pushing on.
+    """Detect a push without motion, and block further pushing.
 
-    It may push again once the command has asked for something else: rest, or the other way.
+    The block ends once the command asks for rest or for the other direction.
 
     Attributes:
         way: Sign of the push that stalled; 0 for none.
-        watches: Whether there is a measured speed to tell it by.
+        watches: Whether a measured speed is available.
 
     Args:
-        after_s: How long it may push, s; 0 for ever.
-        threshold: Push above which it should move.
+        after_s: Longest push without motion, s; 0 to disable.
+        threshold: Push above which motion is expected.
     """
 
     def __init__(self, after_s: float, threshold: float) -> None:
@@ -100,7 +100,7 @@ class Stall:
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
-        """Take in a sensing, and how hard the robot is pushed, -1 to 1."""
+        """Update with a new sensing and the push, -1 to 1."""
         self.watches = self._after_s > 0.0 and "speed" in quantities
         stands = self.watches and abs(quantities["speed"]) < STANDS_M_PER_S
         if self._forward.holds(stands and push > self._threshold, now_ns):
@@ -109,15 +109,15 @@ class Stall:
             self.way = -1
 
     def ask(self, push: float) -> None:
-        """Take in what the command asks for."""
+        """Update with the push that the command asks for."""
         if self.way * push <= 0.0:
             self.way = 0
 
 
 class RobotHealth:
-    """Says why the robot must not move at all: a sensor that fails, battery, temperature.
+    """Reasons to keep the whole robot at rest: failed sensors, low battery, high temperature.
 
-    A low battery recovers as soon as nothing is moved; so it keeps the robot at rest until it is
+    A battery recovers as soon as the load is gone, so a low battery latches until the robot is
     armed again.
 
     Args:
@@ -144,17 +144,17 @@ class RobotHealth:
 
     @property
     def reason(self) -> str:
-        """Why nothing may move, in words; empty when it may."""
+        """Return why nothing may move, or an empty string."""
         return " ".join(filter(None, (*self._others, self._battery)))
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Take in a sensing."""
+        """Update with a new sensing."""
         failing = [
             f"Sensor {name} fails, and can protect no longer: {sensing.failures[name]}"
             for name in self._protecting
             if name in sensing.failures and name not in sensing.slow
         ]
-        # Also one that protects from nothing: it holds up every stop.
+        # Even a sensor without a reflex: a slow one delays every stop.
         failing += [
             f"Sensor {name} holds up the robot: {sensing.failures[name]}"
             for name in sorted(sensing.slow)
@@ -172,17 +172,17 @@ class RobotHealth:
         self._others = tuple(failing)
 
     def rearm(self) -> None:
-        """Forget that the battery was low, unless it still is."""
+        """Clear the low-battery latch, unless the battery is still low."""
         if not self._is_low:
             self._battery = ""
 
 
 STEERING = "steering"
-"""Name of the action that turns. It may propel, as that of a tank does, but never forward."""
+"""Name of the turning action. It may propel, as a tank's does, but never forward."""
 
 
 class Propulsion:
-    """What of the actions goes forward; a positive value is forward.
+    """Forward component of the actions; positive is forward.
 
     Attributes:
         forward: Which actions push the robot forward or backward, by index.
@@ -194,15 +194,15 @@ class Propulsion:
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != STEERING)
-        # Actions whose profile says how fast they make the robot.
+        # Actions whose profile gives a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 
     def push(self, values: Sequence[float]) -> float:
-        """How hard the robot is pushed forward, -1 to 1; negative is backward."""
+        """Return the forward push, -1 to 1; negative is backward."""
         return self._mean(self.forward, [value - a.rest for value, a in self._pairs(values)])
 
     def speed(self, values: Sequence[float]) -> float | None:
-        """Speed that this push gives by the profile, m/s; None where the profile has none."""
+        """Return the speed that the profile gives for this push, m/s; None if it gives none."""
         if not self._known:
             return None
         speeds = [a.gain * (value - a.rest) for value, a in self._pairs(values)]

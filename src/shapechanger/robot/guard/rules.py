@@ -1,8 +1,8 @@
-"""Everything that decides whether and how the outputs move, with the time handed in.
+"""Safety rules: whether and how the outputs move, as a function of time.
 
-Nothing here knows a pin, a socket or a clock, so that each rule can be tried at any moment. The
-process around it (`shapechanger.robot.guard.process`) hands in orders and what was sensed, and
-writes what `Rules.tick` decides.
+No pins, sockets or clocks, so that every rule can be tested at any time. The guard process
+(`shapechanger.robot.guard.process`) passes in orders and sensor readings, and writes what
+`Rules.tick` decides.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = ["ARM_WITHIN_NS", "Arming", "OutputDecision", "Rules", "Stopping"]
 
 
 class Arming:
-    """Starts disarmed. An emergency stop latches until a person who knows of it arms again.
+    """Arming state: starts disarmed; an emergency stop latches until a person who saw it arms.
 
     Attributes:
         armed: Whether commands move anything.
         emergency: Whether an emergency stop is in force.
-        emergencies: How many there were.
-        reason: Why nothing may move, in words; empty while armed.
+        emergencies: Number of emergency stops.
+        reason: Why nothing may move; empty while armed.
     """
 
     def __init__(self) -> None:
@@ -38,14 +38,14 @@ class Arming:
         self.reason = "Not armed."
 
     def arm(self, seen: int, *, person: bool) -> str:
-        """Let commands move, and end an emergency stop.
+        """Arm, and end an emergency stop.
 
         Args:
-            seen: How many emergency stops whoever arms has seen.
+            seen: Number of emergency stops that the sender knows of.
             person: Whether a person arms.
 
         Returns:
-            Why not, in words; empty when it is armed now.
+            Why it stays disarmed; empty if it is armed now.
         """
         if self.emergency and not person:
             return "Not armed: only a person ends an emergency stop."
@@ -58,13 +58,13 @@ class Arming:
         return ""
 
     def disarm(self, reason: str) -> None:
-        """Let nothing move; the reason of an emergency stop stays."""
+        """Disarm; the reason of an emergency stop is kept."""
         self.armed, reason = False, shortened(reason)
         if not self.emergency:
             self.reason = f"Disarmed: {reason}" if reason else "Disarmed."
 
     def stop(self, reason: str) -> None:
-        """Stop at once, until armed again; each call counts, and the first reason stays."""
+        """Latch an emergency stop. Each call counts; the first reason is kept."""
         reason = shortened(reason)
         if not self.emergency:
             self.reason = f"Emergency stop: {reason}" if reason else "Emergency stop."
@@ -76,13 +76,13 @@ _NS_PER_MS = 1_000_000
 
 
 class Stopping:
-    """One stop: what propels rests at once, the other actions hold, ramp to rest, and let go.
+    """A stop in progress: propulsion rests at once; other actions hold, ramp to rest and release.
 
     Args:
-        plan: How long they hold and ramp.
+        plan: Duration of the hold and the ramp.
         actions: The actions.
-        values: What they are when the stop begins.
-        since_ns: When it begins.
+        values: Values of the actions at the start of the stop.
+        since_ns: Start of the stop, ns.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Stopping:
         """When all of them rest."""
 
     def values(self, now_ns: int) -> tuple[float, ...]:
-        """What the actions are now."""
+        """Return the value of each action."""
         left = self._left(now_ns)
         return tuple(
             action.rest if action.propels else action.rest + left * (value - action.rest)
@@ -109,15 +109,15 @@ class Stopping:
         )
 
     def releases(self, now_ns: int) -> bool:
-        """Whether the outputs let go."""
+        """Return whether the outputs are released."""
         return self._then == "release" and now_ns >= self.end_ns
 
     def next_ns(self, now_ns: int) -> int | None:
-        """When the next thing happens; None when nothing does, or something all the time."""
+        """Return the time of the next change; None if there is none or it is continuous."""
         return next((t for t in (self._hold_end_ns, self.end_ns) if t > now_ns), None)
 
     def _left(self, now_ns: int) -> float:
-        """How much of the way to rest is left, 1 to 0."""
+        """Return the remaining part of the way to rest, 1 to 0."""
         if now_ns < self._hold_end_ns:
             return 1.0
         if now_ns >= self.end_ns:
@@ -126,23 +126,23 @@ class Stopping:
 
 
 ARM_WITHIN_NS = 1_000_000_000
-"""Age from which on an order to arm is refused, ns: nobody looks at the robot any more."""
+"""Age from which an order to arm is refused, ns: the operator may no longer be watching."""
 
-# What the sensors measure whose failure takes the leave to move.
+# Quantities of the sensors whose failure disarms the robot.
 _DISARMING = ("tendons", "joints")
 _CLIPPED = "Clipped by the robot's caps."
 
 
 @dataclass(frozen=True, slots=True)
 class OutputDecision:
-    """What the outputs do from now on.
+    """Decision of the rules on the outputs.
 
     Attributes:
         actions: One number for each action.
-        release: Whether the outputs let go instead.
+        release: Whether the outputs are released instead.
         stop_reason: Why the robot does not do what it was told, in words; empty when it does.
-        session: Session of the command behind it.
-        seq: Its number; None while the robot stands still by itself.
+        session: Session of the underlying command.
+        seq: Its sequence number; None while the robot is at rest without a command.
     """
 
     actions: tuple[float, ...]
@@ -153,15 +153,15 @@ class OutputDecision:
 
 
 class Rules:
-    """The rules of one robot.
+    """Safety rules of one robot.
 
     Attributes:
         arming: Whether commands may move anything.
-        senses: What is sensed, and what follows from it.
+        senses: Sensor readings and their conclusions.
 
     Args:
         plan: The robot.
-        now_ns: The time.
+        now_ns: Monotonic time, ns.
 
     Raises:
         RobotError: If an action rests outside its own caps.
@@ -194,30 +194,30 @@ class Rules:
         self._ticked_ns = now_ns
         self._applied = tuple(action.rest for action in plan.actions)
         self._done = self._applied
-        # A guard starts at the end of a stop.
+        # A guard starts as if a stop had just ended.
         self._stopping: Stopping | None = self._rest_at_once(now_ns)
 
     @property
     def applied(self) -> tuple[float, ...]:
-        """What was decided last, one number for each action."""
+        """Return the last decided value of each action."""
         return self._applied
 
     @property
     def direction(self) -> float:
-        """Sign of the propulsion: 1 forward, -1 backward, 0 neither."""
+        """Return the sign of the propulsion: 1 forward, -1 backward, 0 neither."""
         push = self._propulsion.push(self._done)
         return float((push > 0.0) - (push < 0.0))
 
     @property
     def bumps(self) -> int:
-        """How many bumps there were."""
+        """Return the number of bumps."""
         return self._bump.count
 
     def offer(self, order: Order, now_ns: int) -> str:
-        """Take in an order.
+        """Process an order.
 
         Returns:
-            Why it is refused, in words; empty when it is not.
+            Why it is refused; empty if it is not.
         """
         self._see_frame(order, now_ns)
         match order.kind:
@@ -236,7 +236,7 @@ class Rules:
         return ""
 
     def halt(self) -> None:
-        """Take the newest command back; the robot stays armed."""
+        """Cancel the newest command; the robot stays armed."""
         self._command = None
 
     def disarm(self, reason: str) -> None:
@@ -250,18 +250,18 @@ class Rules:
         self.arming.stop(reason)
 
     def fail(self, reason: str, now_ns: int) -> None:
-        """An output does not obey: an emergency stop without any hold or ramp."""
+        """Latch an emergency stop without hold or ramp, after an output failed."""
         self.stop(reason)
         self._stopping = self._rest_at_once(now_ns)
 
     def press(self, pressed: bool) -> None:
-        """Take in whether the emergency button is pressed."""
+        """Update with the state of the emergency stop button."""
         if pressed and not self._is_pressed:
             self.stop("the button was pressed.")
         self._is_pressed = pressed
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Take in what the sensors say."""
+        """Update with new sensor readings."""
         quantities = sensing.quantities
         limit_m = self._plan.limits.stop_distance_m
         self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m
@@ -271,8 +271,8 @@ class Rules:
         self._bump.sense(quantities, now_ns)
         self._stall.sense(quantities, self._propulsion.push(self._done), now_ns)
         self._health.sense(sensing, now_ns)
-        # Servos with a fault have let go, and a magnet that comes and goes is loose: they obey only
-        # after somebody has looked and armed afresh.
+        # Faulty servos have released, and an intermittent magnet is loose: a person has to inspect
+        # them and arm again.
         for name in self._disarming:
             if name in sensing.failures and name not in sensing.slow and self.arming.armed:
                 self.disarm(sensing.failures[name])
@@ -285,7 +285,7 @@ class Rules:
 
     def tick(self, now_ns: int) -> OutputDecision:
         """Decide what the outputs do from now on."""
-        # A pause of the process is no leave to jump.
+        # A pause of the process must not cause a jump.
         elapsed_ns = min(now_ns - self._ticked_ns, 2 * self._period_ns)
         self._ticked_ns = now_ns
         command = self._command
@@ -300,15 +300,15 @@ class Rules:
         return decision
 
     def stands(self, now_ns: int) -> bool:
-        """Whether `tick` would let nothing act now."""
+        """Return whether `tick` would let no command act now."""
         return self._reason(now_ns) != ""
 
     def learn(self, done: tuple[float, ...]) -> None:
-        """Take in what the outputs really do after `tick`, one number for each action."""
+        """Update with the applied value of each action after `tick`."""
         self._done = done
 
     def next_wake_ns(self, now_ns: int) -> int:
-        """When `tick` must be asked again even if nothing happens."""
+        """Return when `tick` is due even if nothing happens."""
         times = [now_ns + self._period_ns]
         if self._command is not None:
             times.append(self._expiry_ns)
@@ -325,7 +325,7 @@ class Rules:
             return refusal
         wanted, given = len(self._plan.actions), len(order.values)
         if given != wanted:
-            self.halt()  # Whoever sent it had done with the one before.
+            self.halt()  # Its sender has superseded the previous command.
             return f"Command {order.seq} has {given} values; this robot has {wanted} actions."
         if not self.arming.armed:
             return f"Command {order.seq} is refused. {self.arming.reason}"
@@ -341,7 +341,7 @@ class Rules:
             return f"Not armed: the order to arm is {age_ns / 1e9:.1f} s old."
         if refusal := self.arming.arm(order.emergency, person=order.person):
             return refusal
-        self._command = None  # What was said before does not move anything now.
+        self._command = None  # Earlier commands must not take effect now.
         self._health.rearm()
         return ""
 
@@ -351,10 +351,10 @@ class Rules:
             self._frame_ns = max(min(frame_ns, now_ns), self._frame_ns or 0)
 
     def _reason(self, now_ns: int) -> str:
-        """Why nothing may act, in words; empty when the newest command may."""
+        """Return why the newest command must not act, or an empty string."""
         if reason := self.arming.reason or self._health.reason:
             return reason
-        # Pictures are told of by commands, so without one nobody knows how old the newest is.
+        # Commands carry the time of the newest frame, so without a command its age is unknown.
         if self._command is None or now_ns >= self._expiry_ns:
             return "No fresh command."
         return self._blindness(now_ns)
@@ -392,7 +392,7 @@ class Rules:
         return OutputDecision(self._applied, False, reason, command.session, command.seq)
 
     def _hold_back(self, aims: list[float], now_ns: int) -> str:
-        """Drop from what is aimed at what a reflex does not allow, and say why."""
+        """Remove what a reflex forbids from the targets, and return why."""
         forward: list[str] = []
         if self._bump.blocks(now_ns):
             forward.append("Not forward: the bumper touched something.")

@@ -1,4 +1,4 @@
-"""All sensors of the guard as one."""
+"""Sensors of the guard, merged into one set of quantities."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def _slower(new: float, old: float) -> bool:
     return abs(new) < abs(old)
 
 
-# The one that calls for more care counts. Of two speeds it is the smaller one, so that a track that
-# turns does not hide one that is stalled. Of other quantities the last one counts.
+# The more cautious reading wins: of two speeds the smaller, so that a turning track does not hide a
+# stalled one. Of other quantities the last one wins.
 _COUNTS_MORE: Final[dict[str, Callable[[float, float], bool]]] = {
     "bump": _larger,
     "collision": _larger,
@@ -46,12 +46,12 @@ def merge(
     measured: Mapping[str, float],
     sensor: str,
 ) -> None:
-    """Add what one more sensor measured.
+    """Merge the readings of one more sensor.
 
     Args:
-        quantities: What was measured so far, by name; changed.
-        sources: Name of the sensor behind each; changed.
-        measured: What this sensor measured.
+        quantities: Readings so far, by name; updated in place.
+        sources: Name of the sensor behind each; updated in place.
+        measured: Readings of this sensor.
         sensor: Its name.
     """
     for name, value in measured.items():
@@ -62,19 +62,19 @@ def merge(
 
 
 ESTIMATED = "estimated"
-"""Source of a quantity that follows from what is commanded."""
+"""Source of a quantity that is estimated from the command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
-    """What the sensors said in one round.
+    """Sensor readings of one round.
 
     Attributes:
-        quantities: What was measured, by name and in SI units; see `GuardState.quantities`.
+        quantities: Readings by name, in SI units; see `GuardState.quantities`.
         sources: Name of the sensor behind each quantity.
-        failures: Why a sensor did not answer, in words, by its name.
-        slow: Sensors that took too long, among those that failed.
-        silent: Distance sensors that answered, but know no distance.
+        failures: Why a sensor did not respond, by its name.
+        slow: Failed sensors that took too long.
+        silent: Distance sensors that responded without a distance.
     """
 
     quantities: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -85,10 +85,10 @@ class Sensing:
 
 
 class SensedState:
-    """The newest sensing, completed by what is concluded from it.
+    """The newest sensing, with estimated quantities added.
 
     Attributes:
-        quantities: By name and in SI units; what nothing measures and nothing implies is absent.
+        quantities: By name, in SI units; unknown quantities are absent.
         sources: Name of the sensor behind each, or "estimated".
     """
 
@@ -99,13 +99,13 @@ class SensedState:
     def complete(
         self, sensing: Sensing, *, speed: float | None, stalled: bool, watches_stall: bool
     ) -> None:
-        """Take in a sensing.
+        """Update with a new sensing.
 
         Args:
-            sensing: What the sensors said.
-            speed: What the speed should be, m/s, for where it is not measured; None for unknown.
-            stalled: Whether the robot pushes without moving.
-            watches_stall: Whether that would be noticed.
+            sensing: The readings.
+            speed: Expected speed, m/s, used if it is not measured; None if unknown.
+            stalled: Whether the robot is stalled.
+            watches_stall: Whether stalls can be detected.
         """
         self.quantities = dict(sensing.quantities)
         self.sources = dict(sensing.sources)
@@ -116,7 +116,7 @@ class SensedState:
         self._conclude_collision()
 
     def _conclude_collision(self) -> None:
-        """A bumper is certain; a stall is the last thing that tells."""
+        """Conclude a collision from a bumper, or else from a stall."""
         signs = [name for name in ("bump", "stall") if name in self.quantities]
         if not signs:
             return
@@ -129,18 +129,18 @@ class SensedState:
 
 
 MOST_READ_NS: Final = 20_000_000
-"""How long a sensor may take to answer, ns: for so long nothing can be stopped."""
+"""Longest response time of a sensor, ns; no stop can happen meanwhile."""
 
 
 class Sensors:
-    """Reads all sensors; one that fails or is slow is named, and the others go on.
+    """All sensors; a failed or slow one is reported without affecting the others.
 
     Args:
         plan: The robot.
         hardware: Where the sensors are.
 
     Raises:
-        RobotError: If a sensor does not answer.
+        RobotError: If a sensor does not respond.
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
@@ -155,10 +155,10 @@ class Sensors:
             raise
 
     def read(self, now_ns: int, direction: float) -> Sensing:
-        """What they say now.
+        """Read all sensors.
 
         Args:
-            now_ns: The time.
+            now_ns: Monotonic time, ns.
             direction: Sign of the propulsion.
         """
         quantities: dict[str, float] = {}
@@ -167,7 +167,7 @@ class Sensors:
         slow: set[str] = set()
         silent: set[str] = set()
         for name, driver in self._drivers:
-            # A twin's time stands still meanwhile, so that its runs are the same on any machine.
+            # A twin's clock is paused meanwhile, so that its runs are reproducible on any machine.
             began_ns = self._clock.now_ns()
             measured: dict[str, float] = {}
             try:
@@ -183,12 +183,12 @@ class Sensors:
                 continue
             if name in self._ranging and name not in failures and "distance" not in measured:
                 silent.add(name)
-            # What a slow one says is true all the same.
+            # A slow reading is still valid.
             merge(quantities, sources, measured, name)
         return Sensing(quantities, sources, failures, frozenset(slow), frozenset(silent))
 
     def close(self) -> None:
-        """Let go of all sensors."""
+        """Release all sensors."""
         while self._drivers:
             _, driver = self._drivers.pop()
             driver.close()

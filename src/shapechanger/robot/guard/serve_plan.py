@@ -1,9 +1,8 @@
-"""What the processes of a robot are started with, handed on as an open file.
+"""Plan for the processes of a robot, passed on as an open file.
 
 The command line checks a profile once, turns it into this plan and starts the supervisor with it.
-The file has no name, so that nothing is left behind, and is sealed, so that nobody can change it,
-also not the processes that inherit it. It lies in memory, so that a full disk does not keep a robot
-from starting.
+The file is anonymous, so that nothing is left behind; sealed, so that no process can change it; and
+in memory, so that a full disk does not keep a robot from starting.
 """
 
 from __future__ import annotations
@@ -37,13 +36,13 @@ class ServePlan:
 
     Attributes:
         guard: What the guard needs.
-        daemon: What the daemon needs, as JSON; the supervisor hands it on unseen.
-        hardware: Where the hardware comes from, and the argument for it; see
+        daemon: What the daemon needs, as JSON, which the supervisor passes on.
+        hardware: Factory of the hardware and its argument; see
             `shapechanger.robot.hardware.connect`.
         python: The interpreter that runs the processes.
-        patience_ms: How long the guard may show no sign of life at least before it is killed; the
-            guard's deadline where that is longer. 0 on a robot. On a twin's own clock time stands
-            still while a world is drawn, and a guard that waits for it is not dead.
+        patience_ms: Lower bound on the silence after which the guard is killed, ms; its deadline
+            applies if that is longer. 0 on a robot. A twin's clock is paused while a world is
+            drawn, and a guard that waits for it is alive.
     """
 
     guard: GuardPlan
@@ -54,11 +53,11 @@ class ServePlan:
 
     @property
     def guard_silence_ms(self) -> int:
-        """How long the guard may show no sign of life before it is killed."""
+        """Silence after which the guard is killed, ms."""
         return max(self.patience_ms, self.guard.limits.deadline_ms)
 
     def to_json(self) -> str:
-        """The plan as JSON."""
+        """Return the plan as JSON."""
         fields = {
             "guard": json.loads(self.guard.to_json()),
             "daemon": self.daemon,
@@ -70,7 +69,7 @@ class ServePlan:
 
     @classmethod
     def from_json(cls, text: str) -> ServePlan:
-        """Read what `to_json` wrote; for nothing else, since it checks nothing."""
+        """Read the output of `to_json`. The text is trusted and not validated."""
         data: dict[str, Any] = json.loads(text)
         source, argument = data["hardware"]
         return cls(
@@ -83,26 +82,26 @@ class ServePlan:
 
 
 def plan_fd(plan: ServePlan) -> int:
-    """An open file with the plan, which child processes inherit; close it when they have it."""
+    """Return an open file with the plan for child processes to inherit; close it afterwards."""
     # Without MFD_CLOEXEC, so that `exec` keeps it open.
     fd = os.memfd_create("serve-plan", os.MFD_ALLOW_SEALING)
     left = memoryview(plan.to_json().encode())
     while left:
         left = left[os.write(fd, left) :]
-    # The guard takes its limits from it, and a daemon that went astray must not move them.
+    # The guard reads its limits from it, which a faulty daemon must not change.
     seals = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
     fcntl.fcntl(fd, fcntl.F_ADD_SEALS, seals)
     return fd
 
 
 def supervisor_command(plan: ServePlan, fd: int) -> list[str]:
-    """What to run, or to become, with the plan open as `fd`."""
+    """Return the command line of the supervisor, with the plan open as `fd`."""
     script = str(Path(start.__file__).resolve())
     return [plan.python, "-I", script, "supervise", "--plan-fd", str(fd)]
 
 
 def read_plan_fd(fd: int) -> ServePlan:
-    """Read the plan; several processes may read the same file, since its position is not used."""
+    """Read the plan without moving the file position, so that several processes can."""
     data = b""
     while part := os.pread(fd, 1 << 16, len(data)):
         data += part
@@ -110,14 +109,14 @@ def read_plan_fd(fd: int) -> ServePlan:
 
 
 AFTER_FAILURE: Final = "--after-failure"
-"""The guard's argument that says that it follows processes which failed."""
+"""Argument of a guard that replaces failed processes."""
 
 
 def descriptors(arguments: Sequence[str], names: Sequence[str]) -> dict[str, int]:
-    """The file descriptors of a command line such as `--plan-fd 3 --heartbeat-fd 4`.
+    """Parse the file descriptors of a command line such as `--plan-fd 3 --heartbeat-fd 4`.
 
     Raises:
-        ValueError: If there are others, or one is missing.
+        ValueError: If one is unknown or missing.
     """
     pairs = dict(zip(arguments[::2], arguments[1::2], strict=True))
     if sorted(pairs) != sorted(names):

@@ -1,8 +1,8 @@
-"""Started by path, in isolated mode, as `python -I start.py PROGRAM ARGUMENTS`.
+"""Entry point, run by path in isolated mode: `python -I start.py PROGRAM ARGUMENTS`.
 
-The guard and its supervisor must be small, and must not fail because of something that they do not
-need. So the package `shapechanger` is put in place here without running its `__init__`, which
-would load Gymnasium and NumPy; below it, modules are imported as everywhere.
+The guard and its supervisor must be small and must not fail because of an unneeded import. So the
+package `shapechanger` is created here without running its `__init__`, which would load Gymnasium
+and NumPy; its modules are then imported as usual.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PROGRAMS: Final = {
     "guard": "shapechanger.robot.guard.process",
     "supervise": "shapechanger.robot.guard.supervisor",
 }
-"""Which module's `main` each program is."""
+"""Module of each program."""
 
 
 def _put_package_in_place() -> None:
@@ -29,7 +29,7 @@ def _put_package_in_place() -> None:
 
 
 def run(program: str, arguments: list[str]) -> None:
-    """Run a program of the robot without the rest of the package."""
+    """Run a program of the robot without loading the rest of the package."""
     if "shapechanger" not in sys.modules:
         _put_package_in_place()
     importlib.import_module(PROGRAMS[program]).main(arguments)

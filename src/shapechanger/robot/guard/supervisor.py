@@ -1,14 +1,13 @@
-"""Starts guard and daemon, listens to their hearts, and makes the outputs safe when one fails.
+"""Supervisor: starts the guard and the daemon, and makes the outputs safe if either fails.
 
-It is the parent of both, and does nothing else, so that there is nothing in it that could fail. A
-guard that is gone or silent cannot put the outputs to rest, and a Raspberry Pi keeps the levels of
-its pins; so then the supervisor does it, again and again until they obey. After that both are
-started afresh, and the new guard begins with an emergency stop, which only a person ends.
+It is the parent of both and does nothing else, so that little can fail. A dead or silent guard
+cannot put the outputs to rest, and a Raspberry Pi keeps the levels of its pins; the supervisor then
+does it, retrying until they obey. After that both are restarted, and the new guard starts in an
+emergency stop, which only a person can end.
 
-Exit codes: 0 when it was told to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1
-when the processes failed too often; 2 when it cannot start; 3 when it ends and, for some seconds,
-an output did not obey or a killed guard did not end. In all cases but the last the outputs are at
-rest, as far as they say.
+Exit codes: 0 if asked to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1 if the
+processes failed too often; 2 if it cannot start; 3 if, at its end, an output did not obey or a
+killed guard did not exit for some seconds. Except for 3, the outputs report that they are at rest.
 """
 
 from __future__ import annotations
@@ -38,24 +37,24 @@ __all__ = ["Child", "ProcessCommands", "Restarts", "Supervisor", "main"]
 
 
 class Child:
-    """Starts a process, listens to its heart, and ends it.
+    """A child process with a heartbeat.
 
     The process gets one end of a pair of sockets as `--heartbeat-fd`. When the supervisor dies,
     however it dies, the kernel closes the other end, and the process ends itself. This is why there
-    is no PR_SET_PDEATHSIG here: a signal would kill the guard in the middle of whatever its pins
-    do, where the end of the stream lets it put them to rest.
+    is no PR_SET_PDEATHSIG here: a signal would kill the guard at once, whereas the end of the
+    stream lets it put its pins to rest.
 
     Attributes:
-        name: What it is.
-        beaten_ns: When its heart was heard last; when it was started, before the first beat.
-        has_beaten: Whether it was heard at all.
-        killed: Whether it was ended by `kill`; one that is stuck in the kernel outlives that.
+        name: Name of the process.
+        beaten_ns: Time of the last heartbeat, or of the start before the first, ns.
+        has_beaten: Whether there was a heartbeat.
+        killed: Whether it was killed; a process stuck in the kernel survives that.
 
     Args:
-        name: What it is.
-        command: What to run; `--heartbeat-fd N` is added.
-        inherited: Descriptors that it inherits.
-        now_ns: The time.
+        name: Name of the process.
+        command: Command line, to which `--heartbeat-fd N` is added.
+        inherited: File descriptors that it inherits.
+        now_ns: Monotonic time, ns.
     """
 
     def __init__(
@@ -72,30 +71,30 @@ class Child:
                 [*command, "--heartbeat-fd", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[*inherited, theirs.fileno()],
-                # A key press such as Ctrl-C is for the supervisor, which ends them in order.
+                # Ctrl-C goes to the supervisor, which ends its children in order.
                 process_group=0,
             )
-        # Tells of the end at once. The heartbeat's end tells it too, but not of a process whose own
-        # children hold the socket.
+        # Signals the exit at once. The end of the heartbeat does too, but not if a grandchild holds
+        # the socket.
         can_watch = hasattr(os, "pidfd_open")
         self._pidfd = os.pidfd_open(self._process.pid) if can_watch else None
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Process id."""
         return self._process.pid
 
     @property
     def code(self) -> int | None:
-        """Its exit code, negative for a signal; None while it runs."""
+        """Exit code, negative for a signal; None while it runs."""
         return self._process.returncode
 
     def descriptors(self) -> list[int]:
-        """What can be read when it says something or ends."""
+        """Return the descriptors that become readable when it beats or exits."""
         return [self._heart.fileno(), *([] if self._pidfd is None else [self._pidfd])]
 
     def is_gone(self, now_ns: int) -> bool:
-        """Listen to its heart, and say whether it has ended."""
+        """Read its heartbeats and return whether it has exited."""
         try:
             while beats := self._heart.recv(4096):
                 self.has_beaten, self.beaten_ns = True, now_ns
@@ -109,33 +108,33 @@ class Child:
         return self._process.poll() is not None or is_closed
 
     def has_ended(self) -> bool:
-        """Whether there is no such process any more."""
+        """Return whether the process has exited."""
         return self._process.poll() is not None
 
     def kill(self, at_most_s: float) -> None:
-        """End it at once (SIGKILL), and wait for its end so long at most."""
+        """Send SIGKILL and wait at most `at_most_s` seconds for its exit."""
         self.killed = True
         self._process.kill()
         self._wait(at_most_s)
 
     def tell(self) -> None:
-        """Tell it to end (SIGTERM)."""
+        """Send SIGTERM."""
         if not self.has_ended():
             self._process.terminate()
 
     def end(self, at_most_s: float, reap_s: float) -> None:
-        """Tell it to end, and end it at once if it has not ended by then.
+        """Send SIGTERM, then SIGKILL if it has not exited in time.
 
         Args:
-            at_most_s: How long it may take.
-            reap_s: How long it may take to be gone after it was killed.
+            at_most_s: Time to exit after SIGTERM, s.
+            reap_s: Time to disappear after SIGKILL, s.
         """
         self.tell()
         if not self._wait(at_most_s):
             self.kill(reap_s)
 
     def close(self) -> None:
-        """Let go of it; it must have ended."""
+        """Close its descriptors; the process must have exited."""
         self._heart.close()
         if self._pidfd is not None:
             os.close(self._pidfd)
@@ -144,7 +143,7 @@ class Child:
     def _wait(self, at_most_s: float) -> bool:
         try:
             self._process.wait(at_most_s)
-        except subprocess.TimeoutExpired:  # Stuck in the kernel, or deaf.
+        except subprocess.TimeoutExpired:  # Stuck in the kernel, or unresponsive.
             return False
         return True
 
@@ -153,10 +152,10 @@ _PAUSE_S: Final = 0.2
 
 
 class Restarts:
-    """Counts the restarts of the recent past.
+    """Limit on recent restarts.
 
     Args:
-        most: How many there may be in that time.
+        most: Largest number of restarts in that time.
         within_s: The time, s.
     """
 
@@ -167,11 +166,11 @@ class Restarts:
 
     @property
     def pause_s(self) -> float:
-        """How long to wait before the restart that counted last, s: twice as long each time."""
+        """Delay before the restart that was counted last, s; it doubles each time."""
         return _PAUSE_S * (2 ** (len(self._times_ns) - 1) - 1)
 
     def may_restart(self, now_ns: int) -> bool:
-        """Whether there may be one more now, which then counts."""
+        """Return whether another restart is permitted now, and count it."""
         while self._times_ns and now_ns - self._times_ns[0] >= self._within_ns:
             self._times_ns.popleft()
         if len(self._times_ns) >= self._most:
@@ -185,19 +184,23 @@ _FAILED_TOO_OFTEN: Final = 1
 _CANNOT_START: Final = 2
 _NOT_SAFE: Final = 3
 
-_START_S: Final = 30.0  # Until the first heartbeat: a Pi Zero loads a daemon for several seconds.
+_START_S: Final = (
+    30.0  # To the first heartbeat: a Pi Zero takes several seconds to load the daemon.
+)
 _DAEMON_SILENCE_S: Final = 2.0
-_END_S: Final = 1.0  # For a process to end when it is told to.
-_REAP_S: Final = 0.05  # For a killed process to be gone; the pins do not wait any longer.
-_AGAIN_S: Final = 0.1  # Between two attempts to put the outputs to rest.
-_UNSAFE_S: Final = 5.0  # For such attempts where nothing else can be waited for.
-_LOOK_S: Final = 0.02  # Between two looks at the hearts.
-_PAUSE_NS: Final = 100_000_000  # A longer time between two looks means that this did not run.
+_END_S: Final = 1.0  # For a process to exit after SIGTERM.
+_REAP_S: Final = 0.05  # For a killed process to disappear; the pins wait no longer.
+_AGAIN_S: Final = 0.1  # Between attempts to put the outputs to rest.
+_UNSAFE_S: Final = 5.0  # For such attempts when there is nothing else to wait for.
+_LOOK_S: Final = 0.02  # Between checks of the heartbeats.
+_PAUSE_NS: Final = (
+    100_000_000  # A longer gap between checks means that the supervisor itself did not run.
+)
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessCommands:
-    """What to run, without the descriptors.
+    """Command lines of the children, without descriptors.
 
     Attributes:
         guard: The guard.
@@ -209,22 +212,22 @@ class ProcessCommands:
 
     @classmethod
     def of(cls, plan: ServePlan) -> ProcessCommands:
-        """Our own guard and daemon."""
+        """Return the commands of Shapechanger's own guard and daemon."""
         return cls(
             guard=(plan.python, "-I", str(Path(start.__file__).resolve()), "guard"),
-            # -P: the folder where it is started must not hide a module.
+            # -P: a file in the working directory must not shadow a module.
             daemon=(plan.python, "-P", "-m", "shapechanger.robot.daemon"),
         )
 
 
 class Supervisor:
-    """Runs the processes of one robot.
+    """Run the processes of one robot.
 
     Args:
-        plan: What they are started with.
-        fd: Descriptor of the plan, which they inherit.
-        commands: What to run.
-        log: Where to say what happens.
+        plan: Plan of the processes.
+        fd: Descriptor of the plan, inherited by the children.
+        commands: Command lines of the children.
+        log: Receives one line per event.
     """
 
     def __init__(
@@ -239,13 +242,13 @@ class Supervisor:
         self._is_safe = True
         self._has_guarded = False
         self._failures: list[str] = []
-        # A signal makes this readable, so that the loop wakes up.
+        # Becomes readable on a signal, to wake the loop.
         self._woken, self._waker = socket.socketpair()
         for end in (self._woken, self._waker):
             end.setblocking(False)
 
     def run(self) -> int:
-        """Run the processes until told to end.
+        """Run the processes until asked to end.
 
         Returns:
             The exit code.
@@ -284,7 +287,7 @@ class Supervisor:
         self._told = self._told or f"told to by {signal.Signals(number).name}"
 
     def _pause(self, seconds: float) -> None:
-        """Wait; a signal ends that early, once."""
+        """Wait; the first signal ends the wait early."""
         poll = select.poll()
         if not self._told:
             poll.register(self._woken.fileno(), select.POLLIN)
@@ -310,7 +313,7 @@ class Supervisor:
         return Child(name, whole, [self._fd, end.fileno()], time.monotonic_ns())
 
     def _supervise(self, guard: Child, daemon: Child) -> str:
-        """Come back when one of them is gone or silent, or when told to end, and say why."""
+        """Return why supervision ended: a dead or silent child, or a request to end."""
         poll = select.poll()
         for fd in (*guard.descriptors(), *daemon.descriptors(), self._woken.fileno()):
             poll.register(fd, select.POLLIN)
@@ -322,7 +325,7 @@ class Supervisor:
         while not self._told:
             poll.poll(_LOOK_S * 1e3)
             now_ns = time.monotonic_ns()
-            # Silence counts only while somebody listens: not while this was stopped too.
+            # Silence does not count while the supervisor itself was stopped.
             deaf_ns = now_ns - looked_ns if now_ns - looked_ns > _PAUSE_NS else 0
             looked_ns = now_ns
             for child, limit_ns in silence_ns.items():
@@ -337,13 +340,13 @@ class Supervisor:
         return self._told
 
     def _stop(self, guard: Child, daemon: Child) -> None:
-        """End both and leave the outputs at rest; nothing comes before the guard."""
+        """End both children, the guard first, and leave the outputs at rest."""
         if not guard.killed and guard.is_gone(time.monotonic_ns()):
             guard.kill(_REAP_S)
             if guard.code == 0:
                 self._told = self._told or "the guard was told to"
         elif not guard.killed:
-            # One that does not end may hold the outputs anywhere, so it has no longer than that.
+            # A guard that does not exit may hold the outputs anywhere, so the time is short.
             guard.end(self._plan.guard_silence_ms / 1e3, _REAP_S)
         self._has_guarded = self._has_guarded or guard.has_beaten
         daemon.tell()
@@ -357,17 +360,17 @@ class Supervisor:
             child.close()
 
     def _secure(self, guard: Child) -> None:
-        """Put the outputs to rest until they are, and the guard has ended for good.
+        """Put the outputs to rest, retrying until they obey and the guard has exited.
 
-        A guard that is stuck in the kernel still holds its pins, and what it is stuck in may be
-        done later. Where there is nothing else to wait for, because it was told to end or because
-        no guard ever had the outputs, this gives up after some seconds.
+        A guard stuck in the kernel still holds its pins, and its system call may complete later.
+        After a request to end, or if no guard ever had the outputs, this gives up after some
+        seconds.
         """
         self._failures = []
         started_ns = time.monotonic_ns()
         until_ns: int | None = None
         while True:
-            has_ended = guard.has_ended()  # Before: what it did at last must not come after.
+            has_ended = guard.has_ended()  # First, so that its last write cannot come afterwards.
             self._make_safe()
             now_ns = time.monotonic_ns()
             if self._is_safe and has_ended:
@@ -391,7 +394,7 @@ class Supervisor:
         self._say_unsafe(failures)
 
     def _say_unsafe(self, failures: list[str]) -> None:
-        """Say what does not obey, once for each time that it changes."""
+        """Log the outputs that do not obey, whenever the list changes."""
         if failures and failures != self._failures:
             self._failures = failures
             for failure in failures:
@@ -407,10 +410,10 @@ def _safe(plan: ServePlan) -> list[str]:
 
 
 def _collected(work: Callable[[], list[str]]) -> list[str]:
-    """What failed in some work, also when all of it did."""
+    """Run `work` and return its failures, including an exception of its own."""
     try:
         return work()
-    except Exception as error:  # The processes must be ended whatever happens to the pins.
+    except Exception as error:  # The children must be ended whatever happens to the pins.
         return [f"The hardware: {str(error) or type(error).__name__}"]
 
 

@@ -1,4 +1,4 @@
-"""What a robot is made of, as one TOML file."""
+"""Profiles: the hardware, limits and task of a robot as one TOML file."""
 
 from __future__ import annotations
 

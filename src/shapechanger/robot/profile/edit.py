@@ -1,4 +1,4 @@
-"""Changes values in the file of a profile; its comments, order and blank lines stay."""
+"""Edit values in a profile's file, keeping its comments, order and blank lines."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ __all__ = ["rewrite"]
 
 
 def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
-    """Change values, or add keys to tables that exist, all at once or not at all.
+    """Change values, or add keys to existing tables, atomically.
 
     Args:
-        path: The file; where it is a link, the file that it leads to is changed.
+        path: The file; a symbolic link is followed.
         changes: New values by dotted name, such as `output.steering.centre_us`.
 
     Returns:
-        The profile as it is now.
+        The profile after the change.
 
     Raises:
-        ProfileError: If the file is no profile, or would be none any more.
+        ProfileError: If the file is not a valid profile, before or after the change.
         UnknownName: If a table is not in the file.
-        OutputError: If the file cannot be written; it is then as it was.
+        OutputError: If the file cannot be written; it is then unchanged.
     """
     target = Path(path).resolve()
     before = profile_text(target)
@@ -55,7 +55,7 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
 
 
 def _item(value: Any, table: Any, key: str) -> Any:
-    """A value as tomlkit writes it; a table stays on one line, with the comment behind it."""
+    """Convert a value for tomlkit; a table stays inline and keeps its trailing comment."""
     if not isinstance(value, dict):
         return value
     inline = tomlkit.inline_table()
@@ -68,7 +68,7 @@ def _item(value: Any, table: Any, key: str) -> Any:
 
 
 def _replace(target: Path, text: str) -> None:
-    """Write a file so that at each instant, also if the power fails, it is the old or the new."""
+    """Replace a file atomically, safe against a power failure."""
     written: Path | None = None
     try:
         with tempfile.NamedTemporaryFile(

@@ -1,4 +1,4 @@
-"""Finds and reads the file of a profile."""
+"""Find, read and create profile files."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ __all__ = [
 
 _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
-_LARGEST: Final = 1024 * 1024  # Bytes; a longer file is something else.
+_LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.
 
 
 def shipped_profiles() -> dict[str, Path]:
-    """The profiles that come with the package: their names and files."""
+    """Return the profiles that ship with the package: name to file."""
     return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{_SUFFIX}"), key=lambda p: p.stem)}
 
 
 def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a profile.
+    """Resolve the name or path of a profile.
 
     Args:
-        name_or_path: Name of a shipped profile, such as "car"; or else of one in the current
-            folder, "my-car" for my-car.toml; or a path, which is returned as it is.
+        name_or_path: Name of a shipped profile, such as "car"; name of one in the current folder,
+            such as "my-car" for my-car.toml; or a path, which is returned unchanged.
 
     Raises:
-        UnknownName: If it is neither such a name nor looks like a path.
+        UnknownName: If it is neither a known name nor a path.
     """
     text = os.fspath(name_or_path)
     path = Path(text)
@@ -56,19 +56,19 @@ def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def load_profile(path: str | os.PathLike[str]) -> Profile:
-    """The profile in a file.
+    """Load a profile from a file.
 
     Raises:
-        ProfileError: If the file cannot be read, or is no profile.
+        ProfileError: If the file cannot be read or is not a valid profile.
     """
     return read_profile(profile_text(path), Path(path))
 
 
 def profile_text(path: str | os.PathLike[str]) -> str:
-    """The text of a profile.
+    """Read the text of a profile.
 
     Raises:
-        ProfileError: If the file is not there, cannot be read, or is no text.
+        ProfileError: If the file is missing, unreadable or not UTF-8.
     """
     try:
         with Path(path).open("rb") as file:
@@ -77,13 +77,13 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         raise ProfileError(f"There is no file {os.fspath(path)}.") from None
     except IsADirectoryError:
         raise ProfileError(f"{os.fspath(path)} is a folder, not a profile.") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path.
+    except (OSError, ValueError) as error:  # ValueError: NUL in the path.
         reason = getattr(error, "strerror", None) or error
         raise ProfileError(f"{os.fspath(path)} cannot be read: {reason}.") from error
     if len(data) > _LARGEST:
         raise ProfileError(f"{os.fspath(path)} is longer than a profile can be, 1 MiB.")
     try:
-        # As tomllib does for a file; a text editor of Windows may put a mark at the start.
+        # Like tomllib for files; Windows editors may prepend a byte-order mark.
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
@@ -94,22 +94,22 @@ _NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)
 
 
 def starter_text(kind: str, path: str | os.PathLike[str], robot_name: str) -> str:
-    """What `write_profile` would write; it refuses what that refuses, and writes nothing.
+    """Return what `write_profile` would write, with the same checks, without writing it.
 
     Args:
-        kind: Name of the shipped profile, such as "car".
-        path: The file to write; it must not exist.
+        kind: Name of a shipped profile, such as "car".
+        path: The new file, which must not exist.
         robot_name: Name of the new robot.
 
     Raises:
         UnknownName: If no shipped profile has this name.
-        ProfileError: If the robot's name cannot be one.
+        ProfileError: If the robot's name is invalid.
         OutputError: If the file exists.
     """
     shipped = shipped_profiles()
     if kind not in shipped:
         raise UnknownName("kind of robot", kind, shipped)
-    # A text of JSON is a text of TOML too.
+    # JSON strings are TOML strings.
     name_line = f"name = {json.dumps(robot_name, ensure_ascii=False)}"
     text = _NAME_LINE.sub(lambda _: name_line, profile_text(shipped[kind]), count=1)
     target = Path(path)
@@ -120,11 +120,11 @@ def starter_text(kind: str, path: str | os.PathLike[str], robot_name: str) -> st
 
 
 def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> Path:
-    """Copy a shipped profile under a new name; folders that are missing are made.
+    """Copy a shipped profile under a new name, creating missing folders.
 
     Args:
-        kind: Name of the shipped profile, such as "car".
-        path: The file to write; it must not exist.
+        kind: Name of a shipped profile, such as "car".
+        path: The new file, which must not exist.
         robot_name: Name of the new robot.
 
     Returns:
@@ -132,8 +132,8 @@ def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> P
 
     Raises:
         UnknownName: If no shipped profile has this name.
-        ProfileError: If the robot's name cannot be one.
-        OutputError: If the file exists, or cannot be written; nothing of it is left then.
+        ProfileError: If the robot's name is invalid.
+        OutputError: If the file exists or cannot be written; no partial file is left.
     """
     target = Path(path)
     text = starter_text(kind, target, robot_name)

@@ -1,7 +1,7 @@
-"""On which line of a TOML text each table and key stands.
+"""Errors in profiles, with the line and the nearest spelling.
 
-`tomllib` reads the text but forgets where it was. This scanner knows just enough of TOML to tell
-statements apart, and is for texts that `tomllib` has accepted.
+`tomllib` does not keep line numbers. The scanner here understands just enough TOML to separate
+statements, and expects text that `tomllib` has accepted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from shapechanger.errors import ProfileError
 __all__ = ["Place", "Source", "called", "choice", "lines_of", "nearest", "shown"]
 
 Place = tuple[str | int, ...]
-"""Names of the tables and the key that lead to a value; a number for a table of a list."""
+"""Path to a value: names of tables and keys, and numbers for entries of table arrays."""
 
 _NAME: Final = re.compile(r"""[ \t]*("(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+)[ \t]*(\.?)""")
 _PIECE: Final = re.compile(
@@ -36,9 +36,9 @@ _PIECE: Final = re.compile(
 
 
 def lines_of(text: str) -> dict[Place, int]:
-    """The line, from 1, of every table and key; of a table that is named twice, the first.
+    """Return the line of every table and key, from 1; of a repeated table, the first.
 
-    Keys of an inline table are left out: they stand on the line of the table.
+    Keys of inline tables are omitted: they are on the line of the table.
     """
     newlines = [i for i, character in enumerate(text) if character == "\n"]
     lines: dict[Place, int] = {}
@@ -71,7 +71,7 @@ def _note(lines: dict[Place, int], place: Place, line: int) -> None:
 
 
 def _numbered(table: Place, counts: dict[Place, int]) -> Place:
-    """The table with the number of its newest entry after each name of a list."""
+    """Return the path of a table with the newest index after each table array."""
     numbered: Place = ()
     for name in table:
         numbered += (name,)
@@ -81,11 +81,11 @@ def _numbered(table: Place, counts: dict[Place, int]) -> Place:
 
 
 def _names(text: str, at: int) -> tuple[Place, int]:
-    """The names of a dotted key, and where it ends."""
+    """Parse a dotted key and return its names and its end."""
     names: Place = ()
     while (match := _NAME.match(text, at)) is not None:
         name = match[1]
-        # Escapes in a quoted key are left as they are: such a key is no key of a profile.
+        # Escapes in quoted keys are not decoded: no key of a profile has any.
         names += (name[1:-1] if name[0] in "\"'" else name,)
         at = match.end()
         if not match[2]:
@@ -94,7 +94,7 @@ def _names(text: str, at: int) -> tuple[Place, int]:
 
 
 def _end_of_statement(text: str, at: int) -> int:
-    """Where the line ends on which the statement does that goes on at `at`."""
+    """Return the end of the last line of the statement that continues at `at`."""
     depth = 0
     while (match := _PIECE.match(text, at)) is not None:
         piece = match[0]
@@ -109,7 +109,7 @@ _LONGEST_SHOWN: Final = 40
 
 
 class Source:
-    """Where a profile was read, so that a mistake in it can be found.
+    """Source of a profile, for error messages with line numbers.
 
     Attributes:
         path: The file.
@@ -120,37 +120,37 @@ class Source:
         self._lines = lines_of(text)
 
     def line(self, place: Place) -> int:
-        """The line of a table or a key; of the table that it would be in where it is missing."""
+        """Return the line of a table or key; for a missing one, that of its table."""
         while place and place not in self._lines:
             place = place[:-1]
         return self._lines.get(place, 1)
 
     def mistake(self, place: Place, words: str) -> ProfileError:
-        """The error that says where the mistake is, and what."""
+        """Return an error with file, line and message."""
         return ProfileError(f"{self.path}, line {self.line(place)}: {words}.")
 
 
 def called(table: Place) -> str:
-    """A table, as people write it: `[output.drive]`."""
+    """Format a table name as in TOML: `[output.drive]`."""
     if isinstance(table[-1], int):
         return f"[[{'.'.join(map(str, table[:-1]))}]] number {table[-1] + 1}"
     return f"[{'.'.join(map(str, table))}]"
 
 
 def choice(name: str, known: Iterable[str]) -> str:
-    """A name that does not exist, the nearest spelling, and what there is."""
+    """Describe an unknown name: the nearest spelling and the known names."""
     names = sorted(known)
     return f"{name!r}{nearest(name, names)}; there are: {', '.join(names) or 'none'}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The question after a name that does not exist; empty where nothing is spelled like it."""
+    """Return " Did you mean ...?", or an empty string if nothing is similar."""
     close = difflib.get_close_matches(name, list(known), n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def shown(value: Any) -> str:
-    """A value, as TOML writes it; a table or a long text in short."""
+    """Format a value as TOML, shortening tables and long strings."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -164,6 +164,6 @@ def shown(value: Any) -> str:
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, int):
-        # An integer of thousands of digits cannot be written, nor need it.
+        # Python refuses to print integers with thousands of digits.
         return str(value) if abs(value) < 10**_LONGEST_SHOWN else "a number too large to write"
     return f"the date {value}" if isinstance(value, date) else f"the time {value}"

@@ -1,4 +1,4 @@
-"""What a robot is made of."""
+"""A robot's profile, its layouts and its reward, as plain values."""
 
 from __future__ import annotations
 
@@ -47,26 +47,26 @@ __all__ = [
 ]
 
 APPLIED: Final = "applied"
-"""Last part of the name of a feature that says what an action really does: `steering/applied`."""
+"""Suffix of the features with the applied value of an action: `steering/applied`."""
 
 STALL: Final = "stall"
-"""What the guard concludes from a speed that is measured: it pushes and does not move."""
+"""Stall, concluded by the guard from a measured speed: pushing without moving."""
 
 TENDONS: Final = "tendons"
-"""What the sensor of a servo bus measures: `FDP/length`, `FDP/speed` and `FDP/tension`."""
+"""Measurements of a servo bus: `FDP/length`, `FDP/speed` and `FDP/tension`."""
 
 JOINTS: Final = "joints"
-"""What encoders at joints measure: `MCP_flexion/angle`."""
+"""Measurement of joint encoders: `MCP_flexion/angle`."""
 
 COLLISION: Final = "collision"
-"""What the guard concludes from a bumper, or from a stall."""
+"""Collision, concluded by the guard from a bumper or a stall."""
 
 
 class Quantity(NamedTuple):
-    """One number that a sensor gives.
+    """One number measured by a sensor.
 
     Attributes:
-        measures: Which sensors give it, as in `SensorPlan.measures`; or what the guard concludes.
+        measures: Kind of the sensors that give it, as in `SensorPlan.measures`, or a conclusion.
         unit: Its SI unit.
         low: Smallest value.
         high: Largest value.
@@ -90,16 +90,16 @@ QUANTITIES: Final = {
     "battery": Quantity("battery", "V", low=0.0),
     "temperature": Quantity("temperature", "°C"),
 }
-"""The quantities by their names in `GuardState.quantities`, in the order of the state."""
+"""Quantities by their names in `GuardState.quantities`, in the order of the state."""
 
 
 def state_features(
     sensors: Iterable[SensorPlan], actions: Iterable[ActionPlan], limits: LimitPlan
 ) -> list[Feature]:
-    """A feature for each quantity that a robot senses.
+    """Return a feature for each quantity that a robot senses.
 
-    Without a sensor the guard estimates the speed from an action that propels and whose profile
-    says how fast it makes the robot, in m/s. Stalls and collisions are what the guard concludes.
+    Without a speed sensor, the guard estimates the speed from a propelling action whose profile
+    gives its gain in m/s. Stalls and collisions are the guard's conclusions.
     """
     sensors = tuple(sensors)
     sources: dict[str, Element] = {}
@@ -122,7 +122,7 @@ def state_features(
 
 
 def _tendon_features(sensor: SensorPlan) -> list[Feature]:
-    """Length, speed and tension of each tendon of a servo bus."""
+    """Return length, speed and tension of each tendon on a servo bus."""
     names = texts(sensor.settings, "tendons")
     most = numbers(sensor.settings, "most_tensions_n")
     parts = [(name, n, Element("tendon", name)) for name, n in zip(names, most, strict=True)]
@@ -134,7 +134,7 @@ def _tendon_features(sensor: SensorPlan) -> list[Feature]:
 
 
 def _joint_features(sensor: SensorPlan) -> list[Feature]:
-    """Angle of each joint, within half a turn around its zero."""
+    """Return the angle of each joint, within half a turn of its zero."""
     names = texts(sensor.settings, "joints")
     return [
         Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name)) for name in names
@@ -151,7 +151,7 @@ def with_servo_bus(
     sensors: tuple[SensorPlan, ...],
     stop: StopPlan,
 ) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
-    """The outputs and sensors with what they need to know of their bus.
+    """Add the settings of the servo bus to its outputs and sensors.
 
     Args:
         source: Where the profile was read.
@@ -161,8 +161,8 @@ def with_servo_bus(
         stop: How the robot stops.
 
     Raises:
-        ProfileError: If outputs have no bus, or a bus no outputs or no sensor; if two servos have
-            one id, one cannot do what it is set to, or a stop would not let go.
+        ProfileError: If outputs lack a bus, or a bus lacks outputs or a sensor; if two servos share
+            an id, a servo cannot do what it is set to, or a stop would not release it.
     """
     on_bus = [output for output in outputs if output.driver == _DRIVER]
     sensing = [sensor for sensor in sensors if sensor.driver == _DRIVER]
@@ -206,7 +206,7 @@ def with_servo_bus(
 
 
 def tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
-    """From pretension to the most tension, N, of each action that alone pulls one tendon."""
+    """Return the tension span, N, of each action that alone pulls one tendon."""
     outputs = tuple(outputs)
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, float] = {}
@@ -221,7 +221,7 @@ def tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
 
 
 def _check(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) -> None:
-    """Refuse what the driver would refuse, with the line."""
+    """Report, with its line, what the driver would refuse."""
     servos: list[ServoSettings] = []
     for output in outputs:
         try:
@@ -235,7 +235,7 @@ def _check(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) ->
         raise source.mistake(("servo_bus",), str(error).rstrip(".")) from error
 
 
-# The layout is in SI units, a profile may be in degrees.
+# Layouts are in SI units; profiles may use degrees.
 _SI: Final = {"deg": ("rad", math.pi / 180.0)}
 
 
@@ -244,9 +244,9 @@ class RewardPlan:
     """Weights of the task.
 
     Attributes:
-        velocity: Reward for a metre forward, 1/m.
-        collision: Reward for a collision, at most 0.
-        stall: Reward for a second of pushing without moving, 1/s, at most 0.
+        velocity: Reward per metre forward, 1/m.
+        collision: Reward per collision, at most 0.
+        stall: Reward per second of stall, 1/s, at most 0.
         collision_ends_episode: Whether a collision ends the task.
     """
 
@@ -258,11 +258,11 @@ class RewardPlan:
 
 @dataclass(frozen=True, slots=True)
 class ResetStep:
-    """One step of the routine that brings the robot back.
+    """One step of the reset routine.
 
     Attributes:
         values: One number for each action, in order.
-        seconds: How long it lasts.
+        seconds: Duration, s.
     """
 
     values: tuple[float, ...]
@@ -271,11 +271,11 @@ class ResetStep:
 
 @dataclass(frozen=True, slots=True)
 class EnablePlan:
-    """The one-shot that holds the enable line of the motors while the guard toggles a pin.
+    """One-shot that enables the motors while the guard toggles a pin.
 
     Attributes:
         pin: BCM pin that is toggled.
-        hold_ms: How long the one-shot holds the line after the last toggle.
+        hold_ms: Time for which it holds the line after the last toggle, ms.
     """
 
     pin: int
@@ -284,24 +284,24 @@ class EnablePlan:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A robot: what it moves and senses, how far it may go, and when it stops.
+    """A robot: what it moves and senses, its caps, and when it stops.
 
     Attributes:
         path: The file that it was read from.
         name: Name of the robot.
-        body: What it is, such as "car".
-        control_hz: How many commands a second it expects.
-        calibrated: When it was calibrated; None for never.
+        body: Kind of robot, such as "car".
+        control_hz: Expected rate of commands, Hz.
+        calibrated: Date of calibration; None if it never was.
         actions: The numbers of a command, in order.
         outputs: What they move.
         sensors: What the guard reads.
         camera: Its camera; None without one.
         limits: When it stops by itself.
-        max_observation_age_ms: How old an observation may be that a command answers.
+        max_observation_age_ms: Largest age of the observation that a command answers, ms.
         arming: Who may arm it.
         stop: How it stops.
         reward: Weights of the task.
-        reset: Commands that bring it back; empty for none.
+        reset: The reset routine; empty for none.
         enable: The one-shot of the enable line; None without one.
         stop_pin: BCM pin of the emergency stop button; None without one.
     """
@@ -326,11 +326,11 @@ class Profile:
 
     @property
     def image_size(self) -> tuple[int, int] | None:
-        """Width and height of the pictures in pixels; None without a camera."""
+        """Width and height of frames, pixels; None without a camera."""
         return self.camera.size if self.camera else None
 
     def guard_plan(self) -> GuardPlan:
-        """What the guard needs to know."""
+        """Return the guard's plan."""
         plan = GuardPlan(
             name=self.name,
             actions=self.actions,
@@ -347,12 +347,11 @@ class Profile:
         )
 
     def action_layout(self) -> Layout:
-        """What each number of a command means.
+        """Return the layout of commands.
 
-        The range is the whole one of the action, whatever the caps of the robot are: these clip,
-        and `action_applied` says how much. That of a tendon has a gain in newtons: from its
-        pretension, at 0, to the most that it may pull, at 1, which is the highest tension of the
-        state.
+        The range is the full range of each action. The caps of the robot clip commands, and
+        `action_applied` shows the result. The action of a tendon has a gain in newtons, from its
+        pretension at 0 to its largest tension at 1.
         """
         spans = tension_spans(self.outputs)
         return Layout(
@@ -360,7 +359,7 @@ class Profile:
         )
 
     def state_layout(self) -> Layout:
-        """What each number of a state means: what the sensors give, then what the actions do."""
+        """Return the layout of states: sensed quantities, then applied actions."""
         applied = tuple(
             Feature(
                 f"{action.name}/{APPLIED}",
@@ -374,16 +373,16 @@ class Profile:
         return Layout((*state_features(self.sensors, self.actions, self.limits), *applied))
 
     def reward_weights(self) -> dict[str, float]:
-        """The weights of the task by name, as in `Welcome.reward`; a truth is 1 or 0."""
+        """Return the reward weights by name, as in `Welcome.reward`; booleans are 1 or 0."""
         return {name: float(weight) for name, weight in dataclasses.asdict(self.reward).items()}
 
     def reset_routine(self) -> tuple[tuple[tuple[float, ...], float], ...]:
-        """The values of each step and how many seconds it lasts, as in `Welcome.reset`."""
+        """Return the values and the duration, s, of each reset step, as in `Welcome.reset`."""
         return tuple((step.values, step.seconds) for step in self.reset)
 
 
 def _action_feature(action: ActionPlan, span_n: float | None) -> Feature:
-    """What a number of a command means; `span_n` is that of the tendon which it alone pulls, N."""
+    """Return the feature of an action; `span_n` is the tension span of its tendon, N."""
     unit, factor = _SI.get(action.unit, (action.unit, 1.0))
     if span_n is not None and unit == "1":
         unit, factor = "N", span_n

@@ -1,4 +1,4 @@
-"""From the text of a profile to a `Profile`, or to one sentence that says what is wrong with it."""
+"""Parse the text of a profile into a `Profile`, or report one error with its line."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ from shapechanger.robot.profile.wiring import PinAllocation
 
 __all__ = ["read_profile"]
 
-_MOST_NAMED: Final = 64  # As values on the wire, see `shapechanger.link.messages`.
+_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")
 
 
 def read_profile(text: str, path: Path) -> Profile:
-    """The profile that a text says.
+    """Parse a profile.
 
     Args:
         text: TOML.
-        path: The file that it comes from, for what is said about it.
+        path: The file that it comes from, for error messages.
 
     Raises:
-        ProfileError: If it is no TOML, or no profile; the message names the file and the line.
+        ProfileError: If the text is not TOML or not a valid profile; names the file and the line.
     """
     data = _toml(text, path)
     source = Source(path, text)
@@ -74,7 +74,7 @@ def read_profile(text: str, path: Path) -> Profile:
 
 
 class _Reader:
-    """Reads table after table."""
+    """Reader of one profile, table by table."""
 
     def __init__(self, source: Source, data: Mapping[str, Any]) -> None:
         self._source = source
@@ -82,7 +82,7 @@ class _Reader:
         self._wiring = PinAllocation(source)
 
     def profile(self) -> Profile:
-        """The whole profile."""
+        """Read the whole profile."""
         robot = self._only_table("robot", ROBOT_KEYS)
         named = {name: read_action(self._source, name, t) for name, t in self._named("action")}
         if not named:
@@ -192,7 +192,7 @@ class _Reader:
         return read_keys(self._source, table, place, keys)
 
     def _named(self, kind: str) -> list[tuple[str, dict[str, Any]]]:
-        """The tables of one kind, by name, in the order of the file."""
+        """Return the tables of one kind by name, in the order of the file."""
         tables = table_at(self._source, self._data, (kind,))
         for name in tables:
             refuse_bad_name(self._source, (kind, name))
@@ -214,7 +214,7 @@ def _toml(text: str, path: Path) -> dict[str, Any]:
             line = int(at[2])
             words = f"{at[1]} at column {at[3]}"
         what = f"this is no TOML: {words[:1].lower()}{words[1:]}"
-    except ValueError:  # Python reads no number of more than some thousand digits.
+    except ValueError:  # Python refuses to parse integers with thousands of digits.
         long = _DIGITS.search(text)
         line = text.count("\n", 0, long.start() if long else 0) + 1
         what = "a number has too many digits"

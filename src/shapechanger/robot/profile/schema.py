@@ -1,4 +1,4 @@
-"""Every table of a profile and every key that it may have."""
+"""Schema of profiles: every table, its keys, units and bounds."""
 
 from __future__ import annotations
 
@@ -53,17 +53,17 @@ __all__ = [
 ]
 
 HIGHEST_BCM: Final = 27
-"""The largest BCM number on the header; the smallest is 0."""
+"""Largest BCM number on the header; the smallest is 0."""
 
 BCM_OF_BOARD: Final = {
     3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23,
     18: 24, 19: 10, 21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5,
     31: 6, 32: 12, 33: 13, 35: 19, 36: 16, 37: 26, 38: 20, 40: 21,
 }  # fmt: skip
-"""BCM number of each place on the header that has one."""
+"""BCM number of each header position that has one."""
 
 I2C_PINS: Final = {0: (0, 1), 1: (2, 3)}
-"""BCM pins of data and clock of the I2C buses that have fixed ones."""
+"""BCM pins of SDA and SCL of the I2C buses with fixed pins."""
 
 _POWER_OF_BOARD: Final = (
     dict.fromkeys((1, 17), "3.3 V")
@@ -74,11 +74,10 @@ _WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
 
 
 def bcm(written: object) -> int:
-    """The BCM number of a pin.
+    """Parse a pin into its BCM number.
 
     Raises:
-        ValueError: If there is no such pin; the message says why, after a comma, or is empty where
-            there is no more to say.
+        ValueError: If there is no such pin; the message is a reason after a comma, or empty.
     """
     if type(written) is int:
         number = written
@@ -108,39 +107,39 @@ UNITS: Final = {
     "_v": "volts",
     "_c": "degrees Celsius",
 }
-"""What the end of a key says, longest first."""
+"""Units by the suffix of a key, longest first."""
 
-# What people write instead.
+# Common alternative spellings.
 _OTHER_ENDS: Final = ("_deg", "_rad", "_cm", "_mm", "_km", "_mv", "_f", "_sec", "_khz", "_min")
 
 
 def unit_of(key: str) -> str:
-    """The unit that the name of a key ends with, in words; empty for none."""
+    """Return the unit in the suffix of a key, in words; empty for none."""
     return next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
 
 
 def stem_of(key: str) -> str:
-    """The name of a key without any unit."""
+    """Return the name of a key without its unit."""
     return next((key.removesuffix(e) for e in (*UNITS, *_OTHER_ENDS) if key.endswith(e)), key)
 
 
 def with_unit(key: str, known: Iterable[str]) -> str | None:
-    """The known key that is meant by one with no unit or another one; None for none."""
+    """Return the known key with the same stem and another unit; None if there is none."""
     return next((k for k in known if unit_of(k) and stem_of(k) == stem_of(key)), None)
 
 
 Kind = Literal[
     "number", "whole", "text", "truth", "pin", "pins", "size", "weights", "date", "choice"
 ]
-"""What sort of value a key holds."""
+"""Kind of value of a key."""
 
 REQUIRED: Final = object()
-"""The default of a key that has none."""
+"""Marks a key without a default."""
 
 NO_PIN: Final = -1
-"""The value of a pin that is not connected."""
+"""Value of an unconnected pin."""
 
-_LONGEST_TEXT: Final = 64  # As names on the wire, see `shapechanger.link.messages`.
+_LONGEST_TEXT: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _NOT_PRINTABLE: Final = re.compile(r"[^\x20-\x7e\xa0-\U0010ffff]")
 _A_PIN: Final = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
 
@@ -150,14 +149,14 @@ class ProfileKey:
     """One key of a table.
 
     Attributes:
-        name: Its name, which ends with the unit.
-        kind: What it holds.
-        default: What it is where it is left out; `REQUIRED` for a key that may not be.
-        low: Smallest number.
-        high: Largest number; infinity goes with `above`.
-        above: Whether `low` itself is too small.
-        names: What a "choice" may be.
-        longest: Most characters of a text.
+        name: Name, with the unit as its suffix.
+        kind: Kind of value.
+        default: Value if it is omitted; `REQUIRED` if it must not be.
+        low: Lower bound.
+        high: Upper bound; infinity requires `above`.
+        above: Whether `low` is exclusive.
+        names: Options of a "choice".
+        longest: Largest number of characters of a text.
     """
 
     name: str
@@ -171,7 +170,7 @@ class ProfileKey:
 
     @property
     def wanted(self) -> str:
-        """What it must be, in words."""
+        """Describe the permitted values."""
         unit = unit_of(self.name)
         match self.kind:
             case "number":
@@ -197,10 +196,10 @@ class ProfileKey:
                 return f"one of {', '.join(repr(name) for name in self.names if name)}"
 
     def value_of(self, written: Any) -> Any:
-        """The value, as plans have it.
+        """Convert and check a value.
 
         Raises:
-            ValueError: If it is not what the key may hold; the message goes on after `wanted`.
+            ValueError: If it is not permitted; the message continues that of `wanted`.
         """
         try:
             return self._value_of(written)
@@ -252,7 +251,7 @@ class ProfileKey:
     def _number(self, written: Any) -> float:
         if type(written) not in (int, float):
             raise ValueError
-        # Written so that NaN is refused.
+        # Also refuses NaN.
         if not self.low <= written <= self.high or (self.above and written == self.low):
             raise ValueError
         try:
@@ -306,7 +305,7 @@ TABLES: Final = (
     "emergency_button",
     "servo_bus",
 )
-"""The tables of a profile; `action`, `output` and `sensor` hold one table for each name."""
+"""Tables of a profile; `action`, `output` and `sensor` hold one table per name."""
 
 DRIVING_PARTS: Final = (
     "wheels",
@@ -316,13 +315,13 @@ DRIVING_PARTS: Final = (
     "left propeller",
     "right propeller",
 )
-"""Parts that make the robot go."""
+"""Parts that propel the robot."""
 
 PARTS: Final = (*DRIVING_PARTS, "steering", "rudder", "gear", "bed", "joint", "tendon")
 """Parts that an output may move."""
 
 OVER: Final = ("pca9685", "lgpio", "sysfs")
-"""What may make the pulses of a servo or a controller."""
+"""Sources of the pulses of a servo or a controller."""
 
 MEASURES: Final = {
     "encoder": "speed",
@@ -334,7 +333,7 @@ MEASURES: Final = {
     "dynamixel": "tendons",
     "as5600": "joints",
 }
-"""What each sensor driver measures, as in `SensorPlan.measures`."""
+"""Measurement of each sensor driver, as in `SensorPlan.measures`."""
 
 ROBOT_KEYS: Final = (
     ProfileKey("name", "text"),
@@ -377,7 +376,7 @@ _DUTY: Final = (
 
 
 def _width(name: str, default: int) -> ProfileKey:
-    # The widths that lgpio.tx_servo takes; servos and controllers know no others.
+    # Widths that lgpio.tx_servo accepts; servos and controllers use no others.
     return ProfileKey(name, "whole", default, low=500, high=2500)
 
 
@@ -413,11 +412,11 @@ OUTPUT_SETTINGS: Final = {
         ProfileKey("most_tension_n", "number", low=0.0, high=1000.0, above=True),
         ProfileKey("pretension_n", "number", low=0.0, high=1000.0, above=True),
         ProfileKey("homing_n", "number", 3.0, low=0.0, high=1000.0, above=True),
-        # Where the servo stands while the finger is straight, in counts of 1/4096 turn.
+        # Position of the servo with a straight finger, in counts of 1/4096 turn.
         ProfileKey("zero", "whole", 0, low=-1_000_000, high=1_000_000),
     ),
 }
-"""Keys of each output driver, besides those of what it goes `over`."""
+"""Keys of each output driver, besides those of its pulse source."""
 
 OVER_SETTINGS: Final = {
     "pca9685": (
@@ -432,7 +431,7 @@ OVER_SETTINGS: Final = {
         ProfileKey("channel", "whole", low=0, high=15),
     ),
 }
-"""Keys that a servo or a controller has for what makes its pulses."""
+"""Keys of each pulse source of a servo or a controller."""
 
 SENSOR_KEYS: Final = (ProfileKey("driver", "choice", names=tuple(SENSOR_DRIVERS)),)
 
@@ -464,11 +463,11 @@ SENSOR_SETTINGS: Final = {
 
 JOINT_KEYS: Final = (
     ProfileKey("channel", "whole", low=0, high=7),
-    # Counts of 1/4096 turn while the joint is straight.
+    # Counts of 1/4096 turn with a straight joint.
     ProfileKey("zero", "whole", 0, low=0, high=4095),
     ProfileKey("direction", "whole", 1, low=-1, high=1),
 )
-"""Keys of each joint of a sensor with the driver as5600; each is a table of its own in it."""
+"""Keys of each joint of an as5600 sensor, which has a table of its own."""
 
 CAMERA_KEYS: Final = (
     ProfileKey("driver", "choice", names=tuple(CAMERA_DRIVERS)),
@@ -520,19 +519,19 @@ RESET_KEYS: Final = (
 
 ENABLE_KEYS: Final = (
     ProfileKey("pin", "pin"),
-    # The guard toggles the pin at each of its ticks, 10 ms apart; it may be late by some.
+    # The guard toggles the pin at each tick, every 10 ms, and may be a few ms late.
     ProfileKey("hold_ms", "whole", 100, low=30, high=1000),
 )
 
 SERVO_BUS_KEYS: Final = (
     ProfileKey("device", "text", "/dev/ttyUSB0", longest=4096),
     ProfileKey("baud", "whole", 1_000_000, low=9600, high=4_500_000),
-    # The watchdog of the servos counts in steps of 20 ms.
+    # The servos' watchdog has steps of 20 ms.
     ProfileKey("watchdog_ms", "whole", 100, low=20, high=2540),
     ProfileKey("ramp_ms", "whole", 300, low=0, high=10_000),
-    # So that one servo that is silent keeps the guard for less than it lets a sensor take.
+    # One silent servo must delay the guard by less than the limit for sensors.
     ProfileKey("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
 )
-"""What the outputs with the driver dynamixel are on."""
+"""Keys of the bus of the outputs with the driver dynamixel."""
 
 EMERGENCY_BUTTON_KEYS: Final = (ProfileKey("pin", "pin"),)

@@ -1,4 +1,4 @@
-"""Reads one table of a profile: knows all of its keys, or says which one it does not."""
+"""Read the sections of a profile: actions, outputs, sensors, camera, limits and stop."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
 def table_at(source: Source, data: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """The table of this name in another one; empty where there is none.
+    """Return a nested table, or an empty one if it is missing.
 
     Raises:
-        ProfileError: If it is something else.
+        ProfileError: If it is not a table.
     """
     found = data.get(str(place[-1]), {})
     if not isinstance(found, dict):
@@ -67,19 +67,19 @@ def table_at(source: Source, data: Mapping[str, Any], place: Place) -> dict[str,
 def read_keys(
     source: Source, table: Mapping[str, Any], place: Place, keys: Iterable[ProfileKey]
 ) -> dict[str, Any]:
-    """The value of each key, those with their default too.
+    """Return the value of each key, with defaults.
 
     Raises:
-        ProfileError: If one is missing, or is not what it may be.
+        ProfileError: If one is missing or invalid.
     """
     return {key.name: read_key(source, table, place, key) for key in keys}
 
 
 def read_key(source: Source, table: Mapping[str, Any], place: Place, key: ProfileKey) -> Any:
-    """The value of a key, or its default.
+    """Return the value of a key, or its default.
 
     Raises:
-        ProfileError: If it is missing, or is not what it may be.
+        ProfileError: If it is missing or invalid.
     """
     if key.name not in table:
         if key.default is REQUIRED:
@@ -95,10 +95,10 @@ def read_key(source: Source, table: Mapping[str, Any], place: Place, key: Profil
 
 
 def refuse_bad_name(source: Source, place: Place) -> None:
-    """Refuse a table whose own name, the last of its place, is none for a part of a robot.
+    """Refuse a table with an invalid name, the last of its path.
 
     Raises:
-        ProfileError: If it is none.
+        ProfileError: If the name is invalid.
     """
     name = str(place[-1])
     if _NAME.fullmatch(name) is None:
@@ -116,18 +116,18 @@ def refuse_unknown_keys(
     known: Iterable[str],
     elsewhere: Mapping[str, str] | None = None,
 ) -> None:
-    """Refuse a key that nobody would read.
+    """Refuse unknown keys.
 
     Args:
         source: Where the table was read.
         table: The table.
-        place: Its place.
-        known: The keys that it may have.
-        elsewhere: Where other keys belong, in words.
+        place: Path of the table.
+        known: The permitted keys.
+        elsewhere: For keys of other tables, where they belong.
 
     Raises:
-        ProfileError: If there is one; says which key with a unit is meant, where it belongs, or
-            what there is.
+        ProfileError: If there is one. The message names the key with the right unit, the table
+            where it belongs, or the known keys.
     """
     names = tuple(known)
     for name in table:
@@ -148,26 +148,26 @@ def _unit_is_missing(source: Source, place: Place, name: str, meant: str) -> Exc
 
 
 def joints_in(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The tables in the table of a sensor, by the names of the joints."""
+    """Return the joint tables of a sensor, by name."""
     return {name: cast("dict[str, Any]", t) for name, t in table.items() if isinstance(t, dict)}
 
 
 def read_joints(
     source: Source, place: Place, joints: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The settings that the joints give, as lists in the order of the file.
+    """Return the settings of all joints as lists, in the order of the file.
 
     Args:
         source: Where the profile was read.
         place: The sensor.
-        joints: The table of each joint.
+        joints: Table of each joint.
 
     Returns:
         `joints`, their names, and their `channels`, `zeros` and `directions`.
 
     Raises:
-        ProfileError: If there are none, a key is unknown, missing or wrong, or a channel is used
-            twice.
+        ProfileError: If there is no joint, a key is unknown, missing or invalid, or a channel is
+            used twice.
     """
     if not joints:
         words = f"{called(place)} needs a table for each joint, such as {called((*place, 'knee'))}"
@@ -205,10 +205,10 @@ _DRIVER, _OVER = OUTPUT_KEYS[0], next(key for key in OUTPUT_SETTINGS["servo"] if
 
 
 def read_output(source: Source, name: str, table: _Table) -> OutputPlan:
-    """One motor, servo or controller.
+    """Read one motor, servo or controller.
 
     Raises:
-        ProfileError: If a key is unknown, missing or wrong.
+        ProfileError: If a key is unknown, missing or invalid.
     """
     place: Place = ("output", name)
     for key in (_DRIVER, _OVER):
@@ -224,10 +224,10 @@ def read_output(source: Source, name: str, table: _Table) -> OutputPlan:
 
 
 def read_sensor(source: Source, name: str, table: _Table) -> SensorPlan:
-    """One sensor.
+    """Read one sensor.
 
     Raises:
-        ProfileError: If a key is unknown, missing or wrong.
+        ProfileError: If a key is unknown, missing or invalid.
     """
     place: Place = ("sensor", name)
     driver: str = read_keys(source, table, place, SENSOR_KEYS)["driver"]
@@ -243,10 +243,10 @@ def read_sensor(source: Source, name: str, table: _Table) -> SensorPlan:
 
 
 def read_camera(source: Source, table: _Table) -> CameraPlan:
-    """The camera.
+    """Read the camera.
 
     Raises:
-        ProfileError: If a key is unknown, missing or wrong.
+        ProfileError: If a key is unknown, missing or invalid.
     """
     place: Place = ("camera",)
     driver: str = read_key(source, table, place, CAMERA_KEYS[0])
@@ -258,7 +258,7 @@ def read_camera(source: Source, table: _Table) -> CameraPlan:
 
 
 def _refuse_gpiozero(source: Source, table: _Table, place: Place, key: ProfileKey) -> None:
-    """Say why gpiozero moves no servo here, since it looks as if it could."""
+    """Explain why gpiozero is not supported as a pulse source, although it looks as if it were."""
     written = table.get(key.name)
     if isinstance(written, str) and "gpiozero" in written.lower():
         words = f"{key.name} of {called(place)} cannot be {written!r}: {_NOT_GPIOZERO}"
@@ -266,7 +266,7 @@ def _refuse_gpiozero(source: Source, table: _Table, place: Place, key: ProfileKe
 
 
 def _owners(kind: str, tables: Mapping[str, Iterable[ProfileKey]]) -> dict[str, str]:
-    """For each key which drivers have it, in words."""
+    """Return, for each key, the drivers that have it."""
     owners: dict[str, list[str]] = {}
     for driver, keys in tables.items():
         for key in keys:
@@ -300,18 +300,18 @@ def read_limits(
     camera: CameraPlan | None,
     sensors: Iterable[SensorPlan],
 ) -> dict[str, Any]:
-    """The value of each limit.
+    """Read the limits.
 
     Args:
         source: Where the profile was read.
         table: The table of limits.
-        control_hz: How many commands a second the robot expects.
+        control_hz: Expected rate of commands, Hz.
         camera: Its camera.
         sensors: Its sensors.
 
     Raises:
-        ProfileError: If a key is unknown or wrong, if a limit needs a sensor or a camera that is
-            not there, or if commands or pictures come too seldom for it.
+        ProfileError: If a key is unknown or invalid, a limit needs a missing sensor or camera, or
+            the rate of commands or frames is too low for it.
     """
     refuse_unknown_keys(source, table, _PLACE, [key.name for key in LIMIT_KEYS])
     limits = read_keys(source, table, _PLACE, LIMIT_KEYS)
@@ -342,7 +342,7 @@ def _camera_stale_ms(source: Source, stale_ms: int | None, camera: CameraPlan | 
         return 0
     if stale_ms is None:
         stale_ms = _CAMERA_STALE_MS
-    # One picture may be lost.
+    # Tolerates the loss of one frame.
     needed_ms = 2000 / camera.fps
     if stale_ms < needed_ms:
         words = (
@@ -358,15 +358,15 @@ _PULSES: Final = {
     "servo": ("left_us", "centre_us", "right_us"),
     "esc": ("backward_us", "neutral_us", "forward_us"),
 }
-# 1 s in µs; a pulse must end before the next one begins.
+# 1 s in µs; a pulse must end before the next one starts.
 _SECOND_US: Final = 1_000_000
 
 
 def read_action(source: Source, name: str, table: Mapping[str, Any]) -> ActionPlan:
-    """One number of a command.
+    """Read one action.
 
     Raises:
-        ProfileError: If a key is unknown or wrong, or if the action cannot rest within its caps.
+        ProfileError: If a key is unknown or invalid, or the rest lies outside the caps.
     """
     place: Place = ("action", name)
     refuse_unknown_keys(source, table, place, [key.name for key in ACTION_KEYS])
@@ -393,11 +393,11 @@ def read_action(source: Source, name: str, table: Mapping[str, Any]) -> ActionPl
 
 
 def check_pulses(source: Source, output: OutputPlan) -> None:
-    """Refuse what an output cannot do with its settings.
+    """Refuse settings that an output cannot satisfy.
 
     Raises:
-        ProfileError: If the middle pulse is not in the middle, if pulses are longer than the time
-            between them, or if a motor has nothing between its start and its full speed.
+        ProfileError: If the middle pulse is not between the others, pulses are longer than their
+            period, or a motor has no range between start and full speed.
     """
     place: Place = ("output", output.name)
     settings: dict[str, Any] = {**output.settings}
@@ -422,11 +422,11 @@ def check_pulses(source: Source, output: OutputPlan) -> None:
 def check_mix(
     source: Source, actions: Mapping[str, ActionPlan], outputs: Iterable[OutputPlan]
 ) -> None:
-    """Refuse an output or an action that leads nowhere, and a rest at which something drives.
+    """Refuse unconnected outputs and actions, and a rest that drives.
 
     Raises:
-        ProfileError: If a mix names no action or an unknown one; if an action moves nothing; if
-            something that drives has no action that propels, or is not at 0 at rest.
+        ProfileError: If a mix has no action or an unknown one, an action moves nothing, or a
+            propelling part has no propelling action or is not at 0 at rest.
     """
     moved: set[str] = set()
     for output in outputs:
@@ -456,11 +456,10 @@ def check_stop(
     actions: Mapping[str, ActionPlan],
     outputs: Iterable[OutputPlan],
 ) -> None:
-    """Refuse a stop that would let something drive on for a while.
+    """Refuse a stop that would keep driving.
 
     Raises:
-        ProfileError: If the stop holds or ramps, and an action that does not propel is part of
-            something that drives.
+        ProfileError: If the stop holds or ramps an action that contributes to a propelling part.
     """
     if not stop.hold_ms and not stop.ramp_ms:
         return
@@ -497,7 +496,7 @@ def _check_rest(source: Source, actions: Mapping[str, ActionPlan], output: Outpu
 
 
 def _drives(actions: Mapping[str, ActionPlan], output: OutputPlan) -> bool:
-    """Whether an output may make the robot go."""
+    """Return whether an output can propel the robot."""
     return (
         output.driver == "esc"
         or output.part in DRIVING_PARTS

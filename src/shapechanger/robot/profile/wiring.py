@@ -1,4 +1,4 @@
-"""Who uses which pin, channel and address; nothing may be used twice."""
+"""Allocation of pins, channels and addresses; none may be used twice."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _OF_A_CHIP: Final = ("hz", "output_enable")  # A PCA9685 has one of each for its
 
 @dataclass(frozen=True, slots=True)
 class _User:
-    """Who uses something.
+    """User of a pin, channel or address.
 
     Attributes:
-        place: The key that says so.
-        group: Users of one group may share it; empty for a user who shares it with nobody.
+        place: The key that claims it.
+        group: Users of one group may share it; empty for exclusive use.
     """
 
     place: Place
@@ -42,7 +42,7 @@ class _User:
 
 
 class PinAllocation:
-    """What is used so far.
+    """Pins, channels and addresses in use.
 
     Args:
         source: Where the profile was read.
@@ -53,22 +53,21 @@ class PinAllocation:
         self._users: dict[str, _User] = {}
 
     def take_pin(self, pin: int, place: Place) -> None:
-        """Use a pin for one thing.
+        """Allocate a pin.
 
         Raises:
-            ProfileError: If it is used already.
+            ProfileError: If it is in use.
         """
         self._take(f"GPIO{pin}", _User(place))
 
     def take_outputs(self, outputs: Iterable[OutputPlan]) -> tuple[OutputPlan, ...]:
-        """Use the pins and channels of outputs.
+        """Allocate the pins and channels of outputs.
 
         Returns:
-            The outputs; what one says of its PCA9685 is said for all on the chip.
+            The outputs, with the settings of a PCA9685 shared by all outputs on the chip.
 
         Raises:
-            ProfileError: If something is used twice, or if two outputs say different things of
-                their chip.
+            ProfileError: If something is used twice, or two outputs disagree about their chip.
         """
         taken = tuple(outputs)
         chips: dict[str, dict[str, Any]] = {}
@@ -82,10 +81,10 @@ class PinAllocation:
         )
 
     def take_sensor(self, sensor: SensorPlan) -> None:
-        """Use the pins or the address of a sensor.
+        """Allocate the pins or the address of a sensor.
 
         Raises:
-            ProfileError: If something is used already.
+            ProfileError: If something is in use.
         """
         place: Place = ("sensor", sensor.name)
         self._take_pins(sensor.settings, place, SENSOR_SETTINGS[sensor.driver])
@@ -93,7 +92,7 @@ class PinAllocation:
             if key in sensor.settings:
                 self._take_bus(sensor.settings, (*place, key), group="")
         if sensor.driver == "as5600":
-            # They all have one address, and answer together where two multiplexers open to them.
+            # All share one address, and respond together if two multiplexers select them.
             self._take_address(sensor.settings["bus"], _AS5600, _User((*place, "driver")))
 
     def _take_output(self, output: OutputPlan, chips: dict[str, dict[str, Any]]) -> None:
@@ -151,7 +150,7 @@ class PinAllocation:
 
 
 def _chip_of(settings: _Settings) -> str:
-    """The PCA9685 of an output, in words; empty for none."""
+    """Describe the PCA9685 of an output; empty for none."""
     if settings.get("over") != "pca9685":
         return ""
     return f"the PCA9685 at {settings['address']:#x} of I2C bus {settings['bus']}"

@@ -1,4 +1,4 @@
-"""Only pictures that are good and new count as what the robot sees."""
+"""Camera thread of the daemon: only valid, new frames are passed on."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
 from tests.robot.daemon.fakes import FakeCamera
 from tests.robot.daemon.plans import SIZE, picture
 
@@ -76,7 +78,7 @@ GOOD = picture(3)
         (GOOD[: len(GOOD) // 2], 2, "no whole JPEG"),
         (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "Corrupt|Premature|JPEG"),
         (picture(3, (80, 64)), 2, "80 by 64 pixels"),
-        (picture(1), 2, "same picture"),
+        (picture(1), 2, "same frame"),
         (GOOD, 1, "older than the one before"),
         (GOOD, NOW_NS + 60_000_000, "from the future"),
     ],
@@ -99,7 +101,7 @@ def test_a_camera_that_freezes_gives_nothing_and_says_so_once(
     camera.put(Frame(picture(2), 6))
     watched.until(lambda: len(watched.reports) == 2)
     assert [frame.captured_ns for frame in watched.frames] == [1, 6]
-    assert "same picture" in watched.reports[0]
+    assert "same frame" in watched.reports[0]
     assert "again" in watched.reports[1]
     assert watched.reader.errors == 4
 
@@ -110,7 +112,7 @@ def test_a_camera_that_fails_is_opened_again(camera: FakeCamera, watched: Watche
     camera.fail("The camera was unplugged.")
     camera.put(Frame(picture(2), 2))
     watched.until(lambda: len(watched.frames) == 2 and len(watched.reports) == 2)
-    assert watched.reports == ["The camera was unplugged.", "The camera gives pictures again."]
+    assert watched.reports == ["The camera was unplugged.", "The camera works again."]
 
 
 def test_a_camera_that_cannot_be_opened_is_tried_again(
@@ -148,3 +150,42 @@ def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
     watched.reader.close()
     assert not watched.reader._thread.is_alive()
     assert watched.reports == []
+
+
+@given(moves=st.lists(st.booleans(), max_size=60))
+def test_the_mailbox_gives_only_the_newest_item_and_only_once(moves: list[bool]) -> None:
+    """In any order of puts and takes; the items that come out only rise."""
+    box: Latest[int] = Latest()
+    waiting: int | None = None
+    taken: list[int] = []
+    for number, put in enumerate(moves):
+        if put:
+            box.put(number)
+            waiting = number
+        else:
+            got = box.take()
+            assert got == waiting
+            waiting = None
+            if got is not None:
+                taken.append(got)
+    assert taken == sorted(set(taken))
+
+
+def test_two_threads_never_take_an_item_twice() -> None:
+    """One thread puts and one takes: numbers rise, and the last one is not lost."""
+    box: Latest[int] = Latest()
+    last = 20_000
+
+    def put() -> None:
+        for number in range(last + 1):
+            box.put(number)
+
+    writer = threading.Thread(target=put)
+    writer.start()
+    taken: list[int] = []
+    while not taken or taken[-1] != last:
+        got = box.take()
+        if got is not None:
+            taken.append(got)
+    writer.join()
+    assert taken == sorted(set(taken))

@@ -1,4 +1,4 @@
-"""Robots that announce themselves, on loopback."""
+"""Discovery of announced robots, on loopback."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from collections.abc import Iterator
 import pytest
 from zeroconf import ServiceInfo, Zeroconf
 
-from shapechanger.link.address import Address
-from shapechanger.remote import discovery as discover
-from shapechanger.remote.discovery import SERVICE, FoundRobot, find
-from shapechanger.robot.daemon import discovery
+from shapechanger.link.address import SERVICE, Address
+from shapechanger.remote.discovery import FoundRobot, find
 
 
 @pytest.fixture
@@ -24,8 +22,8 @@ def network() -> Iterator[Zeroconf]:
     network.close()
 
 
-def test_a_robot_is_found_with_what_it_says(network: Zeroconf) -> None:
-    """Its name, body, address, fingerprint and version; by name."""
+def test_announced_robots_are_found(network: Zeroconf) -> None:
+    """With name, body, address, fingerprint and version, sorted by name."""
     for name, body, port in (("tank", "tank", 5001), ("car", "car", 5000)):
         network.register_service(
             ServiceInfo(
@@ -43,11 +41,6 @@ def test_a_robot_is_found_with_what_it_says(network: Zeroconf) -> None:
     ]
 
 
-def test_nobody_there_is_no_error(network: Zeroconf) -> None:
-    """Networks may block this; the list is then empty."""
+def test_an_empty_network_is_no_error(network: Zeroconf) -> None:
+    """A network may block multicast; the list is then empty."""
     assert find(0.1, network) == []
-
-
-def test_both_sides_use_the_same_name() -> None:
-    """The robot announces what the workstation looks for."""
-    assert discover.SERVICE == discovery.SERVICE

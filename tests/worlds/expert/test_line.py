@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from shapechanger.worlds.expert import CourseProgress
 from shapechanger.worlds.expert.line import ClosedLine
-from tests.worlds.pathfinder.courses import ring
+from tests.worlds.expert.courses import ring
 
 _SQUARE = ClosedLine(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]))
 _RING = ClosedLine(ring(0).route)

@@ -7,8 +7,8 @@ import math
 import mujoco
 import pytest
 
-from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, Touch
-from shapechanger.worlds.world import Pose
+from shapechanger.bodies.vehicles import PlanarPose
+from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
 # A ball of 0.1 m that can be put anywhere, a wall whose face is at x = 1 m, and the ground.
@@ -26,14 +26,14 @@ class _Bench:
     def __init__(self) -> None:
         self.model = mujoco.MjModel.from_xml_string(_MODEL)
         self.data = mujoco.MjData(self.model)
-        self.touch = Touch(self.model)
+        self.touch = ContactTracker(self.model)
 
     def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
         """Stand somewhere for some time."""
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
-            self.touch.follow(self.data, Pose(x, 0.0, heading), _DT)
+            self.touch.follow(self.data, PlanarPose(x, 0.0, heading), _DT)
 
 
 def test_the_ground_is_nothing_to_run_into() -> None:
@@ -71,7 +71,7 @@ def test_after_it_was_lifted_off_the_next_one_counts() -> None:
     """Whoever was put back and runs into a wall again at once has run into it twice."""
     bench = _Bench()
     bench.stand(0.91)
-    bench.touch.let_go()
+    bench.touch.release()
     assert not bench.touch.touches
     bench.stand(0.91)
     assert bench.touch.collisions == 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.worlds.course import Course, Thing, Wall
+from shapechanger.worlds.course import Course, Obstacle, Wall
 
 
 def ring(
@@ -12,7 +12,7 @@ def ring(
     *,
     half_width: float = 1.0,
     radius: float = 8.0,
-    things: int = 10,
+    obstacles: int = 10,
     gap: float = 0.9,
     current: tuple[float, float] = (0.0, 0.0),
 ) -> Course:
@@ -37,23 +37,23 @@ def ring(
             Wall((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), 0.5, "plaster")
             for a, b in zip(edge, np.roll(edge, -1, axis=0), strict=True)
         ]
-    stand: list[Thing] = []
-    for n in range(things):
-        i = int((n + rng.uniform(0.2, 0.8)) * len(route) / things)
+    stand: list[Obstacle] = []
+    for n in range(obstacles):
+        i = int((n + rng.uniform(0.2, 0.8)) * len(route) / obstacles)
         size = float(rng.uniform(0.25, 0.5))
         reach = float(rng.uniform(0.3, 2 * half_width - gap - 0.1))
         side = rng.choice((-1, 1))
         x, y = route[i] + side * (half_width - reach + size / 2) * left[i]
         yaw = float(np.arctan2(ahead[i, 1], ahead[i, 0]))
         kind = "box" if rng.random() < 0.5 else "post"
-        stand.append(Thing(kind, float(x), float(y), yaw, size, size, 0.4))
+        stand.append(Obstacle(kind, float(x), float(y), yaw, size, size, 0.4))
     return Course(
         world="corridor",
         seed=seed,
         route=route,
         half_width=np.full(len(route), half_width),
         walls=tuple(walls),
-        things=tuple(stand),
+        obstacles=tuple(stand),
         lamps=(),
         ceiling_m=0.0,
         gap_m=gap,

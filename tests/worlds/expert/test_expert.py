@@ -16,8 +16,8 @@ from shapechanger.worlds.expert.driver import ThreeWay
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.world import Pose
-from tests.worlds.pathfinder.courses import ring
-from tests.worlds.pathfinder.kinematic import SIZES, TOP, Kinematic
+from tests.worlds.expert.courses import ring
+from tests.worlds.expert.kinematic import SIZES, TOP, Kinematic
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 
@@ -100,7 +100,7 @@ def test_a_boat_holds_against_the_current() -> None:
 def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
     """With its nose at a wall it backs up, turns, and goes on."""
     half_width = 1.2 if name in ("car", "tank") else 2.5
-    course = ring(7, half_width=half_width, radius=10.0, things=0)
+    course = ring(7, half_width=half_width, radius=10.0, obstacles=0)
     ahead = course.route[31] - course.route[30]
     heading = math.atan2(ahead[1], ahead[0]) + side * math.pi / 2
     near = half_width - SIZES[name][0] / 2 - 0.1

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import WorldError
-from shapechanger.worlds.course import Course, Thing
+from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.expert import CoursePath, plan_path
 from shapechanger.worlds.expert.lattice import FAR_M, ClearanceField
 from shapechanger.worlds.expert.line import ClosedLine
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
-from tests.worlds.pathfinder.courses import ring
+from tests.worlds.expert.courses import ring
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 _CASES = list(itertools.product(_HOMES, range(3)))
@@ -82,19 +82,19 @@ def _plug(course: Course, size: float) -> Course:
     x, y = course.route[100]
     ahead = course.route[101] - course.route[99]
     yaw = float(np.arctan2(ahead[1], ahead[0]))
-    thing = Thing("box", float(x), float(y), yaw, 0.3, size, 0.4)
-    return dataclasses.replace(course, things=(*course.things, thing))
+    obstacle = Obstacle("box", float(x), float(y), yaw, 0.3, size, 0.4)
+    return dataclasses.replace(course, obstacles=(*course.obstacles, obstacle))
 
 
 def test_a_blocked_lane_is_refused_in_words() -> None:
     """With what could be done instead."""
-    with pytest.raises(WorldError, match=r"needs 0\.40 m .* blocked .* another seed"):
-        plan_path(_plug(ring(0, things=0), 2.0), 0.1, 0.1)
+    with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
+        plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1)
 
 
 def test_a_gap_is_found_until_it_is_too_narrow() -> None:
     """A box in the middle leaves 0.6 m at each side: 0.5 m go through, 0.7 m do not."""
-    course = _plug(ring(0, things=0), 0.8)
+    course = _plug(ring(0, obstacles=0), 0.8)
     assert plan_path(course, 0.1, 0.15).clearance.min() >= 0.25
     with pytest.raises(WorldError):
         plan_path(course, 0.1, 0.25)
@@ -111,17 +111,17 @@ def test_ahead_goes_round() -> None:
 
 def test_distances_are_exact() -> None:
     """Of walls, boxes that are turned, and round things; 0 inside."""
-    box = Thing("box", 1.0, 1.0, np.pi / 4, 0.4, 0.2, 0.3)
-    post = Thing("post", 3.0, 0.0, 0.0, 0.4, 0.4, 0.3)
-    empty = ring(0, things=0, radius=50.0)
-    obstacles = ClearanceField(dataclasses.replace(empty, walls=(), things=(box, post)))
+    box = Obstacle("box", 1.0, 1.0, np.pi / 4, 0.4, 0.2, 0.3)
+    post = Obstacle("post", 3.0, 0.0, 0.0, 0.4, 0.4, 0.3)
+    empty = ring(0, obstacles=0, radius=50.0)
+    obstacles = ClearanceField(dataclasses.replace(empty, walls=(), obstacles=(box, post)))
     far = np.sqrt(0.5)
     points = np.array([(1.0, 1.0), (1.0 + far, 1.0 + far), (1.0 - far, 1.0 + far), (3.0, 1.0)])
     np.testing.assert_allclose(obstacles.distance(points), [0.0, 0.8, 0.9, 0.8])
     assert obstacles.distance(np.array([(30.0, 0.0)])) == FAR_M
     assert obstacles.distance(np.empty((0, 2))).shape == (0,)
     # A wall is a line with two ends.
-    walls = ClearanceField(dataclasses.replace(empty, things=()))
+    walls = ClearanceField(dataclasses.replace(empty, obstacles=()))
     wall = empty.walls[0]
     middle = (np.array(wall.start) + np.array(wall.end)) / 2
     assert walls.distance(middle[None])[0] == pytest.approx(0.0, abs=1e-9)
