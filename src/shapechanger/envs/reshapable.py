@@ -403,6 +403,7 @@ def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) 
         UnknownName: If there is no such argument.
         EnvArgumentError: If one has the wrong type.
     """
+    # `main_body` is a number or a name; MuJoCo refuses an unknown one.
     base: Any = next(each for each in env.__mro__ if each.__module__.startswith("gymnasium."))
     known: dict[str, Any] = dict(_OWN_ARGUMENTS)
     for constructor in (cast("Any", MujocoEnv).__init__, base.__init__):
@@ -411,7 +412,7 @@ def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) 
     for name, value in arguments.items():
         if name not in known:
             raise UnknownName(f"argument of {family}", name, ("body", *known))
-        if expected := _mismatch(known[name], value):
+        if name != "main_body" and (expected := _mismatch(known[name], value)):
             raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
 
 
