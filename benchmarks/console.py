@@ -171,7 +171,7 @@ def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[lis
         seen: list[tuple[int, float, str]] = page.evaluate("globalThis.seen")
     if len(seen) < 10.0 * seconds:
         # The robot started afresh, as on a machine that is too busy for its guard: no measurement.
-        raise RuntimeError(f"Only {len(seen)} pictures came in {seconds:.0f} s: {robot.said()}")
+        raise RuntimeError(f"Only {len(seen)} pictures came in {seconds:.0f} s: {robot.log_text()}")
     ages: list[float] = []
     for number, at_ms, bits in seen[1:]:
         if not _is_whole(bits):

@@ -25,7 +25,7 @@ from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.ppo import train, use_one_thread
-from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
+from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
 
 __all__ = ["FOLDER", "TASKS", "learned", "trained"]
 
@@ -78,7 +78,7 @@ def trained(name: str, seed: int) -> Path:
         return out
     task = TASKS[name]
     settings = learner_settings(task.learner)
-    assert isinstance(settings, LearnerSettings)
+    assert isinstance(settings, PpoSettings)
     use_one_thread()
     curve: list[Evaluation] = []
     policy = train(task.env, task.learner, settings, task.steps, seed, on_evaluation=curve.append)

@@ -1,4 +1,4 @@
-"""What holds for all tests, and what those that draw ask for."""
+"""Settings of all tests, and fixtures for rendering."""
 
 from __future__ import annotations
 
@@ -13,63 +13,56 @@ from hypothesis import settings
 
 from tests.drawing import draws, missing
 
-# What `nohup` or a script starts in the background ignores Ctrl-C, and so would all that the tests
-# start, some of which is there to be interrupted.
+# Background processes, such as those of `nohup`, ignore Ctrl-C, and so do their children; some tests
+# interrupt theirs.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# No test asserts a wall-clock time: a busy machine is no defect. Every run tries the same examples,
-# so that what passes here, and what is covered here, does everywhere.
+# No test asserts a wall-clock time. Every run tries the same examples, so that results and coverage
+# are reproducible.
 settings.register_profile("shapechanger", deadline=None, derandomize=True)
 settings.load_profile("shapechanger")
 
 
-# Robots are processes that keep time with one another. Where the machine stands still for half a
-# second, what is right fails too; the summary names what had to be tried again.
-_IN_REAL_TIME = ("robot", "remote", "twin", "cli/robot", "cli/demos/test_on_robot.py")
-_REAL_TIME_CLAIMS = "claims/test_robot_"
-_AGAIN = 2
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Retry `realtime` tests once: a pause of the machine can fail a correct one.
 
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Try the tests of running robots again when they fail."""
+    They start processes, open sockets or kill something. The summary lists each retry as `RERUN`.
+    """
     for item in items:
-        path = item.path.relative_to(config.rootpath / "tests")
-        if path.as_posix().startswith(_REAL_TIME_CLAIMS) or any(
-            path.is_relative_to(folder) for folder in _IN_REAL_TIME
-        ):
-            item.add_marker(pytest.mark.flaky(reruns=_AGAIN))
+        if item.get_closest_marker("realtime"):
+            item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 @pytest.fixture(scope="session")
 def gl() -> None:
-    """Something to draw with."""
+    """Skip without an OpenGL library."""
     if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
         missing("Neither EGL nor OSMesa nor a display works here")
 
 
 @pytest.fixture(scope="session")
 def egl() -> None:
-    """EGL, and a driver for it."""
+    """Skip without EGL and its driver."""
     if not draws("egl"):
         missing("EGL does not work here")
 
 
 @pytest.fixture(scope="session")
 def osmesa() -> None:
-    """OSMesa, which draws on the processor."""
+    """Skip without OSMesa, which renders on the CPU."""
     if not draws("osmesa"):
         missing("OSMesa does not work here")
 
 
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
-    """The name of a display that nobody looks at."""
+    """Yield the name of a virtual display."""
     server = shutil.which("Xvfb")
     if server is None:
         missing("There is no Xvfb")
     read_end, write_end = os.pipe()
-    # The server picks a free number, and writes it when it is ready.
+    # The server picks a free number and prints it when it is ready.
     command = [server, "-displayfd", str(write_end), "-screen", "0", "640x480x24"]
     command += ["-nolisten", "tcp"]
     with subprocess.Popen(command, pass_fds=[write_end], stderr=subprocess.DEVNULL) as process:

@@ -64,12 +64,9 @@ _RULES = {
         never=_HARDWARE | {"torch"},
     ),
     # Transfer cannot tell a simulator from a robot. Cloning is one of its learners.
-    "transfer": _Rule(
-        _names("errors layout demos reports shapechanger"), never=_HARDWARE | _SIMULATORS
-    ),
+    "transfer": _Rule(_names("errors layout demos shapechanger"), never=_HARDWARE | _SIMULATORS),
     "reports": _Rule(
-        _names("errors layout transfer demos identify shapechanger"),
-        never=_HARDWARE | _SIMULATORS,
+        _names("errors layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
     ),
     # The exam for third-party envs.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),

@@ -200,7 +200,7 @@ def test_a_picture_of_no_size_is_refused(width: int, height: int) -> None:
     """Before anything is made that large."""
     statement = f"gym.make('shapechanger/Ant-v1').unwrapped.picture({width}, {height})"
     assert _says(_MAKE.format(asks="") + _REFUSED.format(statement=statement)) == (
-        f"A picture is 1 to 8192 pixels wide and high, got {width} x {height}."
+        f"An image must be 1 to 8192 pixels wide and high, got {width} x {height}."
     )
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from shapechanger.envs.vehicle.drivers import CLONES
 
+pytestmark = pytest.mark.system
+
 _ROOT = Path(__file__).resolve().parents[1]
 _SRC = _ROOT / "src"
 

@@ -13,8 +13,8 @@ The names below are the public interface; each is imported on first use and may 
 - Layouts: `Layout`, `Feature`, `Element` name the numbers that a robot senses and moves.
 - Body edits: `Stretch`, `Radius`, `Cut`, `Remove`, `Split`, `AddSegment`, `AddLimb`, `Mass`,
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity` and
-  `StartHeight` are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body
-  to another, and `certify` proves what a shift changes.
+  `StartHeight` are values; `reshape` and `compile_body` apply them, `interpolate` goes from one
+  body to another, and `certify` proves what a shift changes.
 - Envs: `make_vec` makes many at once; `examine` runs the exam that every env passes.
 - Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
   `TransferTask`, `make_plan` and `run_study` measure what a transfer is worth, `load_policy` and

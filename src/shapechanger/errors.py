@@ -1,37 +1,37 @@
-"""What can go wrong, as one tree; each message is a sentence that says what exists instead.
+"""Exceptions. Each message is one sentence that names what exists instead.
 
 ```
 ShapechangerError
-├── UnknownName (ValueError)        a name that nothing bears, with the nearest spelling
-├── LayoutError (ValueError)        a layout that contradicts itself
-├── MorphologyError (ValueError)    an edit that does not fit the model it was given
-│   ├── BrokenModel                 the edited model does not compile
-│   └── EmptyShift                  source and target do the same, so nothing crosses
-├── SpaceMismatch (ValueError)      two spaces that differ where they must not
-├── BadAction (ValueError)          an action that an env cannot take
-├── VectorEnvError (ValueError)     a vector env that cannot be made as it was asked for
-├── FingerError (ValueError)        a finger that cannot be built, or not move as asked
-├── WorldError (ValueError)         a world that cannot be laid out as it was asked for
-├── PathError (ValueError)          a path for a fingertip that cannot be made as it was asked for
-├── MapError (ValueError)           a body map that cannot be built, inverted or composed
-├── TransplantError (ValueError)    a policy whose weights cannot be moved
-├── StudyError (ValueError)         a study that cannot start
-│   ├── ForeignStudy                the output folder belongs to something else
-│   └── CorruptStudy                a file of the study cannot be read
+├── UnknownName (ValueError)        unknown name, with the nearest spelling
+├── LayoutError (ValueError)        inconsistent layout
+├── MorphologyError (ValueError)    edit that does not fit the model
+│   ├── BrokenModel                 edited model that does not compile
+│   └── EmptyShift                  source and target behave identically
+├── SpaceMismatch (ValueError)      incompatible spaces
+├── BadAction (ValueError)          action that an env cannot take
+├── EnvArgumentError (ValueError)   argument of an env with the wrong type
+├── VectorEnvError (ValueError)     vector env that cannot be made as requested
+├── FingerError (ValueError)        finger that cannot be built or moved as requested
+├── WorldError (ValueError)         world that cannot be laid out as requested
+├── PathError (ValueError)          fingertip path that cannot be made as requested
+├── MapError (ValueError)           body map that cannot be built, inverted or composed
+├── TransplantError (ValueError)    policy whose weights cannot be transplanted
+├── StudyError (ValueError)         study that cannot start
+│   ├── ForeignStudy                output folder of something else
+│   └── CorruptStudy                unreadable file of a study
 ├── DemosError (ValueError)         demonstrations that cannot be recorded, read or learned from
-│   └── BrokenEpisode               an episode that is not whole, and the command that repairs it
-├── LinkError (ConnectionError)     a robot that cannot be reached, or does not understand
-│   ├── RobotRefused                the robot says no, and why
-│   └── StaleObservation            the newest observation is too old to act on
-├── RobotError (RuntimeError)       the robot's own side: a device that does not answer
-│   └── ProfileError (ValueError)   a profile that contradicts itself, with the line
-├── OutputError (OSError)           a file or folder that cannot be written
-├── RenderError (RuntimeError)      no picture can be drawn here
-└── MissingExtra (ImportError)      an optional dependency, and the command that installs it
+│   └── BrokenEpisode               incomplete episode, with the command that repairs it
+├── LinkError (ConnectionError)     robot that cannot be reached or breaks the protocol
+│   ├── RobotRefused                the robot refuses, with its reason
+│   └── StaleObservation            newest observation too old to act on
+├── RobotError (RuntimeError)       error on the robot, such as a device that does not respond
+│   └── ProfileError (ValueError)   invalid profile, with the line
+├── OutputError (OSError)           file or folder that cannot be written
+├── RenderError (RuntimeError)      rendering not possible here
+└── MissingExtra (ImportError)      optional dependency, with the command that installs it
 ```
 
-Each class inherits from the builtin in brackets too, so that code which knows only Python can
-catch it.
+Each class also inherits from the builtin in brackets.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ __all__ = [
     "CorruptStudy",
     "DemosError",
     "EmptyShift",
+    "EnvArgumentError",
     "FingerError",
     "ForeignStudy",
     "LayoutError",
@@ -70,19 +71,19 @@ __all__ = [
     "WorldError",
 ]
 
-# A model of a humanoid has some forty names; a longer list hides the sentence it belongs to.
+# A humanoid has some forty names; a longer list would hide the sentence.
 _MOST_NAMES_LISTED: Final = 40
 
 
 class ShapechangerError(Exception):
-    """Something that Shapechanger refuses to do, in a sentence."""
+    """Base class of all errors of Shapechanger."""
 
 
 class UnknownName(ShapechangerError, ValueError):
-    """A name that nothing bears.
+    """Unknown name.
 
     Attributes:
-        kind: What was looked for, such as "body" or "environment id".
+        kind: Kind of name, such as "body" or "environment id".
         name: The name as given.
         known: The names that exist.
     """
@@ -96,36 +97,40 @@ class UnknownName(ShapechangerError, ValueError):
         super().__init__(f"No {kind} matches {name!r}.{hint} There are: {_listed(self.known)}.")
 
     def __reduce__(self) -> tuple[type[UnknownName], tuple[str, str, tuple[str, ...]]]:
-        """Let the error cross from a worker process: it is made from three arguments, not one."""
+        """Pickle the error with its three arguments, for worker processes."""
         return type(self), (self.kind, self.name, self.known)
 
 
 class LayoutError(ShapechangerError, ValueError):
-    """A layout that contradicts itself."""
+    """Inconsistent layout."""
 
 
 class MorphologyError(ShapechangerError, ValueError):
-    """A morphology edit that does not fit the model it was given."""
+    """Edit that does not fit the model."""
 
 
 class BrokenModel(MorphologyError):
-    """An edited model that MuJoCo does not compile."""
+    """Edited model that does not compile."""
 
 
 class EmptyShift(MorphologyError):
-    """Source and target do the same, so there is nothing to transfer across."""
+    """Source and target behave identically, so there is nothing to transfer."""
 
 
 class SpaceMismatch(ShapechangerError, ValueError):
-    """Two spaces differ where they must be the same."""
+    """Incompatible spaces."""
 
 
 class BadAction(ShapechangerError, ValueError):
-    """An action that an env cannot take; the message names the env."""
+    """Action that an env cannot take; the message names the env."""
+
+
+class EnvArgumentError(ShapechangerError, ValueError):
+    """Argument of an env with the wrong type."""
 
 
 class VectorEnvError(ShapechangerError, ValueError):
-    """A vector env that cannot be made, or reset, as it was asked for."""
+    """Vector env that cannot be made or reset as requested."""
 
 
 class FingerError(ShapechangerError, ValueError):

@@ -8,8 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from shapechanger.demos.episodes import episodes_of, read_episode, repair
 from tests.demos.episodes.making import picture
+
+pytestmark = pytest.mark.system
 
 _TRIALS = 200
 _ROOT = Path(__file__).parents[2]

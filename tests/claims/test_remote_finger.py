@@ -21,7 +21,7 @@ from tests.twin.robots import until
 
 Env = gym.Env[Any, Any]
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 
 @pytest.fixture(scope="module")

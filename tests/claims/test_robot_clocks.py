@@ -17,6 +17,8 @@ from shapechanger.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import Clock, Served, driving
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 DEADLINE_MS = 250
 STALE_MS = 500
 TICK_MS = 10.0

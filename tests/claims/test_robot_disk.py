@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from shapechanger.twin.robot import run_robot
 from shapechanger.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving
+
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def test_a_full_disk(tmp_path: Path) -> None:

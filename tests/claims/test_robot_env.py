@@ -21,6 +21,8 @@ from tests.robot.profile.texts import HOVERCRAFT
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.twin.robots import until
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Env = gym.Env[Any, Any]
 FORWARD = np.array([0.0, 1.0], np.float32)
 STILL = np.zeros(2, np.float32)

@@ -14,6 +14,8 @@ from shapechanger.cli.robot.trial.trial import Trial
 from shapechanger.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 TOLERANCE = 10.0
 """How much longer than promised a stop may take on a machine that does other things too."""
 

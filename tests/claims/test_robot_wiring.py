@@ -10,6 +10,8 @@ from shapechanger.twin.robot import Whereabouts, run_robot
 from tests.robots import CAR, IN_A_ROOM, SWAPPED_ROLES, SWAPPED_WAYS, write_profile
 from tests.served import driving
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 
 def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
     """Where a car is before and after full throttle, and what its encoder says of its speed.

@@ -17,6 +17,8 @@ from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.simulation import MujocoWorld
 from tests.robots import write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 _COURSE, _START = 5, 11
 
 

@@ -22,6 +22,8 @@ from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners.settings import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
+pytestmark = pytest.mark.system
+
 _SUITE = ["suite", "vehicles", "--seeds", "2"]
 # The target of one is the target of another, and so with the sources.
 _PAIRS = [f"{a}-to-{b}" for a, b in (("Dry", "Wet"), ("Dry", "Icy"), ("Wet", "Dry"))]

@@ -18,6 +18,8 @@ import pytest
 from shapechanger.cli import main, pictures
 from shapechanger.errors import OutputError
 
+pytestmark = pytest.mark.system
+
 COMMAND = [sys.executable, "-c", "from shapechanger.cli import main; main()"]
 QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
 

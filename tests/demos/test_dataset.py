@@ -98,7 +98,7 @@ def test_episodes_that_differ_are_not_mixed(
 def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
     """Also within an episode."""
     path = _recorded(tmp_path, image_size=(64, 24))
-    with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, and .* 64 x 24"):
+    with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, but .* 64 x 24"):
         load_dataset(path)
 
 
@@ -106,7 +106,7 @@ def test_a_picture_that_is_cut_off_is_named(tmp_path: Path) -> None:
     """As it was received, so that only whoever decodes it can know."""
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0), _jpeg(1)[:-40])
-    with pytest.raises(DemosError, match=r"000000\.jpg is no whole picture"):
+    with pytest.raises(DemosError, match=r"000000\.jpg is not a JPEG, or is damaged"):
         load_dataset(tmp_path)
 
 
@@ -115,7 +115,7 @@ def test_a_picture_that_claims_to_be_huge_is_not_decoded() -> None:
     jpeg = bytearray(_jpeg(1))
     place = jpeg.index(b"\xff\xc0") + 5
     jpeg[place : place + 4] = b"\xea\x60\xea\x60"  # 60,000 x 60,000.
-    with pytest.raises(DemosError, match=r"x\.jpg says that it has 60000 x 60000 pixels"):
+    with pytest.raises(DemosError, match=r"x\.jpg claims 60000 x 60000 pixels"):
         decode_picture(bytes(jpeg), "x.jpg")
 
 

@@ -222,14 +222,14 @@ def test_a_disk_that_is_full_already_moves_nothing(tmp_path: Path) -> None:
 
 
 def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
-    """The second is told, before it moves anything."""
+    """The second recorder is refused before the env moves."""
     inner = CorridorEnv("state")
     with (
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0),
         RecordEpisodes(inner, tmp_path) as env,
     ):
         env.reset()
-        with pytest.raises(DemosError, match="records in"):
+        with pytest.raises(DemosError, match="in use by another recorder"):
             env.step(FORWARD)
     assert inner.done == []
 
@@ -275,14 +275,14 @@ def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
 
 def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
     """By what it shows, by what it does not say, and by a quality that is none."""
-    with pytest.raises(DemosError, match="what can be recorded is a picture"):
+    with pytest.raises(DemosError, match="it must be a picture"):
         RecordEpisodes(gym.make("Taxi-v4"), tmp_path)
-    with pytest.raises(DemosError, match="CartPole-v1 publishes no observation_layout"):
+    with pytest.raises(DemosError, match="CartPole-v1 has no observation_layout"):
         RecordEpisodes(gym.make("CartPole-v1"), tmp_path)
     with pytest.raises(DemosError, match="quality"):
         RecordEpisodes(CorridorEnv(), tmp_path, quality=0)
     wrong: Any = CorridorEnv("state")
     wrong.action_layout = wrong.observation_layout
     wrong.action_space = gym.spaces.Box(-1.0, 1.0, (3,))
-    with pytest.raises(DemosError, match="its layout has 2 numbers"):
+    with pytest.raises(DemosError, match="its layout has 2 values"):
         RecordEpisodes(wrong, tmp_path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,13 @@ from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.bodies.families import BodyLike
 from shapechanger.envs import CATALOGUE
-from shapechanger.errors import BrokenModel, MorphologyError, SpaceMismatch, UnknownName
+from shapechanger.errors import (
+    BrokenModel,
+    EnvArgumentError,
+    MorphologyError,
+    SpaceMismatch,
+    UnknownName,
+)
 from shapechanger.morphology import (
     AddSegment,
     Cut,
@@ -274,10 +281,10 @@ def test_a_new_body_starts_from_rest(ant: Any) -> None:
 
 
 def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
-    """Resets without options, or with others, keep it; the same body again costs nothing."""
+    """Resets without a body keep it; the same body again is not compiled again."""
     ant.reset(options={"body": "BigAnt"})
     model = ant.unwrapped.model
-    for options in (None, {}, {"height": 3}, {"body": "BigAnt"}, {"body": _BIG[0]}):
+    for options in (None, {}, {"body": "BigAnt"}, {"body": _BIG[0]}):
         ant.reset(options=options)
         assert ant.unwrapped.body == _BIG
         assert ant.unwrapped.model is model
@@ -405,3 +412,43 @@ def test_body_towards_is_a_path_between_two_envs() -> None:
     model = _model("shapechanger/Ant-v1", body=middle)
     shank = model.geom_size[model.body("shank_1").geomadr[0], 1]
     assert shank == pytest.approx(1.5 * 0.2 * math.sqrt(2.0))
+
+
+def test_an_unknown_option_of_reset_is_refused(ant: Any) -> None:
+    """The message suggests the nearest spelling."""
+    with pytest.raises(UnknownName, match=r"Did you mean 'body'\?"):
+        ant.reset(options={"boddy": "BigAnt"})
+
+
+@pytest.mark.parametrize(
+    ("env_id", "arguments", "sentence"),
+    [
+        ("Ant", {"ctrl_cost_weight": "x"}, "Ant: ctrl_cost_weight must be a number, got 'x'."),
+        ("Ant", {"healthy_z_range": 0.3}, "Ant: healthy_z_range must be two numbers, got 0.3."),
+        ("Hopper", {"healthy_z_range": "ab"}, "Hopper: healthy_z_range must be two numbers"),
+        ("HalfCheetah", {"fast_model": 1}, "HalfCheetah: fast_model must be True or False, got 1."),
+        ("InvertedPendulum", {"frame_skip": True}, "frame_skip must be a number, got True."),
+    ],
+)
+def test_an_argument_of_another_type_is_refused(
+    env_id: str, arguments: dict[str, Any], sentence: str
+) -> None:
+    """One sentence names the env, the argument and the expected type."""
+    with pytest.raises(EnvArgumentError, match=re.escape(sentence)):
+        gym.make(f"shapechanger/{env_id}-v1", **arguments)
+
+
+def test_an_unknown_argument_is_refused() -> None:
+    """The message suggests the nearest spelling."""
+    with pytest.raises(UnknownName, match=r"Did you mean 'fast_model'\?"):
+        gym.make("shapechanger/Ant-v1", fast_modell=False)
+
+
+@pytest.mark.parametrize("name", ["HalfCheetah", "Humanoid", "InvertedDoublePendulum"])
+def test_every_env_accepts_fast_model(name: str) -> None:
+    """It changes nothing in an env that has none, and its pickle keeps the argument."""
+    with gym.make(f"shapechanger/{name}-v1", fast_model=False) as env:
+        again = pickle.loads(pickle.dumps(env.unwrapped))
+        assert again.fast_model is False
+        observation, _ = env.reset(seed=0)
+        np.testing.assert_array_equal(observation, again.reset(seed=0)[0])

@@ -13,11 +13,11 @@ from shapechanger.bodies.finger import FingerParameters
 from shapechanger.envs.finger.identification import record_babble
 from shapechanger.identify import FingerLog
 
-__all__ = ["changed", "made_up", "recorded"]
+__all__ = ["changed", "made_up", "recorded", "swings", "synthetic"]
 
 
 def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog, FingerParameters]:
-    """A log of a finger, and the truth about it."""
+    """A log of a simulated finger, and its true parameters."""
     env = gym.make("shapechanger/Finger-v1", max_episode_steps=-1, **arguments)
     actions = arguments.get("actions", "impedance")
     log = record_babble(env, seconds, seed, actions)
@@ -27,13 +27,42 @@ def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog
 
 
 def made_up(rows: int = 300) -> FingerLog:
-    """A log that no finger made: joints swing each at its own rate, and nothing pulls."""
-    t = 0.02 * np.arange(rows)
+    """A log without forces: joints swing, each at its own rate."""
+    t = 0.02 * np.arange(rows, dtype=np.float64)
     angles = np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]))
     nothing = np.zeros((rows, 7))
     return FingerLog(t, nothing, angles, nothing, nothing, "impedance", 0.02)
 
 
 def changed(log: FingerLog, **changes: Any) -> FingerLog:
-    """The same log but for these."""
+    """The same log with some fields replaced."""
     return dataclasses.replace(log, **changes)
+
+
+def swings(t: np.ndarray) -> np.ndarray:
+    """True angles of `synthetic` at times in s, rad, (n, 4)."""
+    phases = np.array([0.0, 1.0, 2.0, 3.0])
+    return 0.5 * np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]) + phases)
+
+
+def synthetic(
+    arms: np.ndarray, compliance: float, joint_noise: float, length_noise: float, rows: int = 400
+) -> FingerLog:
+    """A log whose lengths follow from noisy angles by the kinematic model, without friction.
+
+    Args:
+        arms: Moment arms, m, (7, 4).
+        compliance: Stretch per newton, m/N.
+        joint_noise: Standard deviation of the angles, rad.
+        length_noise: Standard deviation of the lengths, m.
+        rows: Length of the log.
+    """
+    rng = np.random.default_rng(7)
+    t = 0.02 * np.arange(rows, dtype=np.float64)
+    angles = swings(t)
+    tensions = 5.0 + 2.0 * np.sin(np.outer(t, np.linspace(6.0, 12.0, 7)))
+    zeros = 1e-3 * np.arange(7)
+    lengths = zeros - angles @ arms.T - compliance * tensions
+    lengths += length_noise * rng.standard_normal(lengths.shape)
+    angles = angles + joint_noise * rng.standard_normal(angles.shape)
+    return FingerLog(t, np.zeros((rows, 7)), angles, tensions, lengths, "tension", 0.02)

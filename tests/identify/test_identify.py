@@ -2,22 +2,235 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import math
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters
 from shapechanger.envs.finger.gap import GAPS, with_gears
-from shapechanger.errors import MissingExtra
-from shapechanger.identify import identify
-from shapechanger.identify import motion as toolbox
+from shapechanger.identify import FingerLog, IdentifiedFinger, ParameterEstimate, identify, result
+from shapechanger.identify.kinematics import ARMS, Kinematics, interval_quantile
+from shapechanger.identify.motion import FACTORS, Dynamics, Window, cut_windows
+from shapechanger.identify.motors import Motors
+from shapechanger.identify.result import HeldOut, replay
 from shapechanger.reports.finger import finger_html, interval, label, number, summary_line
-from tests.identify.logs import recorded
+from tests.identify.logs import made_up, recorded
+
+
+@functools.cache
+def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, ...]]:
+    """A log of four seconds, the true finger, and the identified one."""
+    parameters = NOMINAL.replace(
+        moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
+        joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
+        joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
+        tendon_friction=0.3,
+        command_delay=0.02,
+    )
+    log, truth = recorded(4.2, parameters=parameters)
+    steps: list[str] = []
+    return log, truth, identify(log, steps.append), tuple(steps)
+
+
+def test_a_finger_is_identified() -> None:
+    """Arms, joints, friction and motors of a finger without noise, and its motion."""
+    log, truth, found, steps = quick()
+    np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
+    assert found.parameters.tendon_stiffness is None
+    np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.1)
+    np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.15)
+    assert found.parameters.tendon_friction == pytest.approx(0.3, rel=0.2)
+    assert found.parameters.command_delay == pytest.approx(0.02, abs=0.005)
+    assert found.parameters.motor_lag == pytest.approx(truth.motor_lag, abs=0.002)
+    assert found.parameters.joint_noise == 0.0
+    off, nominal_off = found.held_out.off
+    assert off < np.radians(0.6)
+    assert nominal_off > 5.0 * off
+    assert len(found.held_out.t) == len(found.held_out.measured) == round(0.2 * len(log))
+    assert found.held_out.t[-1] == pytest.approx(found.seconds)
+    assert (found.source, found.seconds) == (log.source, log.seconds)
+    assert steps == (
+        "arms and stretch, from lengths",
+        "motors, from tensions",
+        "joints and friction, from motion",
+        "the last fifth, simulated",
+    )
+
+
+def test_intervals_of_an_identified_finger_hold_the_truth() -> None:
+    """Those of joints, friction and motors; each arm has one, and the nominal arm is outside."""
+    _, truth, found, _ = quick()
+    by_name = {e.name: e for e in found.estimates}
+    for j, joint in enumerate(JOINTS):
+        for name in ("joint_stiffness", "joint_damping"):
+            e = by_name[f"{name}/{joint}"]
+            assert e.low < getattr(truth, name)[j] < e.high
+            assert e.nominal == getattr(NOMINAL, name)[j]
+    assert by_name["tendon_friction"].low < 0.3 < by_name["tendon_friction"].high
+    assert by_name["command_delay"].low < 0.02 + 0.005
+    assert len(found.arms) == int(ARMS.sum())
+    assert all(e.differs for e in found.arms)
+    ends = found.arm_intervals
+    assert (ends[~ARMS] == 0.0).all()
+    np.testing.assert_allclose(ends.mean(axis=2), found.parameters.arms, atol=1e-12)
+
+
+def kinematics(compliance: float, compliance_sd: float, noise: float = 1e-6) -> Kinematics:
+    """Nominal arms known to a tenth of a millimetre."""
+    return Kinematics(
+        arms=NOMINAL.arms,
+        arms_covariance=1e-8 * np.eye(int(ARMS.sum())),
+        compliance=compliance,
+        compliance_sd=compliance_sd,
+        joint_noise=np.full(4, noise),
+        length_noise=1e-5,
+        angles=np.zeros((1, 4)),
+    )
+
+
+MOTORS = Motors(0.03, 0.001, 0.9, (0.001, 0.002, 0.01), saturates=True, tension_noise=0.1)
+DYNAMICS = Dynamics(
+    values={name: 2.0 * value for name, value in FACTORS.items()},
+    sd={name: 0.1 for name in FACTORS},
+    arms=NOMINAL.arms,
+    rms=0.01,
+)
+
+
+def estimates(
+    compliance: float = 1e-4, compliance_sd: float = 1e-5, motors: Motors = MOTORS
+) -> dict[str, ParameterEstimate]:
+    """Estimates of a made-up fit over a log of 300 rows, by name."""
+    log = made_up()
+    found = result._estimates(kinematics(compliance, compliance_sd), motors, DYNAMICS, log)
+    return {e.name: e for e in found}
+
+
+def half(e: ParameterEstimate) -> float:
+    """Half the width of an interval."""
+    return 0.5 * (e.high - e.low)
+
+
+def test_intervals_are_as_wide_as_the_errors_say() -> None:
+    """Standard errors, those of the model and of the clock, times the quantile."""
+    found, reach = estimates(), interval_quantile(300, 0.02)
+    for i, j in np.argwhere(ARMS):
+        e = found[f"moment_arms/{TENDONS[i]}/{JOINTS[j]}"]
+        assert (e.value, e.nominal, e.unit) == (NOMINAL.arms[i, j], NOMINAL.arms[i, j], "m")
+        assert half(e) == pytest.approx(reach * 1e-4)
+    for name, unit, error in (
+        ("joint_stiffness/PIP_flexion", "N·m/rad", 0.15),
+        ("joint_damping/PIP_flexion", "N·m·s/rad", 0.20),
+        ("tendon_friction", "N", 1.15),
+    ):
+        e, by = found[name], math.exp(1.96 * math.hypot(0.1, error))
+        assert (e.value, e.unit) == (2.0 * FACTORS[name], unit)
+        assert (e.low, e.high) == pytest.approx((e.value / by, e.value * by))
+    assert half(found["motor_lag"]) == pytest.approx(reach * math.hypot(0.001, 0.0005))
+    delay = found["command_delay"]
+    assert (delay.low, delay.value) == (0.0, 0.001)  # Never below zero.
+    assert delay.high == pytest.approx(0.001 + reach * math.hypot(0.002, 0.002))
+    assert half(found["strength"]) == pytest.approx(reach * 0.01)
+    assert found["strength"].nominal == 1.0
+    still = dataclasses.replace(MOTORS, saturates=False)
+    assert "strength" not in estimates(motors=still)
+
+
+def test_stiffness_has_the_interval_of_its_inverse() -> None:
+    """Open to infinity where the tendons may as well be stiff."""
+    reach = interval_quantile(300, 0.02)
+    e = estimates()["tendon_stiffness"]
+    assert e.value == pytest.approx(1e4)
+    assert e.low == pytest.approx(1.0 / (1e-4 + reach * 1e-5))
+    assert e.high == pytest.approx(1.0 / (1e-4 - reach * 1e-5))
+    assert e.differs
+    unclear = estimates(1e-5, 1e-5)["tendon_stiffness"]
+    assert (unclear.value, unclear.high) == (math.inf, math.inf)
+    assert not unclear.differs
+    assert estimates(-1e-4, 1e-6)["tendon_stiffness"].low == math.inf
+
+
+@pytest.mark.parametrize(
+    ("compliance", "sd", "stiffness"),
+    [
+        (1e-4, 0.5e-4, 1e4),  # Two standard errors.
+        (1e-4, 0.52e-4, None),  # 1.92 of them.
+        (4.1e-6, 1e-9, 1.0 / 4.1e-6),
+        (3.9e-6, 1e-9, None),  # Stiffer than 250 kN/m.
+        (-1e-4, 1e-6, None),
+    ],
+)
+def test_tendons_stretch_if_it_shows(compliance: float, sd: float, stiffness: float | None) -> None:
+    """Beyond its error and beyond the smallest stretch that matters."""
+    found = result._parameters(kinematics(compliance, sd), MOTORS, DYNAMICS, None)
+    assert found.tendon_stiffness == pytest.approx(stiffness)
+
+
+def test_parameters_are_those_that_were_fitted() -> None:
+    """Joints, friction, motors and noise; the rest is nominal, or as known."""
+    found = result._parameters(kinematics(0.0, 1e-6, 0.02), MOTORS, DYNAMICS, None)
+    assert found.moment_arms == NOMINAL.moment_arms
+    assert found.joint_stiffness == tuple(2.0 * v for v in NOMINAL.joint_stiffness)
+    assert found.joint_damping == tuple(2.0 * v for v in NOMINAL.joint_damping)
+    assert found.tendon_friction == 1.0
+    assert (found.motor_lag, found.command_delay) == (0.03, 0.001)
+    assert found.joint_noise == pytest.approx(0.02)
+    assert found.tension_noise == 0.1
+    assert found.joint_friction == NOMINAL.joint_friction
+    assert result._parameters(kinematics(0.0, 1e-6), MOTORS, DYNAMICS, None).joint_noise == 0.0
+
+
+def test_parameters_that_no_log_determines_are_listed() -> None:
+    """With the value assumed; the strength unless it is known or a motor saturated."""
+    still = dataclasses.replace(MOTORS, saturates=False)
+    always = ["joint_friction", "tendon_damping", "motor_kg", "backlash"]
+    assert [name for name, _ in result._undetermined(still, None)] == [*always, "most_tension"]
+    assert [name for name, _ in result._undetermined(MOTORS, None)] == always
+    assert "assumed 20 g" in dict(result._undetermined(MOTORS, None))["motor_kg"]
+    known = dict(result._undetermined(still, NOMINAL.replace(motor_kg=1.5, tendon_damping=70.0)))
+    assert list(known) == always
+    assert "assumed 1500 g" in known["motor_kg"]
+    assert "assumed 70 N·s/m" in known["tendon_damping"]
+
+
+def window_of(log: FingerLog, parameters: FingerParameters) -> Window:
+    """The first second of a log after 0.3 s, with exact angles."""
+    exact = dataclasses.replace(kinematics(0.0, 1e-6), angles=log.angles)
+    motors = Motors(
+        parameters.motor_lag, parameters.command_delay, 1.0, (0.0, 0.0, 0.0), False, 0.0
+    )  # fmt: skip
+    return cut_windows(log, exact, motors)[0]
+
+
+@pytest.mark.parametrize("stiffness", [None, 2e4])
+def test_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
+    """To a degree within a second, with stiff tendons and with tendons that stretch."""
+    true = NOMINAL.replace(tendon_stiffness=stiffness, command_delay=0.02)
+    log, _ = recorded(2.0, parameters=true)
+    window = window_of(log, true)
+    angles = replay(log, true, window)
+    assert angles.shape == window.angles.shape
+    np.testing.assert_array_equal(angles[0], window.angles[0])
+    assert np.sqrt(np.mean((angles - window.angles) ** 2)) < np.radians(1.0)
+    weak = true.replace(joint_damping=tuple(3.0 * v for v in true.joint_damping))
+    other = replay(log, weak, window)
+    assert np.sqrt(np.mean((other - window.angles) ** 2)) > np.radians(5.0)
+
+
+def test_errors_are_root_mean_squares() -> None:
+    """Of the identified finger first."""
+    zero, t = np.zeros((4, 4)), np.arange(4.0)
+    found = HeldOut(t, measured=zero + 1.0, identified=zero + 1.5, nominal=zero)
+    assert found.off == (0.5, 1.0)
 
 
 @pytest.mark.slow
 def test_without_noise_everything_that_can_be_told_is_found() -> None:
-    """Arms to a hundredth, stiff tendons, joints and motors; and the finger goes the same way."""
+    """Arms to a hundredth, stiff tendons, joints and motors; and the finger moves alike."""
     changes = {"joint_stiffness": 1.3, "joint_damping": 0.8}
     parameters = NOMINAL.replace(
         moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
@@ -25,8 +238,7 @@ def test_without_noise_everything_that_can_be_told_is_found() -> None:
         **{k: tuple(f * v for v in getattr(NOMINAL, k)) for k, f in changes.items()},
     )
     log, truth = recorded(8.0, parameters=parameters)
-    heard: list[str] = []
-    found = identify(log, heard.append)
+    found = identify(log)
     np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
     assert found.parameters.tendon_stiffness is None
     np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.1)
@@ -35,17 +247,11 @@ def test_without_noise_everything_that_can_be_told_is_found() -> None:
     off, nominal_off = found.held_out.off
     assert off < np.radians(2.0)
     assert nominal_off > 2.0 * off
-    assert heard == [
-        "arms and stretch, from lengths",
-        "motors, from tensions",
-        "joints and friction, from motion",
-        "the last fifth, simulated",
-    ]
 
 
 @pytest.mark.slow
 def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
-    """What comes out is a finger to make an env of, and a page that shows all of it."""
+    """An env takes the identified finger, and the page shows every number."""
     log, truth = recorded(10.0, seed=2, gap="real-like", finger_seed=5)
     found = identify(log)
     ends = found.arm_intervals
@@ -73,13 +279,6 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
         env.reset(seed=0)
         observation, *_ = env.step(np.zeros(7, np.float32))
         assert np.isfinite(observation).all()
-
-
-def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """MuJoCo's toolbox is there without what it needs, and empty then."""
-    monkeypatch.setattr(toolbox.importlib, "import_module", lambda name: object())
-    with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
-        toolbox.sysid_toolbox()
 
 
 @pytest.mark.slow

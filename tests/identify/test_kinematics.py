@@ -1,4 +1,4 @@
-"""Arms and stretch, from lengths, angles and tensions."""
+"""Moment arms and stretch, from lengths, angles and tensions."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import NOMINAL
-from shapechanger.identify.kinematics import ARMS, covariance, fit_kinematics, quantile
-from tests.identify.logs import recorded
+from shapechanger.identify.kinematics import (
+    ARMS,
+    fit_kinematics,
+    interval_quantile,
+    robust_covariance,
+)
+from tests.identify.logs import changed, recorded, swings, synthetic
 
 LARGE_M = 2e-3
 
 
 def test_without_noise_the_arms_are_exact() -> None:
-    """To a hundredth of each, for a finger whose arms are not the nominal ones."""
+    """The error is below a hundredth for a finger whose arms are not the nominal ones."""
     rng = np.random.default_rng(5)
     arms = NOMINAL.arms * (1.0 + rng.uniform(-0.1, 0.1, NOMINAL.arms.shape))
     parameters = NOMINAL.replace(moment_arms=tuple(map(tuple, arms.tolist())))
@@ -23,29 +28,76 @@ def test_without_noise_the_arms_are_exact() -> None:
     assert abs(found.compliance) < 1e-7
 
 
+def test_arms_stretch_and_noise_come_out_of_a_synthetic_log() -> None:
+    """Noise of angles does not bias the arms; every number has its scale and its sign."""
+    arms, noise = 1.15 * NOMINAL.arms, np.radians(1.5)
+    log = synthetic(arms, compliance=5e-5, joint_noise=noise, length_noise=2e-5)
+    found = fit_kinematics(log)
+    large = np.abs(arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], arms[large], rtol=0.03)
+    assert (found.arms[~ARMS] == 0.0).all()
+    assert found.compliance == pytest.approx(5e-5, rel=0.05)
+    assert 1e-7 < found.compliance_sd < 2.5e-6
+    np.testing.assert_allclose(found.joint_noise, noise, rtol=0.1)
+    assert found.length_noise == pytest.approx(2e-5, rel=0.2)
+    # The lengths say where the joints were: most of the noise of the angles is gone.
+    assert np.std(found.angles - swings(log.t)) < 0.5 * noise
+
+
+def test_slack_tendons_and_the_start_of_a_log_weigh_little() -> None:
+    """Neither 5 mm of slack for half a second nor the first 0.2 s spoil the arms.
+
+    The remaining errors are as large as their standard errors say, to a factor of 1.5 in the mean.
+    """
+    log = synthetic(NOMINAL.arms, 0.0, np.radians(1.0), 2e-5)
+    lengths = log.lengths.copy()
+    lengths[:9] += 0.02
+    lengths[100:125, 0] += 5e-3
+    found = fit_kinematics(changed(log, lengths=lengths))
+    large = np.abs(NOMINAL.arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], NOMINAL.arms[large], rtol=0.05)
+    ratio = (found.arms - NOMINAL.arms)[ARMS] / found.arms_sd[ARMS]
+    assert 1.0 / 1.5 < np.sqrt(np.mean(ratio**2)) < 1.5
+    assert len(found.angles) == len(log)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("finger_seed", [0, 3])
-def test_noisy_fingers_that_stretch_and_rub_are_found(finger_seed: int) -> None:
-    """Arms above 2 mm to 5 %, nine of ten intervals hold the truth, and so does the stretch."""
+def test_noisy_fingers_with_stretch_and_friction_are_found(finger_seed: int) -> None:
+    """Arms above 2 mm to 5 %; nine of ten intervals hold the truth; stretch to 5 %."""
     log, truth = recorded(10.0, seed=1, gap="real-like", finger_seed=finger_seed)
     found = fit_kinematics(log)
     off = np.abs(found.arms - truth.arms)
     large = np.abs(truth.arms) > LARGE_M
     assert (off[large] < 0.05 * np.abs(truth.arms[large])).all()
-    held = off <= quantile(len(log), log.control_dt) * found.arms_sd
+    held = off <= interval_quantile(len(log), log.control_dt) * found.arms_sd
     assert held[ARMS].mean() >= 0.9
     assert truth.tendon_stiffness is not None
     assert found.compliance * truth.tendon_stiffness == pytest.approx(1.0, abs=0.05)
     np.testing.assert_allclose(found.joint_noise.min(), truth.joint_noise, rtol=0.15)
 
 
-def test_standard_errors_grow_where_errors_go_on() -> None:
-    """A mean of errors that repeat ten times is known as badly as of a tenth as many."""
+def test_standard_errors_grow_with_correlated_errors() -> None:
+    """Errors that each repeat ten times say as little about a mean as a tenth as many."""
     rng = np.random.default_rng(0)
     ones = np.ones((2000, 1, 1))
     fresh = rng.standard_normal((2000, 1))
     stale = np.repeat(rng.standard_normal((200, 1)), 10, axis=0)
-    known, unknown = (float(covariance(ones, r, 0.02)[0, 0]) for r in (fresh, stale))
+    known, unknown = (float(robust_covariance(ones, r, 0.02)[0, 0]) for r in (fresh, stale))
     assert known == pytest.approx(1.0 / 2000, rel=0.5)
     assert 4.0 < unknown / known < 16.0
-    assert 1.96 < quantile(2000, 0.02) < quantile(200, 0.02) < 2.6
+
+
+def test_the_covariance_has_newey_and_wests_weights() -> None:
+    """A lag of k of L + 1 steps weighs 1 - k / (L + 1), with L half a second."""
+    residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
+    # Two lags of 0.25 s: 1 + 4 + 1 + 9, + 2 (2/3) (2 - 2 - 3), + 2 (1/3) (-1 + 6); over 4 squared.
+    expected = (15.0 - 2.0 * (2.0 / 3.0) * 3.0 + 2.0 * (1.0 / 3.0) * 5.0) / 16.0
+    assert robust_covariance(np.ones((4, 1, 1)), residual, 0.25)[0, 0] == pytest.approx(expected)
+
+
+def test_intervals_reach_further_in_short_logs() -> None:
+    """Kiefer and Vogelsang's cubic in the share of the log over which errors are correlated."""
+    assert interval_quantile(10**9, 0.02) == pytest.approx(1.96, abs=1e-4)
+    assert interval_quantile(250, 0.02) == pytest.approx(1.96 + 0.29694 + 0.00416 - 0.0005324)
+    assert interval_quantile(5, 0.02) == pytest.approx(1.96 + 2.9694 + 0.4160 - 0.5324)

@@ -1,4 +1,4 @@
-"""Logs of fingers: what they hold, how they are kept, and what is wrong with bad ones."""
+"""Logs of fingers: their contents, their files, and the messages about bad ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.identify import FingerLog, identify, load_log, save_log
-from shapechanger.identify.log import SIGNALS
+from shapechanger.identify.log import SIGNALS, require_informative
 from tests.identify.logs import changed, made_up
 
 
@@ -26,6 +26,13 @@ def test_a_log_comes_back_as_it_was(tmp_path: Path) -> None:
         assert getattr(back, name) == getattr(log, name)
 
 
+def test_a_log_knows_its_length() -> None:
+    """In rows, and in seconds from the first to the last."""
+    assert len(made_up(151)) == 151
+    assert made_up(151).seconds == pytest.approx(3.0)
+    assert made_up(0).seconds == 0.0
+
+
 def with_row(name: str, row: int, value: float) -> dict[str, Any]:
     """A signal of the made-up log with another value in one row."""
     values = getattr(made_up(), name).copy()
@@ -36,23 +43,33 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        (with_row("angles", 7, math.nan), "angles holds no number in row 7"),
-        (with_row("tensions", 0, math.inf), "tensions holds no number in row 0"),
+        (with_row("angles", 7, math.nan), "angles is not finite in row 7"),
+        (with_row("tensions", 0, math.inf), "tensions is not finite in row 0"),
         (with_row("t", 20, 0.1), r"backwards in row 20 .* 0\.100 s comes after 0\.380 s"),
-        ({"t": 0.02 * np.r_[:100, 150:350]}, r"gap: between 1\.980 s and 3\.000 s .* every 20 ms"),
-        ({"joints": ("thumb", "b", "c", "d")}, "another finger: its joints are thumb, b, c, d"),
-        ({"tendons": ()}, "another finger: its tendons are none, not FDP"),
-        ({"lengths": np.zeros((300, 6))}, r"lengths has the shape \(300, 6\), not \(300, 7\)"),
-        ({"control_dt": 0.0}, "period of control is above 0 s"),
+        ({"t": 0.02 * np.r_[:100, 150:350]}, r"every 20 ms, .* none between 1\.980 s and 3\.000 s"),
+        ({"joints": ("thumb", "b", "c", "d")}, "joints thumb, b, c, d, but the finger has MCP_fle"),
+        ({"tendons": ()}, "tendons none, but the finger has FDP"),
+        ({"lengths": np.zeros((300, 6))}, r"lengths must have the shape \(300, 7\), got \(300, 6"),
+        ({"t": np.zeros((300, 1))}, r"t must have the shape \(300,\), got \(300, 1\)"),
+        ({"control_dt": 0.0}, r"control_dt must be above 0 s and finite, got 0\.0"),
+        ({"control_dt": math.inf}, "control_dt must be above 0 s and finite, got inf"),
     ],
 )
-def test_bad_logs_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """The sentence says what is wrong, and where."""
+def test_bad_logs_are_rejected(changes: dict[str, Any], sentence: str) -> None:
+    """The message says what is wrong, and where."""
     with pytest.raises(FingerError, match=sentence):
         changed(made_up(), **changes)
 
 
-def test_an_unknown_mode_is_refused() -> None:
+def test_clocks_may_jitter_by_half_a_period() -> None:
+    """A step of 1.5 periods passes, a longer one is a gap."""
+    t = made_up().t
+    changed(made_up(), t=np.where(t > 1.0, t + 0.0099, t))
+    with pytest.raises(FingerError, match="has a gap"):
+        changed(made_up(), t=np.where(t > 1.0, t + 0.0101, t))
+
+
+def test_an_unknown_mode_is_rejected() -> None:
     """With the nearest spelling."""
     with pytest.raises(UnknownName, match="Did you mean 'tension'"):
         changed(made_up(), actions="tensions")
@@ -64,11 +81,11 @@ def only(joint: int, factor: float) -> FingerLog:
     return changed(log, angles=log.angles * np.where(np.arange(4) == joint, factor, 1.0))
 
 
-def test_logs_that_tell_nothing_are_refused() -> None:
-    """Too short, or a joint that stands still or moves only with others: which one is said."""
-    with pytest.raises(FingerError, match=r"3\.0 s long; it takes 4 s"):
+def test_uninformative_logs_are_rejected() -> None:
+    """Too short, or a joint that stands still or moves only with others: the message names it."""
+    with pytest.raises(FingerError, match=r"3\.0 s long; identification needs at least 4 s"):
         identify(made_up(151))
-    with pytest.raises(FingerError, match=r"MCP_abduction hardly moved, by 1\.\d degrees"):
+    with pytest.raises(FingerError, match=r"MCP_abduction moved by 1\.\d degrees only"):
         identify(only(1, 0.01))
     log = made_up()
     coupled = log.angles.copy()
@@ -77,17 +94,45 @@ def test_logs_that_tell_nothing_are_refused() -> None:
         identify(changed(log, angles=coupled))
 
 
-def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
-    """Another file, half of one, none, one without numbers, and one of tomorrow."""
+def test_a_log_is_informative_from_four_seconds_and_ten_degrees_on() -> None:
+    """Half a period short of 4 s passes; a range of 9.9 degrees does not, one of 10.1 does."""
+    require_informative(made_up(201))
+    with pytest.raises(FingerError, match="at least 4 s"):
+        require_informative(made_up(200))
+    low, high = np.percentile(made_up().angles[:, 0], [5.0, 95.0])
+    degrees = math.degrees(high - low)
+    require_informative(only(0, 10.1 / degrees))
+    with pytest.raises(FingerError, match=r"MCP_flexion moved by 9\.9 degrees only; .* least 10"):
+        require_informative(only(0, 9.9 / degrees))
+
+
+@pytest.mark.parametrize(("own", "passes"), [(2.1, True), (1.9, False)])
+def test_a_joint_moves_on_its_own_from_two_degrees_on(own: float, passes: bool) -> None:
+    """As a standard deviation, beyond its share of the other joints' motion."""
+    log = made_up()
+    others, fresh = log.angles[:, :3] - log.angles[:, :3].mean(axis=0), log.angles[:, 3]
+    fresh = fresh - fresh.mean()
+    fresh = fresh - others @ np.linalg.lstsq(others, fresh)[0]
+    coupled = log.angles.copy()
+    coupled[:, 3] = 0.6 * others[:, 2] + math.radians(own) * fresh / fresh.std()
+    if passes:
+        require_informative(changed(log, angles=coupled))
+    else:
+        with pytest.raises(FingerError, match="flexion moved only along with the other joints"):
+            require_informative(changed(log, angles=coupled))
+
+
+def test_other_files_are_rejected(tmp_path: Path) -> None:
+    """A missing file, other files, a damaged log, and one without a header."""
     path = tmp_path / "log.npz"
     with pytest.raises(FingerError, match="There is no file"):
         load_log(path)
     path.write_text("t,x,y,z\n")
-    with pytest.raises(FingerError, match="no log of a finger; `shapechanger finger record`"):
+    with pytest.raises(FingerError, match="not a finger log; `shapechanger finger record`"):
         load_log(path)
     with path.open("wb") as file:
         np.save(file, np.zeros(3))
-    with pytest.raises(FingerError, match="no log of a finger;"):
+    with pytest.raises(FingerError, match="not a finger log;"):
         load_log(path)
     save_log(made_up(), path)
     whole = path.read_bytes()
@@ -97,41 +142,46 @@ def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
     np.savez(path, t=np.zeros(3))
     with pytest.raises(FingerError, match="it has no header"):
         load_log(path)
+    with pytest.raises(FingerError, match="cannot be read: Is a directory"):
+        load_log(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("header", "sentence"),
-    [
-        (b"{}", "its header says"),
-        (b'{"format": "cake", "version": 1', "its header says"),
-        (b'{"format": "cake", "version": 1}', "its header says"),
-    ],
+    "header",
+    [b"{}", b'{"format": "cake", "version": 1', b'{"format": "cake", "version": 1}'],
 )
-def test_bad_headers_are_refused(tmp_path: Path, header: bytes, sentence: str) -> None:
-    """What is missing in them is said."""
+def test_bad_headers_are_rejected(tmp_path: Path, header: bytes) -> None:
+    """The message says what is missing in them."""
     np.savez(tmp_path / "log.npz", header=np.frombuffer(header, np.uint8))
-    with pytest.raises(FingerError, match=sentence):
+    with pytest.raises(FingerError, match="its header is invalid"):
         load_log(tmp_path / "log.npz")
+
+
+FINGER_LOG = '"format": "shapechanger finger log", "version": 1'
 
 
 @pytest.mark.parametrize(
-    ("said", "sentence"),
+    ("kind", "arrays", "sentence"),
     [
-        ('"format": "cake", "version": 1', "no log of a finger, but 'cake'"),
-        ('"format": "shapechanger finger log", "version": 9', "version 9, and this .* up to 1"),
-        ('"format": "shapechanger finger log", "version": 1', "no whole log: it lacks commands"),
+        ('"format": "cake", "version": 1', {}, "not a finger log: its format is 'cake'"),
+        ('"format": "shapechanger finger log", "version": 9', {}, "version 9; this .* up to 1"),
+        (FINGER_LOG, {}, "not a complete log: it lacks commands"),
+        (FINGER_LOG, dict.fromkeys(SIGNALS, np.array(["x"])), "its arrays must hold numbers"),
+        (FINGER_LOG, dict.fromkeys(SIGNALS, np.zeros((3, 1))), "t must have one dimension"),
     ],
 )
-def test_other_files_of_arrays_are_refused(tmp_path: Path, said: str, sentence: str) -> None:
-    """Another format, a later version, and one that lacks arrays."""
+def test_other_archives_are_rejected(
+    tmp_path: Path, kind: str, arrays: dict[str, np.ndarray], sentence: str
+) -> None:
+    """Another format, a later version, and arrays that are missing or of another kind."""
     rest = ', "actions": "tension", "control_dt": 0.02, "joints": [], "tendons": []'
-    header = np.frombuffer(f"{{{said}{rest}}}".encode(), np.uint8)
-    np.savez(tmp_path / "log.npz", header=header, t=np.zeros(3))
+    header = np.frombuffer(f"{{{kind}{rest}}}".encode(), np.uint8)
+    np.savez(tmp_path / "log.npz", header=header, **{"t": np.zeros(3), **arrays})
     with pytest.raises(FingerError, match=sentence):
         load_log(tmp_path / "log.npz")
 
 
-def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    """A folder is none for a file."""
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    """A folder cannot be replaced by a file."""
     with pytest.raises(OutputError, match="cannot be written"):
         save_log(made_up(), tmp_path)

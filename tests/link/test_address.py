@@ -23,7 +23,7 @@ from shapechanger.link.address import DEFAULT_PORT, Address, is_loopback, parse_
         ("[fe80::1%wlan0]:65535", Address("fe80::1%wlan0", 65535)),
     ],
 )
-def test_what_people_write_is_understood(text: str, address: Address) -> None:
+def test_addresses_are_parsed(text: str, address: Address) -> None:
     """Names, IPv4 and IPv6, with and without a port."""
     assert parse_address(text) == address
     assert parse_address(str(address)) == address
@@ -32,28 +32,28 @@ def test_what_people_write_is_understood(text: str, address: Address) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "No address is given"),
-        ("car local", "no address"),
-        ("https://car.local", "no address"),
-        ("user@car", "no address"),
-        ("-car", "no address"),
-        ("300.1.1.1", "no address"),
-        ("1.2.3", "no address"),
-        ("car:", "no port"),
-        ("car:0", "no port"),
-        ("car:65536", "no port"),
-        ("car:000080", "no port"),
-        ("car:٣", "no port"),
-        ("car:12:13", "no port"),
+        ("", "is empty"),
+        ("car local", "not a valid address"),
+        ("https://car.local", "not a valid address"),
+        ("user@car", "not a valid address"),
+        ("-car", "not a valid address"),
+        ("300.1.1.1", "not a valid address"),
+        ("1.2.3", "not a valid address"),
+        ("car:", "must be a port"),
+        ("car:0", "must be a port"),
+        ("car:65536", "must be a port"),
+        ("car:000080", "must be a port"),
+        ("car:٣", "must be a port"),
+        ("car:12:13", "must be a port"),
         ("[::1", "brackets"),
         ("[car]:5000", "brackets"),
         ("[::1]5000", "brackets"),
-        ("[::1]:", "no port"),
-        ("x" * 64, "no address"),
+        ("[::1]:", "must be a port"),
+        ("x" * 64, "not a valid address"),
     ],
 )
-def test_nonsense_is_refused_with_an_example(text: str, words: str) -> None:
-    """The message shows how it is written."""
+def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> None:
+    """The message shows valid addresses."""
     with pytest.raises(LinkError, match=words) as refused:
         parse_address(text)
     assert "192.168.42.1:5000" in str(refused.value)
@@ -61,7 +61,7 @@ def test_nonsense_is_refused_with_an_example(text: str, words: str) -> None:
 
 @given(text=st.text(max_size=30))
 def test_any_text_is_an_address_or_refused(text: str) -> None:
-    """An address can be written and read again; anything else is a `LinkError`."""
+    """An address survives a round trip; any other text is a `LinkError`."""
     try:
         address = parse_address(text)
     except LinkError:
@@ -70,11 +70,11 @@ def test_any_text_is_an_address_or_refused(text: str) -> None:
 
 
 def test_the_port_of_2017_is_the_default() -> None:
-    """As it was."""
+    """5000."""
     assert DEFAULT_PORT == 5000
 
 
-def test_which_hosts_only_this_machine_reaches() -> None:
-    """A name other than localhost may mean anything."""
+def test_loopback_addresses() -> None:
+    """A name other than localhost may resolve to any address."""
     assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
     assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))

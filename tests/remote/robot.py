@@ -238,7 +238,7 @@ class Robot:
                     await self._send(socket, m.Pong(token=0, now_ns=self._time_ns(hello)))
                 case m.Take():
                     mine = not self.held_by
-                    reason = "" if mine else f"{self.held_by} commands."
+                    reason = "" if mine else f"{self.held_by} has control."
                     holder = hello.name if mine else self.held_by
                     await self._send(socket, m.Lease(mine=mine, holder=holder, reason=reason))
                     self.armed = self.armed or (mine and self.arm_by_itself)

@@ -16,6 +16,8 @@ from shapechanger.link.authentication import new_key
 from shapechanger.remote.client import RobotClient
 from tests.remote.robot import Robot, eventually
 
+pytestmark = pytest.mark.realtime
+
 Run = Callable[..., Robot]
 Connect = Callable[..., RobotClient]
 
@@ -165,7 +167,7 @@ def test_without_tls_only_what_was_typed_connects(run: Run) -> None:
 def test_a_robot_that_somebody_else_drives_is_not_taken(run: Run, connect: Connect) -> None:
     """In the robot's words."""
     client = connect(run(held_by="Grace"))
-    with pytest.raises(RobotRefused, match="Grace commands"):
+    with pytest.raises(RobotRefused, match="Grace has control"):
         client.take()
 
 
@@ -249,5 +251,5 @@ def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
 def test_a_timeout_that_is_none_is_refused(timeout_s: float) -> None:
     """Before anything is connected."""
-    with pytest.raises(LinkError, match="more than 0 s"):
+    with pytest.raises(LinkError, match="above 0"):
         RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

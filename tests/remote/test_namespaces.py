@@ -22,6 +22,8 @@ from tests.drawing import missing
 from tests.robots import IN_A_ROOM, write_profile
 from tests.twin.robots import until
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 DEADLINE_MS: Final = 250.0
 LATE_MS: Final = 200.0  # Ten times what is promised on a quiet machine.
 NAME: Final = f"sc{os.getpid() % 100_000}"

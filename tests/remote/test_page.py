@@ -13,6 +13,8 @@ import pytest
 from shapechanger.remote.known_robots import remember
 from tests.remote.robot import Robot
 
+pytestmark = pytest.mark.realtime
+
 PAGE = Path(__file__).parents[2] / "docs" / "remote.md"
 
 

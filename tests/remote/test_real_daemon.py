@@ -23,6 +23,8 @@ from tests.remote.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Running, running
 
+pytestmark = pytest.mark.realtime
+
 ID = "shapechanger/RemoteVehicle-v1"
 HZ = 20.0
 SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
@@ -146,8 +148,8 @@ def test_a_person_takes_the_robot_from_a_program(serve: Callable[..., Served]) -
         person.take()
         *_, truncated, info = env.step(np.zeros(2, np.float32))
         assert truncated
-        assert info["truncated_because"].startswith("Grace commands the robot now")
-        with pytest.raises(RobotRefused, match="Grace commands"):
+        assert info["truncated_because"].startswith("Grace has control of the robot now")
+        with pytest.raises(RobotRefused, match="Grace has control"):
             env.reset()
     env.close()
 

@@ -8,10 +8,13 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.demos.recording import RecordEpisodes
 from tests.remote.robot import Robot
+
+pytestmark = pytest.mark.realtime
 
 Run = Callable[..., Robot]
 

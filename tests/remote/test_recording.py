@@ -13,6 +13,8 @@ from shapechanger.remote.client import RobotClient
 from tests.remote.robot import eventually
 from tests.remote.test_real_daemon import Served
 
+pytestmark = pytest.mark.realtime
+
 Connect = Callable[..., RobotClient]
 
 
@@ -73,7 +75,7 @@ def test_what_cannot_be_is_said_and_the_link_stands(robot: Served) -> None:
             lambda: client.browse("/"),
             lambda: client.judge("x", -1, 0, keep=True),
         ):
-            with pytest.raises(LinkError, match="no message"):
+            with pytest.raises(LinkError, match="Not a valid message"):
                 nonsense()
         for impossible, why in (
             (lambda: client.record(on=False), "Nothing is being recorded"),
@@ -106,4 +108,4 @@ def test_a_program_suggests_while_a_person_drives(robot: Served) -> None:
         wrong = program.suggest((0.25,), answers=shown.message.seq)
         eventually(lambda: "2 values" in program.refusal(wrong))
         mine = person.suggest((0.0, 0.0), answers=person.ask().message.seq)
-        eventually(lambda: "You command" in person.refusal(mine))
+        eventually(lambda: "You have control" in person.refusal(mine))

@@ -13,6 +13,8 @@ from shapechanger.remote.client import RobotClient
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 
+pytestmark = pytest.mark.realtime
+
 AHEAD = np.array([0.25, 0.5], np.float32)
 BACK = (-0.5, -0.4)
 
@@ -98,7 +100,7 @@ def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) ->
     with _made(robot) as env, robot.client(role="person") as person:
         env.reset()
         person.take()
-        assert "commands the robot now" in _cut(env)
+        assert "has control of the robot now" in _cut(env)
 
 
 def _cut(env: gym.Env[Any, Any]) -> str:

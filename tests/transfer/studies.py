@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.settings import LearnerSettings
+from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import make_plan
 
@@ -14,7 +14,7 @@ SMALL = EnvRef("shapechanger/SmallInvertedPendulum-v1")
 BIG = EnvRef("shapechanger/BigInvertedPendulum-v1")
 
 # Two envs and updates of 32 steps: a run takes a second and learns nothing.
-TINY = LearnerSettings(
+TINY = PpoSettings(
     n_envs=2,
     n_steps=16,
     batch_size=16,
@@ -25,7 +25,7 @@ TINY = LearnerSettings(
     eval_every=32,
     eval_episodes=2,
 )
-TINY_NORMALISED = LearnerSettings(
+TINY_NORMALISED = PpoSettings(
     n_envs=2,
     n_steps=16,
     batch_size=16,
@@ -39,7 +39,7 @@ TINY_NORMALISED = LearnerSettings(
 )
 
 
-def tiny_plan(settings: LearnerSettings = TINY, **arguments: Any) -> Plan:
+def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:
     """A plan of a study that takes seconds."""
     task = arguments.pop("task", TransferTask(SMALL, BIG))
     return make_plan(task, "tiny", settings, **{"seeds": 2, **arguments})

@@ -16,6 +16,8 @@ from shapechanger.errors import StudyError, UnknownName
 from shapechanger.transfer.executor import Executor, Job, Processes, Serial
 from tests.transfer import jobs
 
+pytestmark = pytest.mark.system
+
 EXECUTORS = [Serial(), Processes(2)]
 
 

@@ -14,10 +14,11 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.reports.study import write_report
+from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.sac import MixedReplay, train_sac
+from shapechanger.transfer.learners.sac import MixedReplay, train_camera_policy, train_sac
 from shapechanger.transfer.learners.settings import SacSettings, learner_settings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
@@ -120,7 +121,7 @@ def test_a_study_of_it_is_a_study_as_any(tmp_path: Path) -> None:
     assert shown == {f"{kind}-{i}.npz" for kind in ("source", "scratch") for i in range(2)}
     write_report(study, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text()
-    assert "30 steps of trying, which begins after 60 steps of demonstrations" in page
+    assert "30 steps of SAC, which starts after 60 demonstrated steps" in page
 
 
 def test_a_budget_ends_with_an_evaluation() -> None:
@@ -161,5 +162,23 @@ def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
 def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
     """Before anything is learned, with the name of the env."""
     task = TransferTask(*(LANE, BIG)[::order])
-    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 has no demonstrator, and sac"):
+    with pytest.raises(
+        StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and sac"
+    ):
         make_plan(task, "sac", TINY_SAC, seeds=2)
+
+
+def test_training_without_a_camera_is_refused(tmp_path: Path) -> None:
+    """As `train Ant --learner sac` does: the sentence names what is missing."""
+    ant = EnvRef("shapechanger/Ant-v1")
+    with pytest.raises(
+        StudyError, match="Ant-v1 has no camera and no demonstrator, and sac learns"
+    ):
+        train_camera_policy(
+            ant,
+            TINY_SAC,
+            90,
+            0,
+            demonstrations=DemonstrationFile(tmp_path / "shown.npz", 0),
+            on_evaluation=lambda evaluation: None,
+        )

@@ -7,7 +7,9 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import msgspec
 import numpy as np
 import pytest
@@ -22,13 +24,20 @@ from shapechanger.errors import (
     StudyError,
     UnknownName,
 )
+from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.methods import policy_path
-from shapechanger.transfer.plan import Run, TransferTask
-from shapechanger.transfer.study import STUDY_FILE, Study, run_study
+from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.study import (
+    STUDY_FILE,
+    Study,
+    default_arms,
+    inspect_task,
+    run_study,
+)
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
 
 
@@ -319,7 +328,7 @@ def test_a_disk_that_runs_full_loses_nothing(
     assert curves(run_study(tiny_plan(), out, executor=Serial())) == curves(finished[0])
 
 
-def test_a_study_of_an_untold_env_is_refused() -> None:
+def test_a_study_of_an_env_without_layouts_is_refused() -> None:
     """An env that publishes no layout cannot be mapped."""
     bare = EnvRef("CartPole-v1")
     with pytest.raises(Exception, match="publishes no observation_layout"):
@@ -332,3 +341,61 @@ def test_settings_refuse_what_cannot_be(finished: tuple[Study, Path]) -> None:
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):
         msgspec.structs.replace(TINY, n_envs=0)
+
+
+class Misnamed(gym.Env[Any, Any]):
+    """An env whose layout does not name the numbers of its space."""
+
+    def __init__(self, as_dict: bool = False) -> None:
+        box = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
+        self.observation_space = gym.spaces.Dict({"x": box}) if as_dict else box
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+        self.observation_layout = Layout((Feature("y", "1"), Feature("z", "1")))
+        self.action_layout = Layout((Feature("slider/motor", "1", -1.0, 1.0),))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("kwargs", [{}, {"as_dict": True}])
+def test_a_layout_that_does_not_fit_its_space_is_refused(
+    order: int, kwargs: dict[str, Any]
+) -> None:
+    """When the study is planned, and not after the source was trained."""
+    gym.register("tests/Misnamed-v0", Misnamed)
+    try:
+        task = TransferTask(*(SMALL, EnvRef("tests/Misnamed-v0", kwargs))[::order])
+        with pytest.raises(SpaceMismatch, match=r"observation of tests/Misnamed.* has 2 numbers"):
+            tiny_plan(task=task, rules={"slider/motor": "zero"})
+    finally:
+        del gym.registry["tests/Misnamed-v0"]
+
+
+def test_arguments_that_break_an_env_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    """The constructor of Ant accepts a weight that is a text."""
+    broken = EnvRef("shapechanger/Ant-v1", {"ctrl_cost_weight": "x"})
+    task = TransferTask(broken, EnvRef("shapechanger/ExtendedAnt-v1"))
+    with pytest.raises(StudyError, match=r"Ant-v1 .*fails in a short rollout .*check the arg"):
+        run_study(tiny_plan(task=task), tmp_path / "study", executor=Serial())
+
+
+def test_an_argument_that_does_not_exist_is_refused() -> None:
+    """With the name of the env."""
+    task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
+    with pytest.raises(StudyError, match="SmallInvertedPendulum-v1 cannot be made with these opt"):
+        tiny_plan(task=task)
+
+
+def test_each_env_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planning and certifying read both envs together."""
+    made: list[str] = []
+    make = EnvRef.make
+
+    def counted(env: EnvRef, **more: Any) -> gym.Env[Any, Any]:
+        made.append(env.id)
+        return make(env, **more)
+
+    monkeypatch.setattr(EnvRef, "make", counted)
+    traits = inspect_task(TransferTask(SMALL, BIG))
+    assert default_arms(traits) == ARMS
+    tiny_plan(traits=traits)
+    assert made == [SMALL.id, BIG.id]
+    assert "pole" in traits.shift

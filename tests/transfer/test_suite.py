@@ -22,8 +22,8 @@ from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_folder, study_outcomes
+from tests.reports.studies import make_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
-from tests.transfer.report.studies import make_study
 from tests.transfer.studies import files_of
 
 _KINDS = ("source", "random", "scratch", "zero-shot", "fine-tune")
@@ -200,7 +200,7 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
 def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
     """It may hold what is wanted here, so somebody should look at it."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
-    with pytest.raises(CorruptStudy, match=r"Dry-to-Wet/plan\.json .*delete .*Dry-to-Wet to do"):
+    with pytest.raises(CorruptStudy, match=r"to-Wet/plan\.json .*delete .*to-Wet to repeat"):
         run_in_suite(_plan(DRY, ICY), out, executor=_Told(refuses=True))
 
 

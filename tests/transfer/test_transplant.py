@@ -736,7 +736,7 @@ def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
     """A map for other bodies is found before anything is built."""
     there, stay = MAPS["growth"], MAPS["identity"]
     source = trained(PPO, stay)
-    with pytest.raises(SpaceMismatch, match=f"{wrong} observation layout holds 59"):
+    with pytest.raises(SpaceMismatch, match=f"layout of the {wrong} observation has 59"):
         transplant(
             source,
             there if wrong == "target" else there.inverse(),

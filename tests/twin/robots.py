@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Clock
-from shapechanger.twin.clock import GrantedClock, SteadyClock
+from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.twin.hardware import TwinHardware
 
 ACTIONS = (ActionPlan("steering"), ActionPlan("throttle", propels=True))
@@ -91,3 +91,9 @@ def granted(hardware: TwinHardware) -> GrantedClock:
     """The clock of hardware in twin time."""
     assert isinstance(hardware.clock, GrantedClock)
     return hardware.clock
+
+
+def die(hardware: TwinHardware) -> None:
+    """Close the connection to the board as the death of a process does, without leaving first."""
+    assert isinstance(hardware.board, BoardClient)
+    hardware.board._socket.close()

@@ -19,6 +19,8 @@ from shapechanger.twin.start import RunningBoard, start_board
 from shapechanger.twin.world.place import Place
 from tests.twin.robots import CAR
 
+pytestmark = pytest.mark.realtime
+
 _PLAN = load_profile(find_profile("finger")).guard_plan()
 _PULL = (0.5, *(0.0,) * 6)
 

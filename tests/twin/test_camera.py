@@ -22,6 +22,8 @@ from shapechanger.twin.start import RunningBoard, start_board
 from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR, until
 
+pytestmark = pytest.mark.realtime
+
 _CAMERA = CameraPlan("pipe", fps=20.0)
 
 
@@ -127,14 +129,12 @@ def test_a_picture_without_a_barcode_is_the_whole_picture(tmp_path: Path) -> Non
     assert read_barcode(simplejpeg.decode_jpeg(striped, "RGB")) == 77
 
 
-def test_it_is_fast(tmp_path: Path) -> None:
-    """At least 100 pictures a second of 160 by 120, with JPEG; measured: some 1500."""
+def test_pictures_are_small(tmp_path: Path) -> None:
+    """A JPEG of 160 by 120 takes less than 8 kB on average."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     path = str(tmp_path / "none")
     camera = FrontCameraPipe(path, 20.0, 80, latest_only=True, start_ns=0, seed=0)
-    start = time.process_time()
     sizes = [len(camera.draw(world, i)) for i in range(50)]
-    assert time.process_time() - start < 0.5
     assert np.mean(sizes) < 8000
 
 

@@ -19,6 +19,8 @@ from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import CAR, until
 
+pytestmark = pytest.mark.realtime
+
 _DEADLINE_MS = 250
 
 

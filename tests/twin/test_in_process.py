@@ -148,7 +148,7 @@ def test_a_closed_robot_is_at_rest_and_moves_no_more() -> None:
     robot.step((0.0, 1.0))
     robot.close()
     robot.close()
-    with pytest.raises(RobotError, match="was closed"):
+    with pytest.raises(RobotError, match="is closed"):
         robot.step((0.0, 1.0))
     assert robot.start().armed
     robot.close()

@@ -11,7 +11,7 @@ from shapechanger.bodies.finger import JOINTS, NOMINAL
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
-from shapechanger.twin.chips import Behind, SimulatedAs5600, Tca9548a
+from shapechanger.twin.chips import ChannelsBehind, SimulatedAs5600, Tca9548a
 from shapechanger.twin.in_process import LocalBoard
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.finger import FingerWorld
@@ -65,7 +65,7 @@ def test_only_open_channels_are_heard() -> None:
     """None at first; with two open, a line is low where either chip pulls it low."""
     chips = [SimulatedAs5600("knee", lambda: 0.0, counts, 1) for counts in (0x0F3, 0x155)]
     mux = Tca9548a({0: chips[0], 6: chips[1]})
-    behind = Behind(mux)
+    behind = ChannelsBehind(mux)
     with pytest.raises(OSError, match="no chip answers"):
         behind.read(0x0C, 2)
     mux.write(1 << 6, [])

@@ -41,7 +41,7 @@ def test_a_broken_line_in_between_is_refused(tmp_path: Path) -> None:
     """The file was changed, so it proves nothing: the message says where."""
     path = tmp_path / "ledger.jsonl"
     path.write_text('{"t": 1, "kind": "gone"}\n{"t": 2, "ki\n{"t": 3, "kind": "gone"}\n')
-    with pytest.raises(RobotError, match=r"Line 2 of .*ledger\.jsonl is no transition"):
+    with pytest.raises(RobotError, match=r"Line 2 of .*ledger\.jsonl is malformed"):
         read_ledger(path)
 
 

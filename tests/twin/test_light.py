@@ -6,9 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import shapechanger
 from shapechanger.twin.start import start_board
 from tests.twin.robots import CAR
+
+pytestmark = pytest.mark.realtime
 
 _BARE = """
 import sys, types
@@ -25,8 +29,8 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
 
-def test_the_guard_loads_only_gpiozero(tmp_path: Path) -> None:
-    """Under the guard's bare package, in isolated mode, the twin needs nothing heavy."""
+def test_the_guard_loads_only_light_modules(tmp_path: Path) -> None:
+    """On a twin, the guard loads gpiozero, msgspec and what these need, and nothing heavier."""
     source = str(Path(shapechanger.__file__).parent)
     with start_board(CAR, "real", tmp_path) as board:
         command = [sys.executable, "-I", "-c", _BARE, source, board.socket_path]
@@ -39,4 +43,6 @@ def test_the_guard_loads_only_gpiozero(tmp_path: Path) -> None:
         "pkg_resources",
         "importlib_resources",
         "importlib_metadata",
+        "msgspec",
+        "typing_extensions",
     }

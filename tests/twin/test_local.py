@@ -11,7 +11,7 @@ from gpiozero import DigitalInputDevice, DigitalOutputDevice, Motor
 
 from shapechanger.errors import RobotError
 from shapechanger.twin.in_process import LocalBoard
-from shapechanger.twin.timekeeper import START_NS
+from shapechanger.twin.server import START_NS
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR
@@ -43,7 +43,7 @@ def test_time_moves_only_by_advance() -> None:
 def test_who_waits_would_wait_for_ever(wait: Callable[[Any], object]) -> None:
     """There is no other process that could let time go by."""
     board, _ = _board()
-    with pytest.raises(RobotError, match="moves only by `advance`"):
+    with pytest.raises(RobotError, match="advances only by `advance`"):
         wait(board.hardware.clock)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import socket
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -13,6 +12,8 @@ from hypothesis import strategies as st
 
 from shapechanger.twin.network import BadNetwork
 from tests.twin.robots import until
+
+pytestmark = pytest.mark.realtime
 
 PATIENCE_S = 10.0
 
@@ -93,12 +94,23 @@ def test_much_at_once(line: Line) -> None:
     assert line.takes(line.far, 100_000) == data[200_000:]
 
 
-def test_latency(line: Line) -> None:
-    """Each byte takes its time."""
-    line.network.latency_s = 0.2
-    before_s = time.monotonic()
-    assert line.carries(b"late") == b"late"
-    assert time.monotonic() - before_s >= 0.19
+def test_latency(far: socket.socket) -> None:
+    """Bytes are held back until the latency has passed on the network's clock, and no longer."""
+    now_s = 0.0
+    with BadNetwork(far.getsockname()[1], clock=lambda: now_s) as network:
+        line = Line(network, far)
+        network.latency_s = 0.2
+        line.near.sendall(b"late")
+        line.far.settimeout(0.1)
+        with pytest.raises(TimeoutError):
+            line.far.recv(1)
+        now_s = 0.19
+        with pytest.raises(TimeoutError):
+            line.far.recv(1)
+        now_s = 0.21
+        line.far.settimeout(PATIENCE_S)
+        assert line.takes(line.far, 4) == b"late"
+        line.close()
 
 
 def test_silence_holds_back_and_keeps_the_connection(line: Line) -> None:

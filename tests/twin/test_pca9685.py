@@ -19,6 +19,8 @@ from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, esc, process, servo
 
+pytestmark = pytest.mark.realtime
+
 _ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 3, "output_enable": 24}
 _SERVO_CAR = GuardPlan("car", ACTIONS, (servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),))
 

@@ -13,7 +13,9 @@ from shapechanger.twin.hardware import connect
 from shapechanger.twin.robot import Operator
 from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
-from tests.twin.robots import CAR, process
+from tests.twin.robots import CAR, die, process
+
+pytestmark = pytest.mark.realtime
 
 _MOTOR = """
 import sys
@@ -67,7 +69,7 @@ def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
             hardware = connect(board.socket_path)
             device = PWMOutputDevice(22, pin_factory=hardware.pin_factory())
             device.value = 0.4
-            hardware._link._socket.close()  # As a death does, without a goodbye.
+            die(hardware)
             high += operator.levels().duties[22] == 1.0
             device.close()
         assert 50 < high < 110
@@ -142,7 +144,7 @@ def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
         hardware = connect(board.socket_path)
         hardware.servo_pins().pulse(12, 1503, 50)
         assert operator.levels().pulses[12] == (1503, 50)
-        hardware._link._socket.close()
+        die(hardware)
         levels = operator.levels()
         assert 12 not in levels.pulses
         assert levels.duties[12] in (0.0, 1.0)

@@ -18,6 +18,8 @@ from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.simulation import MujocoWorld
 from tests.twin.robots import CAR
 
+pytestmark = pytest.mark.realtime
+
 _PARTS = {"wheels", "steering"}
 _CORRIDOR = Place("corridor", "car")
 

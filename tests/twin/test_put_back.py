@@ -17,6 +17,8 @@ from shapechanger.twin.world.place import Place
 from shapechanger.twin.world.vehicle import DrivingWorld
 from tests.twin.robots import CAR
 
+pytestmark = pytest.mark.realtime
+
 _CORRIDOR = Place("corridor", "car")
 
 

@@ -16,7 +16,7 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
-from shapechanger.twin.rig import Rig, ServoFault
+from shapechanger.twin.servos.rig import Rig, ServoFault
 from shapechanger.twin.world.finger import FingerWorld
 
 _REST = (0.0,) * 7
@@ -61,14 +61,14 @@ def bench() -> Iterator[_Bench]:
 def test_nothing_pulls_before_the_first_command(bench: _Bench) -> None:
     """Armed or not: no servo has torque while nobody commands."""
     assert bench.seen.armed
-    assert not any(servo.has_torque for servo in bench.rig.line.servos.values())
+    assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
     assert max(bench.rig.tensions().values()) < 1.5  # Gears hold what hangs on them.
 
 
 def test_zero_is_the_pretension_and_one_the_most(bench: _Bench) -> None:
     """Each servo has the current of its tension, to a count."""
     bench.drive(_REST, 5)
-    pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.line.servos.values()]
+    pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.bus.servos.values()]
     assert pulls == pytest.approx([1.0] * 7, abs=0.02)
     bench.drive((1.0, *_REST[1:]), 15)
     assert bench.rig.servo("FDP").pulls_a * _N_PER_A == pytest.approx(15.0, abs=0.02)
@@ -104,7 +104,7 @@ def test_the_same_commands_give_the_same_motion() -> None:
         ("hot", "FDS .*(overheated|more than 65 C)"),
         ("overload", "FDS .*overloaded"),
         ("snapped", "FDS .*lost its tendon"),
-        ("power", "FDS .*(started afresh|does not answer)"),
+        ("power", "FDS .*(restarted|does not answer)"),
     ],
 )
 def test_a_servo_that_fails_takes_all_tendons_down(
@@ -121,7 +121,7 @@ def test_a_servo_that_fails_takes_all_tendons_down(
         assert steps < 40
     assert re.search(words, bench.seen.stop_reason), bench.seen.stop_reason
     bench.drive(_FLEX, 16)
-    others = [s for s in bench.rig.line.servos.values() if s is not bench.rig.servo("FDS")]
+    others = [s for s in bench.rig.bus.servos.values() if s is not bench.rig.servo("FDS")]
     goal = max(abs(servo.pulls_a) for servo in others) * _N_PER_A
     assert goal < 1.05
     bench.drive(_FLEX, 20)
@@ -143,7 +143,7 @@ def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
     assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in bench.seen.stop_reason
     assert not bench.seen.armed
     bench.drive(_FLEX, 36)
-    assert [servo.pulls_a for servo in bench.rig.line.servos.values()] == [0.0] * 7
+    assert [servo.pulls_a for servo in bench.rig.bus.servos.values()] == [0.0] * 7
     magnet.set_magnet("")
     bench.drive(_FLEX, 5)
     assert "no magnet" in bench.seen.stop_reason
@@ -178,10 +178,10 @@ def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
 def test_a_silent_guard_lets_the_servos_let_go(bench: _Bench) -> None:
     """Without any word for 100 ms each servo stops by itself."""
     bench.drive(_FLEX, 25)
-    bench.rig.line.advance(90_000_000)
+    bench.rig.bus.advance(90_000_000)
     assert bench.rig.tensions()["FDP"] > 5.0
-    bench.rig.line.advance(500_000_000)
-    assert [servo.pulls_a for servo in bench.rig.line.servos.values()] == [0.0] * 7
+    bench.rig.bus.advance(500_000_000)
+    assert [servo.pulls_a for servo in bench.rig.bus.servos.values()] == [0.0] * 7
     assert max(bench.rig.tensions().values()) < 2.0
 
 

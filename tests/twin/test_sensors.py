@@ -13,10 +13,13 @@ from gpiozero import Motor
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.hardware import TwinHardware, connect
 from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import RunningBoard, start_board
 from tests.twin.robots import BUMPER, CAR, ENCODER
+
+pytestmark = pytest.mark.realtime
 
 _SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
@@ -38,10 +41,11 @@ class _Rig:
         """Let time go by, then take in the edges that came, and read."""
         for _ in range(round(seconds * 100)):
             now_ns = self.operator.advance(0.01)
-            link = self.hardware._link
-            link.drain()
-            link.dispatch()
-            link.now_ns = now_ns
+            board = self.hardware.board
+            assert isinstance(board, BoardClient)
+            board.drain()
+            board.dispatch()
+            board.now_ns = now_ns
             self.seen |= self.sensor.read(now_ns, self.motor.value)
         return self.seen
 
@@ -76,14 +80,14 @@ def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
     """80 edges a turn of 0.2 m, forward and back."""
     edges: list[int] = []
     with _rig(tmp_path, ENCODER) as rig:
-        inner = rig.hardware._link.on_edge
+        inner = rig.hardware.board.on_edge
         assert inner is not None
 
         def count(pin: int, level: int, at_ns: int) -> None:
             edges.append(at_ns)
             inner(pin, level, at_ns)
 
-        rig.hardware._link.on_edge = count
+        rig.hardware.board.on_edge = count
         rig.motor.value = 1.0
         rig.advance(0.7)
         travelled = rig.operator.where().travelled_m

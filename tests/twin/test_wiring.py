@@ -17,6 +17,8 @@ from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
 
+pytestmark = pytest.mark.realtime
+
 _CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1}
 _PHASE = OutputPlan(
     "phase",

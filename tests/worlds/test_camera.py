@@ -90,11 +90,11 @@ def test_a_camera_that_looks_at_nothing_says_so() -> None:
     """Before the first model, and after it was closed."""
     model, data = _model("1 0 0")
     camera = OnboardCamera((32, 16))
-    with pytest.raises(RenderError, match="looks at nothing yet"):
+    with pytest.raises(RenderError, match="has no model"):
         camera.picture(model, data)
     camera.look_through(model, "eye")
     camera.close()
-    with pytest.raises(RenderError, match="looks at nothing yet"):
+    with pytest.raises(RenderError, match="has no model"):
         camera.picture(model, data)
 
 
@@ -111,5 +111,5 @@ def test_a_fork_of_who_draws_is_told_how_to_be_started(monkeypatch: pytest.Monke
     camera = OnboardCamera((32, 16))
     model, data = _model("1 0 0")
     camera.look_through(model, "eye")
-    with pytest.raises(RenderError, match="forked from one that draws"):
+    with pytest.raises(RenderError, match="forked after rendering"):
         camera.picture(model, data)

@@ -197,7 +197,7 @@ def test_a_current_sets_a_boat_adrift() -> None:
 
 def test_without_a_camera_there_is_no_picture() -> None:
     """The sentence says what to give."""
-    with pytest.raises(WorldError, match="made without a camera: give it a `size`"):
+    with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()
 
 
@@ -231,7 +231,7 @@ def test_what_is_refused_leaves_the_world_as_it_was() -> None:
     with pytest.raises(WorldError, match="Seeds of courses count from 0"):
         world.lay_out(-1)
     dim = replace(look, light=0.3)
-    with pytest.raises(WorldError, match="outside the world"):
+    with pytest.raises(WorldError, match="off its vehicle or in the floor"):
         world.lay_out(4, dim, CameraJitter(up_m=-1.0))
     assert (world.model, world.course, world.look) == (model, course, look)
     _drive(world, _AHEAD["car"], 0.2)

@@ -1,4 +1,4 @@
-"""The robots: where each model comes from, its constants with their sources, its named bodies."""
+"""Bodies: families of named bodies, the finger and the vehicles."""
 
 from __future__ import annotations
 

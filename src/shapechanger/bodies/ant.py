@@ -1,8 +1,8 @@
-"""The ant: a sphere on four legs, each with a hip and an ankle.
+"""Ant: a sphere on four legs, each with a hip and an ankle.
 
-Model: `ant.xml` of Gymnasium (MIT). Bodies: those of the 2017 Shapechanger release, whose masses,
-inertias, ranges, gears and lengths the edits below give to the last bit. The release's third
-segments had no motors; here they have, and `ExtendedAntPassive` is the body without.
+The model is `ant.xml` of Gymnasium (MIT). The bodies are those of the 2017 Shapechanger release;
+the edits below reproduce its masses, inertias, ranges, gears and lengths exactly. The third
+segments of the release had no motors; here they have, and `ExtendedAntPassive` is the body without.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeig
 
 __all__ = ["ANT", "LEGS"]
 
-# The legs in the order of the model's motors, and the quarter of the plane that each points into:
-# signs of x and y. The ankles of legs 2 and 3 turn the other way round.
+# Legs in the order of the model's motors, with the signs of x and y of their directions. The ankles
+# of legs 2 and 3 turn in the opposite direction.
 LEGS: Final = {4: (1, -1), 1: (1, 1), 2: (-1, 1), 3: (-1, -1)}
 _TURNS_BACK: Final = (2, 3)
 
@@ -29,7 +29,7 @@ _EXTENDED_START_HEIGHT_M: Final = 1.25
 
 
 def _extended(gear: float | None) -> Body:
-    """The ant with a third segment on each leg, with motors of this gear (N·m) or without."""
+    """Ant with a third segment on each leg, with motors of this gear, N·m, or without."""
     feet: list[AddSegment] = []
     ankles: list[JointRange] = []
     for leg, (x, y) in LEGS.items():
@@ -41,7 +41,7 @@ def _extended(gear: float | None) -> Body:
 
 
 def _range(leg: int, degrees: tuple[float, float]) -> tuple[float, float]:
-    """The range of a leg's joint, rad, from that of the legs that turn forwards."""
+    """Range of a leg's joint, rad, from that of the legs that turn forwards, degrees."""
     lower, upper = (math.radians(x) for x in degrees)
     return (-upper, -lower) if leg in _TURNS_BACK else (lower, upper)
 

@@ -1,4 +1,9 @@
-"""A family: one model and the named bodies that edits make of it."""
+"""Families of bodies: one model each, and the named bodies that edits make from it.
+
+All models are those of Gymnasium (MIT). `InvertedPendulum`, `SmallInvertedPendulum` and
+`BigInvertedPendulum` are bodies of the 2017 Shapechanger release, whose poles end at (0.001, 0, h)
+m with h = 0.6, 0.3 and 1.2: stretching along z keeps the lean of 1 mm.
+"""
 
 from __future__ import annotations
 
@@ -24,18 +29,18 @@ __all__ = [
     "Family",
 ]
 
-# What a user may give for a body: its name, its JSON, an edit or several.
 BodyLike = str | Edit | Iterable[Edit]
+"""A body as users give it: its name, edits as JSON, one edit, or several."""
 
 
 @dataclass(frozen=True)
 class Family:
-    """One model, and the bodies that have a name.
+    """One model and its named bodies.
 
     Attributes:
-        name: Name of the family, which is that of its first body.
-        bodies: For each named body the edits that make it from the model as it is.
-        bodies_by_joint: For a joint's name that of the body it moves, where the model gives none.
+        name: Name of the family, which is also that of its unedited body.
+        bodies: Edits of each named body.
+        bodies_by_joint: Names for bodies that the model leaves unnamed, by the name of their joint.
     """
 
     name: str
@@ -43,20 +48,20 @@ class Family:
     bodies_by_joint: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
-        """The model at `path`, with a name for every element."""
+        """Load the model at `path`, and name all its elements."""
         spec = mujoco.MjSpec.from_file(str(path))
         name_elements(spec, self.bodies_by_joint)
         return spec
 
     def body(self, value: BodyLike) -> Body:
-        """The body that `value` stands for.
+        """Edits of a body.
 
         Args:
             value: Name of a body of this family, edits as JSON, one edit, or several.
 
         Raises:
-            UnknownName: If it is the name of no body.
-            MorphologyError: If it is nothing that a body can be made of.
+            UnknownName: If the family has no body of this name.
+            MorphologyError: If `value` is not a valid body.
         """
         if isinstance(value, str) and not value.lstrip().startswith(("[", "{")):
             if value not in self.bodies:
@@ -76,7 +81,7 @@ PENDULUM: Final = Family(
 
 
 def _plain(name: str) -> Family:
-    """The family whose only named body is the model as it is."""
+    """Family whose only named body is the unedited model."""
     return Family(name, {name: ()})
 
 

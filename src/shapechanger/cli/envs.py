@@ -38,7 +38,7 @@ class ListEnvs:
 
 
 @dataclass(frozen=True)
-class Show:
+class ShowEnv:
     """Show the name, unit and range of each number of an env's observation and action."""
 
     env: _EnvId
@@ -84,7 +84,7 @@ class Compare:
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckEnv:
     """Check that an env satisfies the contract that learners rely on."""
 
     env: _EnvId
@@ -132,9 +132,9 @@ class Envs:
 
     command: (
         Annotated[ListEnvs, tyro.conf.subcommand("list")]
-        | Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[ShowEnv, tyro.conf.subcommand("show")]
         | Annotated[Compare, tyro.conf.subcommand("compare")]
-        | Annotated[Check, tyro.conf.subcommand("check")]
+        | Annotated[CheckEnv, tyro.conf.subcommand("check")]
         | Annotated[Render, tyro.conf.subcommand("render")]
     )
 

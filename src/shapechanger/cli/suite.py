@@ -55,7 +55,7 @@ class Suite:
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.files import write_json
         from shapechanger.transfer.learners.settings import learner_settings
-        from shapechanger.transfer.study import make_plan, unfinished_runs
+        from shapechanger.transfer.study import inspect_task, make_plan, unfinished_runs
         from shapechanger.transfer.suite import open_study_folder, run_in_suite, study_outcomes
 
         require_seed(self.seed)
@@ -67,6 +67,7 @@ class Suite:
         settings = learner_settings("cloning")
         found: list[StudyOutcome] = []
         for task in self._tasks():
+            traits = inspect_task(task)
             plan = make_plan(
                 task,
                 "cloning",
@@ -75,12 +76,18 @@ class Suite:
                 steps=self.steps,
                 source_steps=settings.steps if self.steps is None else self.steps,
                 seed=self.seed,
+                traits=traits,
             )
             try:
                 folder = open_study_folder(plan, out)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
                     study = run_in_suite(
-                        plan, out, executor=executor, on_progress=progress, command=command
+                        plan,
+                        out,
+                        executor=executor,
+                        on_progress=progress,
+                        command=command,
+                        traits=traits,
                     )
             except KeyboardInterrupt:
                 raise Interrupted(f"Stopped. Go on with: {command}") from None

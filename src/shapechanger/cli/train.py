@@ -49,7 +49,7 @@ class Train:
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
-        from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
+        from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
@@ -79,7 +79,7 @@ class Train:
 
         try:
             with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
-                if not isinstance(settings, LearnerSettings):
+                if not isinstance(settings, PpoSettings):
                     _learn_to_drive(env, settings, steps, self.seed, out, show, progress)
                     console.print(f"wrote {out}")
                     return

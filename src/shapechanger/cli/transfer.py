@@ -10,7 +10,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-import msgspec
 import tyro
 from rich.table import Table
 
@@ -29,8 +28,8 @@ from shapechanger.transfer.env_ref import EnvRef
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from shapechanger.transfer.plan import Plan, Run
-    from shapechanger.transfer.study import Study
+    from shapechanger.transfer.plan import Plan, Run, TransferTask
+    from shapechanger.transfer.study import Study, TaskTraits
 
 __all__ = ["Transfer", "run_steps", "write_study_report"]
 
@@ -63,7 +62,9 @@ class Transfer:
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
-    """A policy to bring along in place of training one for each seed."""
+    """A given source policy, instead of training one for each seed."""
+    trust: bool = False
+    """Load the given policy even if it contains something that can run code."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
@@ -95,14 +96,21 @@ class Transfer:
     def run(self) -> None:
         """Run the study, print its table, and write its report."""
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.study import is_folder_of, run_study, unfinished_runs
+        from shapechanger.transfer.study import (
+            inspect_task,
+            is_folder_of,
+            run_study,
+            unfinished_runs,
+        )
 
         self._require_sense()
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
         # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        plan = self._plan()
+        task = self._task()
+        traits = inspect_task(task)
+        plan = self._plan(task, traits)
         executor = Processes(1 if plan.exclusive else self.workers)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
@@ -114,9 +122,11 @@ class Transfer:
                     plan,
                     out,
                     source_policy=self.source_policy,
+                    trust=self.trust,
                     executor=executor,
                     on_progress=progress,
                     command=_command(),
+                    traits=traits,
                 )
         except KeyboardInterrupt:
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
@@ -143,29 +153,28 @@ class Transfer:
                 "--map."
             )
 
-    def _plan(self) -> Plan:
-        """Return the plan of the study."""
-        from shapechanger.transfer.learners.settings import LearnerSettings, learner_settings
-        from shapechanger.transfer.methods import default_arms
+    def _task(self) -> TransferTask:
+        """Source and target, with their bodies and options."""
         from shapechanger.transfer.plan import TransferTask
-        from shapechanger.transfer.study import make_plan
 
         source = driven(env_ref(self.source, self.source_body))
         target = driven(env_ref(self.target, self.target_body), self.target_lens)
-        task = TransferTask(
+        return TransferTask(
             source.having(options_of(self.source_options, "--source-options")),
             target.having(options_of(self.target_options, "--target-options")),
         )
-        for env in (task.source, task.target):
-            _require_options(env)
+
+    def _plan(self, task: TransferTask, traits: TaskTraits) -> Plan:
+        """The plan of the study."""
+        from shapechanger.transfer.learners.settings import learner_settings
+        from shapechanger.transfer.study import default_arms, make_plan
+
         learner = self.learner or default_learner(task.target)
         settings = learner_settings(learner)
         steps, seeds = self.steps, self.seeds
         if self.quick:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-            if isinstance(settings, LearnerSettings):
-                every = min(settings.eval_every, settings.whole_updates(shortest // 4))
-                settings = msgspec.structs.replace(settings, eval_every=every, source_steps=0)
+            settings = settings.for_budget(shortest)
             steps = shortest if steps is None else steps
             seeds = _QUICK_SEEDS if seeds is None else seeds
         return make_plan(
@@ -176,11 +185,13 @@ class Transfer:
             steps=steps,
             source_steps=self.source_steps,
             source_policy=self.source_policy,
-            arms=self.arms or default_arms(task),
+            trust=self.trust,
+            arms=self.arms or default_arms(traits),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),
             map_text=_read(self.map) if self.map else "",
             units=self.units,
+            traits=traits,
         )
 
 
@@ -205,21 +216,6 @@ def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
     steps = {"scratch": plan.steps, "fine-tune": plan.steps}
     steps |= dict.fromkeys(("source", *ADAPTED_SOURCE_ARMS), plan.source_steps)
     return {run.name: steps.get(run.kind, 1) for run in runs}
-
-
-def _require_options(env: EnvRef) -> None:
-    """Refuse options that an env does not accept.
-
-    Raises:
-        StudyError: If there is one.
-    """
-    try:
-        env.make().close()
-    except TypeError as error:
-        reason, told, _ = str(error).partition(" was raised from the environment creator")
-        if not told:
-            raise
-        raise StudyError(f"{env.id} cannot be made with these options: {reason}.") from error
 
 
 def _split_rule(text: str) -> tuple[str, str]:

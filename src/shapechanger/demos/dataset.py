@@ -18,41 +18,34 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.demos.episodes.files import is_episode
-from shapechanger.errors import DemosError, MissingExtra, UnknownName
+from shapechanger.demos.jpeg import decode_picture
+from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
-try:
-    import simplejpeg
-except ImportError as error:
-    raise MissingExtra("simplejpeg", "data") from error
-
-__all__ = ["LARGEST_PICTURE", "Dataset", "count_steps", "decode_picture", "load_dataset"]
-
-LARGEST_PICTURE: Final = 4096 * 4096
-"""Pixels of the largest picture that is decoded; a file that claims more is damaged, or a trap."""
+__all__ = ["Dataset", "count_steps", "decode_picture", "load_dataset"]
 
 _NS_PER_S: Final = 1e9
-# Two recorders of 20 Hz write 20 and 20.000001.
-_SAME_RATE: Final = 0.01
+# Two recorders at 20 Hz may write 20 and 20.000001.
+_RATE_TOLERANCE: Final = 0.01
 
 Shrink = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
-"""Makes of a picture, (H, W, 3), what is kept of it."""
+"""Function that reduces a picture, shape (H, W, 3), to save memory."""
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """What was seen and decided, step by step, of one or more episodes.
+    """Observations and actions of one or more episodes, step by step.
 
     Attributes:
         pictures: Red, green and blue, shape (n, H, W, 3); None without pictures.
-        states: Shape (n, k), NaN where nothing measured a number; None without states.
-        actions: What was decided, shape (n, m), in the order of the layout.
-        episodes: How many steps each episode has, in order; none of them 0.
-        times_s: When each step was, s since the start of its episode, shape (n,).
-        files: Where each step comes from, for people to read.
-        action_layout: What the numbers of an action mean.
-        state_layout: What those of a state mean; None without states.
-        control_hz: Steps a second.
+        states: Shape (n, k), NaN where nothing measured a value; None without states.
+        actions: Decided actions, shape (n, m), in the order of the layout.
+        episodes: Number of steps of each episode, in order; each positive.
+        times_s: Time of each step since the start of its episode, s, shape (n,).
+        files: Origin of each step, for people to read.
+        action_layout: Meaning of the values of an action.
+        state_layout: Meaning of the values of a state; None without states.
+        control_hz: Steps per second.
     """
 
     pictures: NDArray[np.uint8] | None
@@ -66,11 +59,11 @@ class Dataset:
     control_hz: float
 
     def __len__(self) -> int:
-        """How many steps there are."""
+        """Return the number of steps."""
         return len(self.actions)
 
     def __repr__(self) -> str:
-        """Shapes, and not arrays."""
+        """Describe the shapes instead of printing the arrays."""
         seen = "no pictures" if self.pictures is None else f"pictures {self.pictures.shape[1:]}"
         return f"Dataset({len(self)} steps of {len(self.episodes)} episodes, {seen})"
 
@@ -81,18 +74,18 @@ def load_dataset(
     drivers: Collection[str] = ("person", "expert"),
     shrink: Shrink | None = None,
 ) -> Dataset:
-    """Read demonstrations, whatever format they have.
+    """Read demonstrations in any supported format.
 
-    Steps that were dropped are left out, and so is what others than the drivers did.
+    Dropped steps and steps of other drivers are left out.
 
     Args:
-        data: A recording, one episode of it, or anything that `shapechanger demos import` reads,
-            which is not changed.
-        drivers: Whose steps to learn from.
-        shrink: What is kept of a picture, to save memory; None for all of it.
+        data: A recording, one episode of it, or anything that `shapechanger demos import` reads.
+            It is not changed.
+        drivers: Drivers whose steps to load.
+        shrink: Function that reduces each picture, to save memory; None to keep it as it is.
 
     Raises:
-        DemosError: If there is nothing, or it does not go together.
+        DemosError: If there are no such steps, or the episodes do not match each other.
         UnknownName: If there is no such driver.
     """
     for driver in drivers:
@@ -105,51 +98,32 @@ def load_dataset(
     first = parts[0]
     pictures = [picture for part in parts for picture in part.pictures]
     states = [state for part in parts for state in part.states]
+    layout = first.header.state_layout
     return Dataset(
         pictures=np.stack(pictures) if pictures else None,
-        states=np.array(states, np.float32) if first.header.state_layout else None,
+        states=np.array(states, np.float32) if layout else None,
         actions=np.array([action for part in parts for action in part.actions], np.float32),
         episodes=tuple(len(part.actions) for part in parts),
         times_s=np.concatenate([part.times_s() for part in parts]),
         files=tuple(file for part in parts for file in part.files),
         action_layout=Layout.from_json(first.header.action_layout),
-        state_layout=_layout(first.header.state_layout),
+        state_layout=Layout.from_json(layout) if layout else None,
         control_hz=first.header.control_hz,
     )
 
 
 def count_steps(data: Path, *, drivers: Collection[str] = ("person", "expert")) -> int:
-    """How many steps `load_dataset` would give, without looking at a picture; errors as there."""
+    """Count the steps that `load_dataset` would load, without decoding any picture.
+
+    Args:
+        data: As in `load_dataset`.
+        drivers: As in `load_dataset`.
+    """
     return sum(step.driver in drivers for _, _, steps in _episodes(data) for step, _ in steps)
 
 
-def decode_picture(jpeg: bytes, name: str) -> NDArray[np.uint8]:
-    """The pixels of a picture, shape (H, W, 3).
-
-    Args:
-        jpeg: Its bytes.
-        name: Where it is, for the error.
-
-    Raises:
-        DemosError: If it is no whole JPEG, or claims to be huge.
-    """
-    try:
-        height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
-        if height * width > LARGEST_PICTURE:
-            raise DemosError(
-                f"{name} says that it has {width} x {height} pixels: more than {LARGEST_PICTURE} "
-                "are not read."
-            )
-        # Strict refuses what a decoder would fill up with grey.
-        return simplejpeg.decode_jpeg(jpeg, colorspace="RGB", strict=True)
-    except ValueError as error:
-        if isinstance(error, DemosError):
-            raise
-        raise DemosError(f"{name} is no whole picture: {error}.") from error
-
-
 class _Part(NamedTuple):
-    """One episode."""
+    """The steps of one episode."""
 
     name: str
     header: EpisodeHeader
@@ -161,7 +135,7 @@ class _Part(NamedTuple):
     files: list[str]
 
     def times_s(self) -> NDArray[np.float64]:
-        """When each step was; by the rate where no clock was read."""
+        """Return the time of each step, s; from the rate where a time is missing."""
         known = [ns for ns in self.captured if ns is not None]
         if len(known) < len(self.captured):
             return (np.array(self.indices) - self.indices[0]) / self.header.control_hz
@@ -169,14 +143,14 @@ class _Part(NamedTuple):
         if (np.diff(times_s) < 0.0).any():
             worst = int(np.diff(times_s).argmin())
             raise DemosError(
-                f"Time runs backwards in {self.name}, after step {self.indices[worst]}: "
-                "`shapechanger demos bad` leaves steps out."
+                f"Time runs backwards in {self.name} after step {self.indices[worst]}: exclude "
+                "steps with `shapechanger demos bad`."
             )
         return times_s
 
 
 def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Iterator[_Part]:
-    """Each episode, in order."""
+    """Yield each episode, in order."""
     for name, header, steps in _episodes(data):
         part = _Part(name, header, [], [], [], [], [], [])
         newest: bytes | None = None
@@ -197,15 +171,15 @@ def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Itera
             part.indices.append(step.index)
             part.files.append(f"{name}, step {step.index}")
         if len(part.pictures) not in {0, len(part.actions)}:
-            raise DemosError(f"Of {name} only some steps have pictures.")
+            raise DemosError(f"Only some steps of {name} have pictures.")
         yield part
 
 
-_Episode = tuple[str, EpisodeHeader, Iterator[tuple[Step, bytes | None]]]
+_Steps = Iterator[tuple[Step, bytes | None]]
 
 
-def _episodes(data: Path) -> Iterator[_Episode]:
-    """Name, header, and each step that counts with its picture, of each episode."""
+def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, _Steps]]:
+    """Yield the name, the header, and the kept steps with their pictures, of each episode."""
     if not data.exists() or _is_ours(data):
         for path in episodes_of(data):
             episode = read_episode(path)
@@ -223,44 +197,40 @@ def _is_ours(data: Path) -> bool:
 
 
 def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDArray[np.uint8]:
-    """What is kept of a picture.
+    """Decode a picture, and reduce it.
 
     Raises:
-        DemosError: If it is none, or has another size than the header says.
+        DemosError: If it is damaged, or its size differs from the header's.
     """
     pixels = decode_picture(jpeg, where)
     size = pixels.shape[1], pixels.shape[0]
     if part.header.image_size not in {None, size}:
         wide, high = part.header.image_size or size
         raise DemosError(
-            f"{where} has {size[0]} x {size[1]} pixels, and the other pictures {wide} x {high}."
+            f"{where} has {size[0]} x {size[1]} pixels, but the other pictures {wide} x {high}."
         )
     return pixels if shrink is None else shrink(pixels)
 
 
 def _require_same(parts: list[_Part]) -> None:
-    """Refuse episodes that do not go together.
+    """Refuse episodes that differ in layout, picture size or rate.
 
     Raises:
-        DemosError: If one differs from the first, and in what.
+        DemosError: If one differs from the first.
     """
     first = parts[0]
     for part in parts[1:]:
         ratio = part.header.control_hz / first.header.control_hz
-        differences = {
+        same = {
             "actions": part.header.action_layout == first.header.action_layout,
             "states": part.header.state_layout == first.header.state_layout,
             "pictures": part.header.image_size == first.header.image_size
             and bool(part.pictures) == bool(first.pictures),
-            "steps a second": abs(ratio - 1.0) < _SAME_RATE,
+            "steps a second": abs(ratio - 1.0) < _RATE_TOLERANCE,
         }
-        for what, same in differences.items():
-            if not same:
+        for what in same:
+            if not same[what]:
                 raise DemosError(
                     f"{part.name} has other {what} than {first.name}: learn from one kind at a "
                     "time."
                 )
-
-
-def _layout(text: str) -> Layout | None:
-    return Layout.from_json(text) if text else None

@@ -1,8 +1,8 @@
-"""When somebody who can drive takes over from a policy, and gives back.
+"""Who drives while an episode is recorded: an expert, a policy, or a policy with corrections.
 
-The policy drives and is watched; only while it is corrected is there something to learn: M. Kelly
-et al., "HG-DAgger: Interactive Imitation Learning with Human Experts", ICRA 2019. There a person
-decides by feeling; here a rule in plain numbers does.
+With corrections the policy drives, and an expert takes over where it goes wrong: M. Kelly et al.,
+"HG-DAgger: Interactive Imitation Learning with Human Experts", ICRA 2019. There a person decides
+when to intervene; here a rule with fixed thresholds does.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ _ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GateRule:
-    """When to take over, and when to give back.
+    """When the expert takes over, and when it hands back.
 
     Attributes:
-        apart: The expert takes over when any number of the two actions, such as the steering, has
-            differed by more than this,
-        apart_s: for so long without a break, s; at least one step.
-        near_s: It takes over at once when, at the present speed, what is ahead is so near, s, and
-            the policy does not brake.
-        agree: It gives back when no number has differed by more than this,
-        agree_s: for so long without a break, s, and nothing was near; at least one step.
+        apart: Take over when any value of the two actions, such as the steering, has differed by
+            more than this,
+        apart_s: for this long without interruption, s; at least one step.
+        near_s: Take over at once when an obstacle ahead would be reached within this time at the
+            present speed, s, and the policy does not brake.
+        agree: Hand back when no value has differed by more than this,
+        agree_s: for this long without interruption, s, with no obstacle near; at least one step.
     """
 
     apart: float = 0.6
@@ -56,22 +56,21 @@ class GateRule:
     agree_s: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a rule by which nobody could drive."""
+        """Refuse contradictory thresholds."""
         if not 0.0 < self.agree <= self.apart:
             raise DemosError(
-                f"The expert gives back below the difference at which it takes over, which is above"
-                f" 0: got {self.agree} and {self.apart}."
+                f"agree must be positive and at most apart, got {self.agree} and {self.apart}."
             )
         if min(self.apart_s, self.near_s, self.agree_s) < 0.0:
-            raise DemosError("The times of a rule for taking over are not below 0 s.")
+            raise DemosError("apart_s, near_s and agree_s must not be negative.")
 
 
 class Gate:
-    """Says at each step who drives.
+    """State machine that decides at each step who drives.
 
     Args:
-        rule: When.
-        period_s: Time from one step to the next, s.
+        rule: The thresholds.
+        period_s: Time between steps, s.
 
     Attributes:
         corrects: Whether the expert drives.
@@ -84,20 +83,20 @@ class Gate:
         self.begin()
 
     def begin(self) -> None:
-        """An episode has begun: the policy drives."""
+        """Start an episode: the policy drives."""
         self.corrects = False
         self._lasted = 0
 
     def watch(self, wanted: NDArray[np.float32], right: NDArray[np.float32], danger: str) -> str:
-        """Take in one step.
+        """Process one step.
 
         Args:
-            wanted: What the policy would do, (n,).
-            right: What the expert would do, (n,).
-            danger: What is about to go wrong, in words; empty for nothing.
+            wanted: Action of the policy, shape (n,).
+            right: Action of the expert, shape (n,).
+            danger: Imminent danger, in words; "" for none.
 
         Returns:
-            Why the driver changes now, in words; empty if it does not.
+            Why the driver changes at this step, in words; "" if it does not change.
         """
         rule, gap = self._rule, float(np.abs(wanted - right).max())
         if self.corrects:
@@ -118,36 +117,37 @@ class Gate:
 
 
 def _steps(seconds: float, period_s: float) -> int:
-    """How many steps last so long; a sum of periods is never quite what it should be."""
+    """Return how many steps a duration takes, at least one; robust to rounding."""
     return max(1, math.ceil(seconds / period_s - _ROUNDING))
 
 
 Act = Callable[[Any], NDArray[np.float32]]
-"""A policy: from an observation to an action, (n,)."""
+"""A policy: maps an observation to an action, shape (n,)."""
 
 
 class TaskExpert(Protocol):
-    """Somebody who can do the task of an env; `env.unwrapped.demonstrator(seed)` gives one."""
+    """An expert for the task of an env, as `env.unwrapped.demonstrator(seed)` returns one."""
 
     def begin(self) -> None:
-        """An episode has begun."""
+        """Start an episode."""
         ...
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """What they mean to do now, which is learned, and what they do, which is carried out."""
+        """Return the intended action, which is learned, and the action to carry out."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class DriverDecision:
-    """What is done in one step.
+    """The decision for one step.
 
     Attributes:
-        carried_out: What is passed to the env, (n,).
-        meant: What was decided, (n,): the same, but for a demonstrator that makes mistakes.
-        driver: Who decided it.
-        wanted: What a policy wanted while somebody else drives.
-        remark: What is worth a mark; empty for nothing.
+        carried_out: Action to pass to the env, shape (n,).
+        meant: Action to record as decided, shape (n,); differs where a demonstrator errs on
+            purpose.
+        driver: Who decided.
+        wanted: Action of a policy while somebody else drives.
+        remark: Text of a mark to set; "" for none.
     """
 
     carried_out: NDArray[np.float32]
@@ -158,33 +158,33 @@ class DriverDecision:
 
 
 class EpisodeDriver(Protocol):
-    """Whoever drives."""
+    """Interface of everything that can drive during a recording."""
 
     def begin(self) -> None:
-        """An episode has begun."""
+        """Start an episode."""
         ...
 
     def decide(self, observation: Any) -> DriverDecision:
-        """What to do on seeing this."""
+        """Return the decision for an observation."""
         ...
 
 
 class ExpertPilot:
-    """An expert shows how.
+    """An expert drives.
 
-    What it means to do is what is recorded as decided. It makes mistakes now and then, so that a
-    learner sees how they are put right; what was carried out then is what the outputs did.
+    The intended action is recorded as decided. The expert errs on purpose now and then, so that a
+    learner sees recoveries; the erroneous action is what the outputs carry out.
     """
 
     def __init__(self, expert: TaskExpert) -> None:
         self._expert = expert
 
     def begin(self) -> None:
-        """An episode has begun."""
+        """Start an episode."""
         self._expert.begin()
 
     def decide(self, observation: Any) -> DriverDecision:
-        """What to do; the observation is not looked at."""
+        """Return the expert's decision; the observation is ignored."""
         meant, done = self._expert.act()
         return DriverDecision(done, meant, "expert")
 
@@ -196,10 +196,10 @@ class PolicyPilot:
         self._act = act
 
     def begin(self) -> None:
-        """An episode has begun."""
+        """Start an episode."""
 
     def decide(self, observation: Any) -> DriverDecision:
-        """What to do on seeing this."""
+        """Return the policy's decision for an observation."""
         action = self._act(observation)
         return DriverDecision(action, action, "policy")
 
@@ -209,9 +209,9 @@ class CorrectedPilot:
 
     Args:
         act: The policy.
-        expert: Who corrects; it makes no mistakes then.
-        gate: When.
-        danger: What is about to go wrong if this action is done, in words; empty for nothing.
+        expert: The expert; its intended actions, without mistakes, are carried out.
+        gate: Decides who drives.
+        danger: Returns the imminent danger of an action, in words; "" for none.
     """
 
     def __init__(
@@ -224,12 +224,12 @@ class CorrectedPilot:
         self._act, self._expert, self._gate, self._danger = act, expert, gate, danger
 
     def begin(self) -> None:
-        """An episode has begun: the policy drives."""
+        """Start an episode: the policy drives."""
         self._expert.begin()
         self._gate.begin()
 
     def decide(self, observation: Any) -> DriverDecision:
-        """What to do on seeing this."""
+        """Return the decision for an observation."""
         wanted, right = self._act(observation), self._expert.act()[0]
         remark = self._gate.watch(wanted, right, self._danger(wanted))
         if self._gate.corrects:
@@ -244,17 +244,17 @@ def record_steps(
     seed: int,
     on_step: Callable[[int], object] = lambda steps: None,
 ) -> None:
-    """Let somebody drive and record it; the last episode is closed, whatever happens.
+    """Record a number of steps; the last episode is closed in any case.
 
     Args:
-        env: What records.
+        env: The recording env.
         pilot: Who drives.
-        steps: How many steps, over all episodes.
-        seed: Of the first episode; each later one has the next whole number.
-        on_step: Called with the number of steps so far, after each.
+        steps: Number of steps over all episodes.
+        seed: Seed of the first episode; later episodes use consecutive seeds.
+        on_step: Called after each step with the number of steps so far.
 
     Raises:
-        OutputError: If it cannot be written.
+        OutputError: If a step cannot be written.
     """
     last = env.steps + steps
     first, episode = env.steps, seed

@@ -1,4 +1,4 @@
-"""Puts the episodes of several recordings into one."""
+"""Merge the episodes of several recordings into one recording."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from shapechanger.errors import DemosError, OutputError
 
 __all__ = ["Merged", "merge"]
 
-_MOST: Final = 10_000
+_MAX_EPISODES: Final = 10_000
 
 
 @dataclass(frozen=True, slots=True)
 class Merged:
-    """What was merged.
+    """Result of a merge.
 
     Attributes:
-        episodes: Where each episode was, and where it is now, too.
-        layouts: How many kinds of layouts there are among them; who learns needs one.
-        bytes_: How much was copied.
+        episodes: Source and target folder of each episode.
+        layouts: Number of different layouts in the merged recording; learning needs exactly one.
+        bytes_: Number of bytes copied.
     """
 
     episodes: tuple[tuple[Path, Path], ...]
@@ -33,30 +33,30 @@ class Merged:
 
 
 def merge(sources: Sequence[Path], out: Path) -> Merged:
-    """Copy episodes into one recording; the sources stay as they are, and nothing is overwritten.
+    """Copy episodes into one recording; the sources are not changed, and nothing is overwritten.
 
-    All of them are read before the first is copied. An episode whose name is taken by another one
-    gets the next number that is free.
+    All episodes are read before the first one is copied. An episode whose name is taken gets the
+    next free number.
 
     Args:
         sources: Recordings, or single episodes.
-        out: Folder of the recording that they come into; made where it is missing.
+        out: Folder of the target recording; created if missing.
 
     Raises:
-        DemosError: If an episode is still being recorded or there already, or there are none.
-        BrokenEpisode: If one of them is not whole.
-        OutputError: If they cannot be written. What was copied by then is whole.
+        DemosError: If there are no episodes, or one is still being recorded or already in `out`.
+        BrokenEpisode: If an episode is damaged.
+        OutputError: If an episode cannot be copied; those copied before are complete.
     """
     if not sources:
-        raise DemosError("There is nothing to merge: name at least one recording.")
+        raise DemosError("There is nothing to merge: give at least one recording.")
     episodes = [read_episode(path) for source in sources for path in episodes_of(source)]
     there = [read_episode(path) for path in _episodes_in(out)]
     known = {_identity(episode): episode.path for episode in there}
     for episode in episodes:
         if not episode.closed:
             raise DemosError(
-                f"{episode.path} is not closed: wait for its end, or "
-                f"`shapechanger demos repair {episode.path}` if nobody records it any more."
+                f"{episode.path} is not closed: wait until its recording ends, or run "
+                f"`shapechanger demos repair {episode.path}` if the recorder has crashed."
             )
         identity = _identity(episode)
         if identity in known:
@@ -73,21 +73,21 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
 
 
 def _episodes_in(out: Path) -> tuple[Path, ...]:
-    """The episodes that are in a recording already.
+    """Return the episodes that are already in the target recording.
 
     Raises:
-        DemosError: If it is something else.
+        DemosError: If the folder is not a recording.
     """
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return ()
     found = episodes_of(out)
     if found == (out,):
-        raise DemosError(f"{out} is an episode, and a recording is a folder of them.")
+        raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
     return found
 
 
 def _identity(episode: Episode) -> tuple[object, ...]:
-    """What an episode is told from others by, also after somebody has judged its steps."""
+    """Return fields that identify an episode, and that marks and drops do not change."""
     first = episode.steps[0] if episode.steps else None
     seen = (first.wall_ns, first.captured_ns, first.frame_crc, first.action) if first else ()
     return (episode.header.created, len(episode.steps), *seen)
@@ -98,7 +98,7 @@ def _layouts(episode: Episode) -> tuple[str, str]:
 
 
 def _copied(source: Path, out: Path) -> Path:
-    """Copy an episode, which appears whole or not at all."""
+    """Copy an episode atomically."""
     part = out / f".{source.name}.{os.getpid()}.part"
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -107,20 +107,20 @@ def _copied(source: Path, out: Path) -> Path:
         part.rename(target)
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
-        # Of many files that cannot be copied it gives a list, which has no words of its own.
-        reason = error.strerror or "not all of its files can be copied"
+        # `shutil.Error` lists many errors, and has no text of its own.
+        reason = error.strerror or "not all of its files could be copied"
         raise OutputError(f"Cannot copy {source} to {out}: {reason}.") from error
     return target
 
 
 def _free(out: Path, name: str) -> Path:
-    """The name, or the next one that nothing has."""
+    """Return the path with this name, or with the next free number."""
     if not (out / name).exists():
         return out / name
     stem, dash, number = name.rpartition("-")
     begun, start = (stem, int(number)) if dash and number.isdigit() else (name, 0)
-    for following in range(start + 1, _MOST):
+    for following in range(start + 1, _MAX_EPISODES):
         path = out / f"{begun}-{following:04d}"
         if not path.exists():
             return path
-    raise OutputError(f"{out} has too many episodes that are called as {name}.")
+    raise OutputError(f"{out} has too many episodes with names like {name}.")

@@ -1,4 +1,4 @@
-"""Draws an action into the picture that it was decided on."""
+"""Draw the action of a step below its picture."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
     "policy": (230, 159, 0),
     "program": (153, 153, 153),
 }
-"""Who drives, as red, green and blue: M. Okabe, K. Ito, "Color universal design", 2008."""
+"""Colour of each driver: M. Okabe, K. Ito, "Color universal design", 2008."""
 
-_WIDTH: Final = 480  # Pixels that a picture is brought to, at least.
-_BAR: Final = 14  # Height of the strip of one number, pixels.
-_PAPER: Final = (24, 28, 34)
+_WIDTH: Final = 480  # Minimum width, pixels.
+_BAR: Final = 14  # Height of one bar, pixels.
+_BACKGROUND: Final = (24, 28, 34)
 _MIDDLE: Final = (110, 118, 128)
 _WANTED: Final = (255, 255, 255)
 
 
 def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[np.uint8]:
-    """A picture with the action of its step below it, a bar for each number.
+    """Return a picture with the action of its step below it, one bar per value.
 
-    A bar begins at 0, or at the bound nearest to it: steering to the left is a bar to the left. Its
-    colour says who drives; a white line is what a policy wanted while somebody else drove.
+    A bar starts at 0, or at the bound nearest to 0: steering to the left is a bar to the left. Its
+    colour shows the driver; a white line shows what a policy wanted while somebody else drove.
 
     Args:
         picture: Shape (h, w, 3).
         step: The step.
-        layout: Of its action.
+        layout: Layout of its action.
 
     Returns:
-        Shape (H, W, 3); W is at least 480, and both are even, as films need it.
+        Shape (H, W, 3) with W at least 480; both sizes are even, as video codecs require.
     """
     times = max(1, math.ceil(_WIDTH / picture.shape[1]))
     large = picture.repeat(times, axis=0).repeat(times, axis=1)
@@ -63,12 +63,16 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
 
 
 def blank(size: tuple[int, int]) -> NDArray[np.uint8]:
-    """A picture of nothing, for episodes without a camera; width and height in pixels."""
-    return np.full((size[1], size[0], 3), _PAPER, np.uint8)
+    """Return an empty picture, for episodes without a camera.
+
+    Args:
+        size: Width and height in pixels.
+    """
+    return np.full((size[1], size[0], 3), _BACKGROUND, np.uint8)
 
 
 def _bounds(layout: Layout, action: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Ends of the bars; where the layout has none, those of a number that is as large as it is."""
+    """Return the ends of the bars; for an unbounded value its magnitude, at least 1."""
     lows = [
         low if math.isfinite(low) else -max(1.0, abs(value))
         for low, value in zip(layout.low.tolist(), action, strict=True)
@@ -81,14 +85,14 @@ def _bounds(layout: Layout, action: Sequence[float]) -> tuple[list[float], list[
 
 
 def _share(value: float, low: float, high: float) -> float:
-    """Where a value lies between two bounds, from 0 to 1."""
+    """Return the position of a value between two bounds, from 0 to 1."""
     return 0.5 if not low < high else min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def _strip(
     width: int, value: float, zero: float, wanted: float | None, colour: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
-    strip = np.full((_BAR, width, 3), _PAPER, np.uint8)
+    strip = np.full((_BAR, width, 3), _BACKGROUND, np.uint8)
     last = width - 1
     from_, to = sorted((round(zero * last), round(value * last)))
     strip[2:-2, from_ : to + 1] = colour

@@ -1,4 +1,10 @@
-"""Records what happens in an env, one episode a reset."""
+"""Record episodes of any Gymnasium env, one per reset.
+
+Besides observations and actions, a step keeps what the env provides: in `info`, `captured_ns`,
+`decided_ns`, `action_applied`, `intervene_action`, `absent` (names of missing state values),
+`reward_terms`, `stop_reason`, `truncated_because` and `is_success`; on the unwrapped env,
+`newest_jpeg` (bytes of the picture as received), `record_clock` and `welcome`.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +18,15 @@ from typing import Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
-import simplejpeg
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader, EpisodeWriter, Step
-from shapechanger.errors import DemosError, MissingExtra, ShapechangerError
+from shapechanger.demos.jpeg import encode_picture, picture_size
+from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
 
 __all__ = ["QUALITY", "SPARE_BYTES", "RecordEpisodes", "Seen", "Sight"]
-
-try:
-    import simplejpeg
-except ImportError as error:
-    raise MissingExtra("simplejpeg", "data") from error
-
 
 _PICTURE_DIMENSIONS: Final = 3
 _CHANNELS: Final = 3
@@ -34,12 +34,12 @@ _CHANNELS: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What one observation is recorded as.
+    """An observation in the form in which it is recorded.
 
     Attributes:
-        jpeg: Its picture; None without one.
-        state: Its numbers; NaN where nothing measures one.
-        captured_ns: When it was taken, clock of the robot; None where nobody says.
+        jpeg: The picture; None without one.
+        state: The state; NaN where nothing measured a value.
+        captured_ns: Capture time on the robot's clock; None if unknown.
     """
 
     jpeg: bytes | None
@@ -48,25 +48,25 @@ class Seen:
 
 
 class Sight:
-    """Takes the observations of an env apart.
+    """Splits the observations of an env into a JPEG and a state.
 
     Args:
         env: Its observations are a picture, a state, or a Dict of `image` and `state`.
-        quality: Of pictures that the env gives as arrays, in percent; their colours are kept at
+        quality: JPEG quality in percent for pictures that the env returns as arrays; colours keep
             full resolution.
 
     Attributes:
-        action_layout: What the numbers of an action mean.
-        state_layout: What the numbers of a state mean; None without a state.
-        has_picture: Whether there are pictures.
+        action_layout: Meaning of the values of an action.
+        state_layout: Meaning of the values of a state; None without a state.
+        has_picture: Whether observations contain pictures.
 
     Raises:
-        DemosError: If it shows or takes something else, or does not say what that means.
+        DemosError: If the spaces are of another kind, or the env has no layouts.
     """
 
     def __init__(self, env: gym.Env[Any, Any], quality: int) -> None:
         if not 1 <= quality <= 100:  # Percent.
-            raise DemosError(f"The quality of a picture is 1 to 100 %, got {quality}.")
+            raise DemosError(f"quality must be from 1 to 100 percent, got {quality}.")
         self._env, self._quality = env, quality
         name = env.spec.id if env.spec else type(env.unwrapped).__name__
         space = env.observation_space
@@ -84,8 +84,9 @@ class Sight:
             or (state is not None and not _is_row(state))
         ):
             raise DemosError(
-                f"{name} shows {space}, and what can be recorded is a picture (bytes, height x "
-                "width x 3), a row of numbers, or a Dict of both as `image` and `state`."
+                f"{name} has the observation space {space}, which cannot be recorded: it must be a "
+                "picture (uint8, height x width x 3), a vector, or a Dict of both as `image` and "
+                "`state`."
             )
         self.has_picture, self._has_state = picture is not None, state is not None
         seen, self.action_layout = (_layout(env, name, s) for s in ("observation", "action"))
@@ -100,11 +101,16 @@ class Sight:
                 continue
             if not _is_row(part) or part.shape != (layout.size,):
                 raise DemosError(
-                    f"{name}: each {what} is {part}, and its layout has {layout.size} numbers."
+                    f"{name}: the {what} space is {part}, but its layout has {layout.size} values."
                 )
 
     def seen(self, observation: Any, info: Mapping[str, Any]) -> Seen:
-        """What an observation is recorded as."""
+        """Return an observation as it is recorded.
+
+        Args:
+            observation: Observation of the env.
+            info: The info that came with it.
+        """
         return Seen(
             self._jpeg(observation["image"] if self._is_dict else observation)
             if self.has_picture
@@ -115,11 +121,7 @@ class Sight:
 
     def _jpeg(self, picture: NDArray[np.uint8]) -> bytes:
         given: bytes | None = getattr(self._env.unwrapped, "newest_jpeg", None)
-        if given is not None:
-            return given
-        return simplejpeg.encode_jpeg(
-            np.ascontiguousarray(picture), quality=self._quality, colorsubsampling="444"
-        )
+        return given if given is not None else encode_picture(picture, self._quality)
 
     def _state(self, observation: Any, info: Mapping[str, Any]) -> tuple[float, ...]:
         given = observation["state"] if self._is_dict else observation
@@ -147,17 +149,17 @@ def _layout(env: gym.Env[Any, Any], name: str, side: str) -> Layout:
     layout = getattr(env.unwrapped, f"{side}_layout", None)
     if not isinstance(layout, Layout):
         raise DemosError(
-            f"{name} publishes no {side}_layout, so nothing says what its numbers mean: add it to "
-            "the env, as a `shapechanger.Layout`."
+            f"{name} has no {side}_layout, so the meaning of its values is unknown: add it to the "
+            "env, as a `shapechanger.Layout`."
         )
     return layout
 
 
 QUALITY: Final = 95
-"""Of pictures that an env gives as arrays, in percent."""
+"""JPEG quality in percent for pictures that an env returns as arrays."""
 
 SPARE_BYTES: Final = 64 << 20
-"""How much of the disk stays free."""
+"""Disk space to leave free."""
 
 _COLLISION: Final = "reward_collision"
 _SECRET: Final = frozenset({"key"})
@@ -165,7 +167,7 @@ _SECRET: Final = frozenset({"key"})
 
 
 class _Decision(NamedTuple):
-    """What was decided where it is not what is carried out."""
+    """The decision for the next step, where it differs from what is carried out."""
 
     action: tuple[float, ...]
     driver: Driver
@@ -173,32 +175,32 @@ class _Decision(NamedTuple):
 
 
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
-    """Records what is seen and done in an env.
+    """Wrapper that records what is observed and done in an env.
 
-    A step holds what was seen, the action that was decided on seeing it, and what came of that.
-    Where a person intervened (`info["intervene_action"]`), the person's action is the one that
-    counts, and what was passed to `step` is what a policy wanted. What else is kept where the env
-    gives it is listed in `shapechanger.demos.recording`.
+    A step holds an observation, the action decided for it, and the outcome. Where a person
+    intervened (`info["intervene_action"]`), the person's action is recorded as decided, and the
+    action passed to `step` as what a policy wanted.
 
-    When nothing can be written any more the env is brought to rest by one step of the action that
-    moves nothing, and `step` raises what went wrong; what was written before is whole.
+    If a step cannot be written, the wrapper stops the env with one action that moves nothing, and
+    `step` raises the error; everything written before is complete.
 
     Args:
-        env: Shows a picture, a state, or a Dict of `image` and `state`; has layouts.
-        recording: Folder of the recording; made where it is missing.
-        driver: Who decides what is passed to `step`.
-        about: More fields of the header, such as `robot`, `body`, `source` and `notes`.
-        quality: Of pictures that the env gives as arrays, in percent.
-        spare_bytes: How much of the disk stays free.
+        env: Its observations are a picture, a state, or a Dict of `image` and `state`; it has
+            layouts.
+        recording: Folder of the recording; created if missing.
+        driver: Who decides the actions passed to `step`.
+        about: Further fields of the header, such as `robot`, `body`, `source` and `notes`.
+        quality: JPEG quality in percent for pictures that the env returns as arrays.
+        spare_bytes: Disk space to leave free.
 
     Attributes:
         path: Folder of the newest episode; None before the first.
-        steps: How many steps were written, of all episodes.
-        episodes: How many episodes were begun.
-        outcome: How the newest episode that is over ended.
+        steps: Number of steps written, over all episodes.
+        episodes: Number of episodes begun.
+        outcome: Outcome of the newest closed episode.
 
     Raises:
-        DemosError: If the env shows or takes what cannot be recorded.
+        DemosError: If the env's observations or actions cannot be recorded.
     """
 
     def __init__(
@@ -228,7 +230,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
 
     @property
     def control_hz(self) -> float:
-        """Steps a second."""
+        """Steps per second."""
         return float(self.env.metadata.get("render_fps") or 20.0)
 
     def decide(
@@ -237,10 +239,10 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         driver: Driver,
         wanted: Sequence[float] | NDArray[Any] | None = None,
     ) -> None:
-        """Say what was decided for the next step, where it is not what is passed to `step`.
+        """Set the decision for the next step, where it differs from the action passed to `step`.
 
         Args:
-            action: What was meant, and is to be learned.
+            action: The intended action, which is to be learned.
             driver: Who decided it.
             wanted: What a policy wanted while somebody else drives.
         """
@@ -250,7 +252,12 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; one that is still open is closed. It is on disk from its first step."""
+        """Begin an episode, which is created on disk with its first step; close the previous one.
+
+        Args:
+            seed: As in `gymnasium.Env.reset`.
+            options: As in `gymnasium.Env.reset`.
+        """
         self.end()
         observation, info = super().reset(seed=seed, options=options)
         self._seen = self._sight.seen(observation, info)
@@ -263,14 +270,14 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """Do a step, and record it.
 
         Raises:
-            OutputError: If it cannot be written.
-            DemosError: If it cannot be recorded as it is, or somebody else records there.
+            OutputError: If the step cannot be written.
+            DemosError: If the step is invalid, or another process is recording to the folder.
             ResetNeeded: If the episode is over.
         """
         seen = self._seen
         if seen is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
-        # A folder that cannot be written to is found before anything moves.
+        # Before the step, so that an unwritable folder is found before anything moves.
         writer = self._writer or self._begin(seen)
         try:
             observation, reward, terminated, truncated, info = super().step(action)
@@ -294,26 +301,35 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         return observation, reward, terminated, truncated, info
 
     def mark(self, text: str = "") -> None:
-        """Mark the newest step.
+        """Mark the newest step, with free text.
 
         Raises:
-            DemosError: If there is none in this episode.
+            DemosError: If no episode is being recorded.
         """
         self._open().mark(text)
 
     def undo(self, seconds: float = 5.0) -> int:
-        """Drop the newest steps of this episode; how many.
+        """Exclude the newest steps of this episode.
+
+        Args:
+            seconds: How far to go back, s.
+
+        Returns:
+            Number of excluded steps.
 
         Raises:
-            DemosError: If there is no episode.
+            DemosError: If no episode is being recorded.
         """
         return self._open().undo(seconds)
 
     def end(self, outcome: str = "") -> None:
-        """Close the episode, if there is one; the env goes on, and is not recorded any more.
+        """Close the episode, if one is open; the env goes on unrecorded until the next reset.
+
+        Args:
+            outcome: How the episode ended; "" if unspecified.
 
         Raises:
-            OutputError: If that cannot be written; all steps are there all the same.
+            OutputError: If the header cannot be written; all steps are on disk all the same.
         """
         writer, self._writer = self._writer, None
         self._seen = self._jpeg = self._decision = None
@@ -322,7 +338,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             writer.close(outcome)
 
     def close(self) -> None:
-        """Close the env, and the episode."""
+        """Close the env and the episode."""
         try:
             super().close()
         finally:
@@ -343,14 +359,13 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         notes = dict(self._about.get("notes", {}))
         if "options" in self._begun:
             notes["reset_options"] = self._begun["options"]
-        # A robot on the network says what it is.
-        robot = getattr(inner, "welcome", None)
+        robot = getattr(inner, "welcome", None)  # Of a robot on the network.
         fields: dict[str, Any] = {
             "robot": getattr(robot, "robot", ""),
             "body": getattr(robot, "body", ""),
             "action_layout": self._sight.action_layout.to_json(),
             "state_layout": layout.to_json() if layout else "",
-            "image_size": _size(seen.jpeg),
+            "image_size": picture_size(seen.jpeg, "from the env") if seen.jpeg else None,
             "control_hz": self.control_hz,
             "env": spec.id if spec else "",
             "env_kwargs": _plain(_public(spec.kwargs)) if spec else {},
@@ -393,12 +408,12 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         )
 
     def _give_up(self, why: ShapechangerError, *, over: bool) -> None:
-        """Bring the env to rest, and let go of the episode, whatever else goes wrong."""
+        """Stop the env, and close the episode, even if either fails."""
         if not over:
             try:
                 super().step(_rest(self.env.action_space))
             except (ShapechangerError, gym.error.Error) as error:
-                why.add_note(f"The env could not be brought to rest either: {error}")
+                why.add_note(f"Stopping the env failed too: {error}")
         try:
             self.end("failed")
         except ShapechangerError as error:
@@ -406,7 +421,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
 
     def _open(self) -> EpisodeWriter:
         if self._writer is None:
-            raise DemosError("No episode is being recorded: it begins with the first step.")
+            raise DemosError("No episode is being recorded: one begins with the first step.")
         return self._writer
 
 
@@ -419,7 +434,7 @@ def _terms(info: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _outcome(terminated: bool, info: Mapping[str, Any]) -> str:
-    """How an episode ended, in a word or a sentence."""
+    """Return how an episode ended."""
     if not terminated:
         return str(info.get("truncated_because") or "time")
     if _terms(info).get(_COLLISION, 0.0) < 0.0:
@@ -428,16 +443,9 @@ def _outcome(terminated: bool, info: Mapping[str, Any]) -> str:
 
 
 def _rest(space: gym.Space[Any]) -> NDArray[np.float32]:
-    """The action that moves nothing: 0, or the bound nearest to it."""
+    """Return the action that moves nothing: 0, or the bound nearest to 0."""
     box = cast("gym.spaces.Box", space)
     return np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32)
-
-
-def _size(jpeg: bytes | None) -> tuple[int, int] | None:
-    if jpeg is None:
-        return None
-    height, width, *_ = simplejpeg.decode_jpeg_header(jpeg)
-    return int(width), int(height)
 
 
 def _public(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -445,5 +453,5 @@ def _public(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values as JSON can hold them; of what it cannot, what it looks like."""
+    """Return values as JSON can hold them; others as their `str`."""
     return cast("dict[str, Any]", json.loads(json.dumps(dict(values), default=str)))

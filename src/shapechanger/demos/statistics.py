@@ -1,4 +1,4 @@
-"""What is in a recording, in numbers."""
+"""Summaries of episodes, and distributions of their values."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ _COLLISION: Final = "reward_collision"
 
 @dataclass(frozen=True, slots=True)
 class EpisodeStatistics:
-    """What there is to say of an episode.
+    """Summary of an episode. "Kept" steps are those that were not dropped.
 
     Attributes:
         name: Name of its folder.
         what: Its env or robot.
-        created: When it began, ISO 8601 in UTC.
-        steps: How many steps there are.
-        kept: How many of them count.
-        seconds: How long those last, s.
-        drivers: How many of those each driver decided.
-        marks: How many marks were set.
-        reward: Sum of the rewards of those that have one; None if none has.
-        collisions: Steps of those that were punished for a collision.
-        stopped: Steps of those at which the robot did not do what it was told.
-        outcome: How it ended.
-        closed: Whether it was ended, and not cut off.
+        created: Start time, ISO 8601 in UTC.
+        steps: Number of all steps.
+        kept: Number of kept steps.
+        seconds: Duration of the kept steps, s.
+        drivers: Number of kept steps by driver.
+        marks: Number of marks.
+        reward: Sum of the rewards of the kept steps; None if none has a reward.
+        collisions: Kept steps with a collision penalty.
+        stopped: Kept steps at which the robot overrode the action.
+        outcome: How the episode ended.
+        closed: Whether the episode was closed properly.
     """
 
     name: str
@@ -54,7 +54,7 @@ class EpisodeStatistics:
 
 
 def summary(episode: Episode) -> EpisodeStatistics:
-    """An episode in a few numbers."""
+    """Summarise an episode."""
     header, kept = episode.header, episode.kept
     rewards = [step.reward for step in kept if step.reward is not None]
     return EpisodeStatistics(
@@ -75,48 +75,46 @@ def summary(episode: Episode) -> EpisodeStatistics:
 
 
 def _drivers(steps: Sequence[Step]) -> dict[Driver, int]:
-    """Who decided how many steps, whoever decided most first."""
+    """Count the steps by driver, most frequent first."""
     counts = {driver: sum(step.driver == driver for step in steps) for driver in DRIVERS}
     most = sorted(DRIVERS, key=lambda driver: -counts[driver])
     return {driver: counts[driver] for driver in most if counts[driver]}
 
 
 def gaps_s(episode: Episode) -> list[float]:
-    """Times from one step that counts to the next on the robot's clock, s.
+    """Return the times between consecutive kept steps on the robot's clock, s.
 
-    Left out are steps that do not say when they were, and those with others between them that do
-    not count.
+    Steps without a time, and pairs with dropped steps in between, are left out.
     """
     return [
         (at - before) / _NS_PER_S
         for one, two in pairwise(episode.kept)
         if two.index == one.index + 1
-        and (before := _at_ns(one)) is not None
-        and (at := _at_ns(two)) is not None
+        and (before := _time_ns(one)) is not None
+        and (at := _time_ns(two)) is not None
     ]
 
 
-def _at_ns(step: Step) -> int | None:
-    """When a step was."""
+def _time_ns(step: Step) -> int | None:
     return step.captured_ns if step.captured_ns is not None else step.decided_ns
 
 
 BINS: Final = 21
-"""An odd number, so that 0 has a bin of its own where the range is as wide on both sides."""
+"""Number of bins. It is odd, so that 0 has a bin of its own in a symmetric range."""
 
 
 @dataclass(frozen=True, slots=True)
 class Distribution:
-    """How some numbers are spread.
+    """Histogram and order statistics of a set of values.
 
     Attributes:
-        counts: How many are in each bin, the lowest first.
-        low: Where the first bin begins.
-        high: Where the last bin ends.
+        counts: Number of values in each bin, lowest first.
+        low: Lower edge of the first bin.
+        high: Upper edge of the last bin.
         median: The median.
-        least: The smallest number.
-        most: The largest number.
-        missing: How many were no numbers, and are counted nowhere else.
+        least: The smallest value.
+        most: The largest value.
+        missing: Number of NaN and infinite values, which are counted nowhere else.
     """
 
     counts: tuple[int, ...]
@@ -129,23 +127,24 @@ class Distribution:
 
     @property
     def total(self) -> int:
-        """How many numbers there are."""
+        """Number of finite values."""
         return sum(self.counts)
 
 
 def spread(
     values: Iterable[float], low: float = -math.inf, high: float = math.inf, bins: int = BINS
 ) -> Distribution | None:
-    """Count numbers in bins.
+    """Return the distribution of values.
 
     Args:
-        values: The numbers; NaN and infinite ones are counted as missing.
-        low: Where the first bin begins; that of the smallest number if there is no bound.
-        high: Where the last bin ends; as `low`. What is beyond counts in the outer bins.
-        bins: How many.
+        values: The values; NaN and infinities are counted as missing.
+        low: Lower edge of the first bin; the smallest value if infinite.
+        high: Upper edge of the last bin; the largest value if infinite. Values outside the range
+            are counted in the outer bins.
+        bins: Number of bins.
 
     Returns:
-        None if there is no number.
+        None if there is no finite value.
     """
     given = np.fromiter(values, np.float64)
     numbers = given[np.isfinite(given)]
@@ -154,7 +153,7 @@ def spread(
     least, most = float(numbers.min()), float(numbers.max())
     begin = low if math.isfinite(low) else least
     end = high if math.isfinite(high) else most
-    if not begin < end:  # All are alike.
+    if not begin < end:  # All values are equal.
         begin, end = begin - 0.5, begin + 0.5
     counts = np.histogram(np.clip(numbers, begin, end), bins, (begin, end))[0]
     return Distribution(

@@ -1,4 +1,4 @@
-"""Embodiment times task, as Gymnasium envs; importing this loads no simulator."""
+"""Gymnasium envs that join bodies and tasks; importing this package loads no simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Refusing actions that no env can take, before anything steps."""
+"""Check actions before anything steps."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from shapechanger.errors import BadAction
 from shapechanger.layout import Layout
 
-__all__ = ["ActionTaker", "check_action", "checked"]
+__all__ = ["NamedEnv", "check_action", "check_actions"]
 
-# Booleans, integers and floats.
-_NUMBERS = "biuf"
+# Kinds of NumPy dtypes: booleans, integers and floats; a batch refuses booleans, as Gymnasium.
+_NUMBERS: Final = "biuf"
+_BATCH_NUMBERS: Final = "iufc"
 
 
-class ActionTaker(Protocol):
-    """An env that names what its actions mean."""
+class NamedEnv(Protocol):
+    """An env that names the numbers of its actions."""
 
     action_layout: Layout
 
@@ -27,12 +28,15 @@ class ActionTaker(Protocol):
         ...
 
 
-def check_action(env: ActionTaker, action: Any) -> NDArray[Any]:
-    """The action as an array.
+def check_action(env: NamedEnv, action: Any) -> NDArray[Any]:
+    """Return an action as an array.
+
+    Args:
+        env: The env that takes it.
+        action: The action, of any dtype.
 
     Raises:
-        BadAction: If it is of another shape than the env's actions, or holds what is no finite
-            number; the message names the env.
+        BadAction: If it has another shape than the env's actions, or a number that is not finite.
     """
     try:
         array = np.asarray(action)
@@ -53,37 +57,32 @@ def check_action(env: ActionTaker, action: Any) -> NDArray[Any]:
     return array
 
 
-def _name(env: ActionTaker) -> str:
+def _name(env: NamedEnv) -> str:
     return type(env).__name__ if env.spec is None else str(env.spec.id)
 
 
-_ACTIONS_NUMBERS: Final = "iufc"  # Kinds of NumPy's types, as letters.
-
-
-def checked(
+def check_actions(
     actions: Any, num_envs: int, shape: tuple[int, ...], ignored: NDArray[np.bool_]
 ) -> NDArray[Any]:
-    """The actions as one array of their own precision.
+    """Return the actions of many envs as one array of their own dtype.
 
     Args:
         actions: One action per env.
         num_envs: How many envs there are.
-        shape: The shape of one action.
-        ignored: For each env whether its action does not count, as it is about to be reset.
+        shape: Shape of one action.
+        ignored: Whether the action of each env is ignored, because the env is about to be reset.
 
     Raises:
-        BadAction: If one has another shape, or numbers that are not finite.
+        BadAction: If one has another shape or a number that is not finite.
     """
     try:
         given = np.asarray(actions)
-        fits = given.shape == (num_envs, *shape)
     except ValueError:  # Rows of several lengths.
-        fits = False
-    if not fits:
-        _refuse_shape(actions, num_envs, shape)
-    given = np.asarray(actions)
-    if given.dtype.kind not in _ACTIONS_NUMBERS:
-        raise BadAction(f"Actions are numbers, not of the type {given.dtype}.")
+        given = None
+    if given is None or given.shape != (num_envs, *shape):
+        raise BadAction(_wrong_shape(actions, num_envs, shape))
+    if given.dtype.kind not in _BATCH_NUMBERS:
+        raise BadAction(f"Actions must be numbers, got {given.dtype}.")
     if not np.logical_and.reduce(np.isfinite(given), axis=None):
         rows = np.isfinite(given).reshape(num_envs, -1).all(axis=1)
         bad = np.flatnonzero(~rows & ~ignored)
@@ -94,23 +93,15 @@ def checked(
     return given
 
 
-def _refuse_shape(actions: Any, num_envs: int, shape: tuple[int, ...]) -> None:
-    """Say which action has another shape, or that there are not as many as envs.
-
-    Raises:
-        BadAction: Always.
-    """
+def _wrong_shape(actions: Any, num_envs: int, shape: tuple[int, ...]) -> str:
+    """Describe which action has another shape, or how many actions are missing."""
     try:
         count = len(actions)
     except TypeError:
-        raise BadAction(
-            f"Actions are one row per env, shape {(num_envs, *shape)}; this is {actions!r}."
-        ) from None
+        return f"Actions are one row per env, shape {(num_envs, *shape)}; this is {actions!r}."
     if count != num_envs:
-        raise BadAction(f"There are {num_envs} envs and {count} actions.")
+        return f"There are {num_envs} envs and {count} actions."
     for number, action in enumerate(actions):
         if np.shape(action) != shape:
-            raise BadAction(
-                f"The action of env {number} has shape {np.shape(action)}, not {shape}."
-            )
-    raise BadAction(f"Actions have the shape {(num_envs, *shape)}.")
+            return f"The action of env {number} has shape {np.shape(action)}, not {shape}."
+    return f"Actions have the shape {(num_envs, *shape)}."

@@ -1,4 +1,4 @@
-"""Ants: run forwards on whatever legs there are."""
+"""Ant envs: run forwards on any number and length of legs."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from shapechanger.layout import Feature
 
 __all__ = ["AntEnv", "ExtendedAntEnv"]
 
-# An ant this many times higher than it stands has been thrown up. The ceiling of Ant is then 0.98
-# m, where Gymnasium has 1.0, and that of BigAnt 1.80 m, where the 2017 release had 2.0.
+# An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
+# m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9
 
 _sum: Final = np.add.reduce
@@ -59,35 +59,36 @@ class _Ant(Binding):
         self.state_size = sum(view.size for view in self.observed)
         if env.contacts_observed:
             self.observed.append(self.clipped[1:].ravel())
-        self.healthy_z_range = env.healthy_z_range
-        self.after = [data.qpos, data.qvel, self.main_xy, data.cfrc_ext.ravel()]
+        self.healthy_z_range = np.array(env.healthy_z_range, np.float64)
+        # Joining memory is four times as fast as joining arrays of this size.
+        after = (data.qpos, data.qvel, self.main_xy, self.healthy_z_range, self.forces.ravel())
+        self.after = [memoryview(view) for view in after]
+        self._main_xy = memoryview(self.main_xy)
 
-    def remember(self) -> list[float]:
-        """Return the place of the main body, which a step needs from before the physics, m."""
-        return self.main_xy.tolist()
+    def remember(self) -> bytes:
+        """Return what `conclude` needs from before the physics: the place of the main body."""
+        return self._main_xy.tobytes()
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Gymnasium's `Ant-v5` with any body of the family of ants.
+    """Gymnasium's `Ant-v5` with any body of the ant family.
 
     Actions, observations, rewards and infos are those of `Ant-v5`; `observation_layout` and
-    `action_layout` name each number. Three things follow from the body:
+    `action_layout` name each number. Three things depend on the body:
 
-    - **Start pose**: the model's own, with each joint moved a tenth of its range inside its limits,
-      and the torso no lower than the feet need. Noise is drawn as in `Ant-v5`; joints stay inside
-      their limits and feet above the floor.
+    - **Start pose**: the model's own, with each joint at least a tenth of its range inside its
+      limits, and the torso high enough for the feet. Noise is drawn as in `Ant-v5`; joints stay
+      inside their limits and feet above the floor.
     - **Healthy range**: an ant is unhealthy when its torso's up axis points down, when it is higher
-      than 1.9 times its own standing height, or when its state is not finite. A fixed lower height
-      cannot tell a flipped ant, which rests at 0.27 m, from one that lies down.
-    - **Spaces**: an ant with more joints has more numbers.
+      than 1.9 times its own standing height, or when its state is not finite. A lower limit could
+      not distinguish a flipped ant, which rests at 0.27 m, from one that lies down.
+    - **Spaces**: an ant with more joints has larger spaces.
 
     Args:
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Heights of the torso between which the ant is healthy, m; None derives the
             upper one from the body and sets no lower one.
-        fast_model: Whether a model that moves to the last bit like the body's, and costs less, may
-            step it, and MuJoCo measures no times (`data.timer`) meanwhile.
-        **arguments: All arguments of `Ant-v5`.
+        **arguments: All arguments of `Ant-v5`, and those of `Reshapable`.
     """
 
     family = ANT
@@ -101,19 +102,19 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         self,
         body: BodyLike = "Ant",
         healthy_z_range: tuple[float, float] | None = None,
-        fast_model: bool = True,
         **arguments: Any,
     ) -> None:
-        self.fast_model = fast_model
         self._given_z_range = healthy_z_range
         self.contacts_observed = arguments.get("include_cfrc_ext_in_observation", True)
         self.place_hidden = arguments.get("exclude_current_positions_from_observation", True)
         self._force_range = arguments.get("contact_force_range", (-1.0, 1.0))
+        if healthy_z_range is not None:
+            arguments["healthy_z_range"] = healthy_z_range
         self._begin(body, arguments)
         cast("Any", GymnasiumAntEnv).__init__(
-            self, healthy_z_range=healthy_z_range or (-math.inf, math.inf), **arguments
+            self, **{"healthy_z_range": (-math.inf, math.inf), **arguments}
         )
-        self._finish({"healthy_z_range": healthy_z_range, "fast_model": fast_model, **arguments})
+        self._finish(arguments)
 
     def _follow_body(self) -> None:
         super()._follow_body()
@@ -124,7 +125,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     @property
     def main_body(self) -> int | str:
-        """The body whose velocity is rewarded."""
+        """The body whose velocity is rewarded, by number or name."""
         return self._main_body
 
     def _bind(self, watch: ModelWatch) -> _Ant:
@@ -138,7 +139,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(action), axis=None)
         if not math.isfinite(ctrl_cost):
             check_action(self, action)
-        x_before, y_before = bound.remember()
+        x_before, y_before = bound.main_xy.tolist()
         bound.ctrl[:] = action
         with bound.timer:
             bound.move()
@@ -217,7 +218,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     def _kind_of(self, bound: _Ant) -> str:
         if self.render_mode == "human":
             return ""
-        bound.healthy_z_range = self._healthy_z_range
+        bound.healthy_z_range[:] = self._healthy_z_range
         # Numbers of other types give results of other types; their representations differ too.
         return sys.intern(
             repr(
@@ -232,25 +233,30 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         )
 
     def conclude(
-        self, bounds: Sequence[_Ant], before: Sequence[Any], actions: NDArray[Any]
+        self,
+        bounds: Sequence[_Ant],
+        before: Sequence[bytes],
+        actions: NDArray[Any],
+        out: NDArray[np.float64] | None,
     ) -> Outcomes:
         """Compute observations, rewards, ends and infos of ants of this kind, all at once."""
-        n, nq = len(bounds), self._bound.qpos.size
-        size = nq + self._bound.qvel.size
-        after = np.concatenate([view for bound in bounds for view in bound.after]).reshape(n, -1)
-        place, state = after[:, :2], after[:, :size]
-        main_xy, forces = after[:, size : size + 2], after[:, size + 2 :]
-        low, high = np.array([bound.healthy_z_range for bound in bounds]).T
-        warnings = np.concatenate([bound.warnings for bound in bounds]).reshape(n, -1)
+        n, one = len(bounds), self._bound
+        size = one.qpos.size + one.qvel.size
+        memory = b"".join([view for bound in bounds for view in bound.after])
+        after = np.frombuffer(memory).reshape(n, -1)
+        place, state, forces = after[:, :2], after[:, :size], after[:, size + 4 :]
+        main_xy, low, high = after[:, size : size + 2], after[:, size + 2], after[:, size + 3]
+        main_xy_before = np.frombuffer(b"".join(before)).reshape(n, 2)
+        warnings = np.concatenate([bound.warnings for bound in bounds])
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(actions, order="C"), axis=1)
         clipped = forces.clip(*self._contact_force_range)
         observed = [state[:, 2:] if self.place_hidden else state]
         if self.contacts_observed:
-            observed.append(clipped[:, self._bound.forces.shape[1] :])
-        observations = np.concatenate(observed, axis=1)
+            observed.append(clipped[:, one.forces.shape[1] :])
+        observations = np.concatenate(observed, axis=1, out=out)
         contact_cost = self._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # As with Python's own numbers.
-            velocity = (main_xy - np.array(before)) / self._bound.dt
+            velocity = (main_xy - main_xy_before) / one.dt
             upright = _is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
             # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.
             distance = np.sqrt(np.vecdot(place, place))
@@ -266,7 +272,9 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             healthy,
         )
         terminated = ~healthy & bool(self._terminate_when_unhealthy)
-        diverged = np.flatnonzero(warnings.any(axis=1)).tolist() if warnings.any() else ()
+        diverged: Sequence[int] = ()
+        if warnings.any():
+            diverged = np.flatnonzero(warnings.reshape(n, -1).any(axis=1)).tolist()
         return Outcomes(observations, rewards, terminated, infos, diverged)
 
     def _observation_features(self, model: Any) -> list[Feature]:
@@ -283,13 +291,13 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     @property
     def up(self) -> float:
-        """How far the torso's up axis points up: 1 upright, 0 on its side, -1 upside down."""
+        """Vertical part of the torso's up axis: 1 upright, 0 on its side, -1 upside down."""
         x, y = self.data.qpos[4:6]
         return float(1.0 - 2.0 * (x * x + y * y))
 
     @property
     def is_healthy(self) -> bool:
-        """Whether the state is finite, the torso upright and not higher than it should be."""
+        """Whether the state is finite, and the torso upright and within its healthy heights."""
         return bool(super().is_healthy) and self.up > 0.0
 
 
@@ -310,12 +318,12 @@ def _is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
 
 
 class ExtendedAntEnv(AntEnv):
-    """The ant with a third segment on each leg, so that both its spaces differ from the ant's.
+    """The ant with a third segment on each leg, which makes both spaces larger than the ant's.
 
     Args:
         body: As in `AntEnv`; None for the extended ant.
-        actuated_extension: Whether the third segments have motors of their own, 12 in all; the 2017
-            release had none there, 8 in all.
+        actuated_extension: Whether the third segments have motors of their own, which makes 12; the
+            2017 release had 8.
         **arguments: All arguments of `AntEnv`.
     """
 

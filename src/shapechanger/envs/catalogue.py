@@ -1,4 +1,4 @@
-"""The ids of all envs, registered without loading a simulator."""
+"""Ids of all envs, registered without importing a simulator."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ __all__ = [
 NAMESPACE: Final = "shapechanger"
 
 REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
-"""Id of the env of a finger on a rig, which has the layout of `Finger-v1`."""
+"""Id of the env of a finger on a rig, with the layouts of `Finger-v1`."""
 
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
-"""Id of the env of a robot on the network; its body is whatever answers, so it is no `CatalogueEntry`."""
+"""Id of the env of a robot on the network, whose body is unknown until the robot answers."""
 
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
@@ -42,17 +42,17 @@ VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
     }
 )
-"""Vehicle and summary by id: one task, of which no body is a variant of another."""
+"""Vehicle and summary by id; all have the same task, and their bodies form no family."""
 
 
 class TaskEntry(msgspec.Struct, frozen=True):
-    """An env whose body is no family's.
+    """An env whose body does not belong to a family.
 
     Attributes:
-        entry_point: Where its class is.
-        summary: What it is, in a line.
-        learner: Name of the learner whose settings were tuned on it.
-        episode_steps: After how many steps an episode is truncated.
+        entry_point: Module and class.
+        summary: One-line description.
+        learner: Name of the learner settings tuned on it.
+        episode_steps: Steps after which an episode is truncated.
     """
 
     entry_point: str
@@ -77,19 +77,19 @@ FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
         ),
     }
 )
-"""The envs of the finger by id."""
+"""Envs of the finger by id."""
 
 
 class CatalogueEntry(msgspec.Struct, frozen=True):
-    """One env of the catalogue.
+    """An env whose body belongs to a family.
 
     Attributes:
         name: Its name; the id is `shapechanger/NAME-v1`.
-        family: Name of the family that its body belongs to.
-        summary: What it is, in a line.
-        entry_point: Where its class is.
-        learner: Name of the learner whose settings were tuned on the family.
-        body: Name of its body, handed to the class; empty where the class knows it.
+        family: Name of its body's family.
+        summary: One-line description.
+        entry_point: Module and class.
+        learner: Name of the learner settings tuned on the family.
+        body: Name of its body, passed to the class; empty for the default of the class.
         reward_threshold: Return that counts as solved.
     """
 
@@ -103,7 +103,7 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
 
     @property
     def id(self) -> str:
-        """The id to make it with."""
+        """The registered id."""
         return f"{NAMESPACE}/{self.name}-v1"
 
 
@@ -196,7 +196,7 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
 }
 
 _EPISODE_STEPS: Final = 1000
-# The families whose step is our own; Gymnasium's wrappers would cost them time in every step.
+# Families with a fast step of their own, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
@@ -210,7 +210,7 @@ def register_all() -> None:
                 reward_threshold=entry.reward_threshold,
                 max_episode_steps=_EPISODE_STEPS,
                 vector_entry_point=f"shapechanger.envs.vector.entry_points:{entry.name}",
-                # Their own step refuses to begin before a reset, and the tests check them.
+                # Their own step requires a reset, and the tests check the envs.
                 order_enforce=entry.family not in _TUNED,
                 disable_env_checker=entry.family in _TUNED,
                 kwargs={"body": entry.body} if entry.body else {},
@@ -233,18 +233,18 @@ def register_all() -> None:
             REMOTE_FINGER,
             "shapechanger.envs.remote.finger:RemoteFingerEnv",
             max_episode_steps=FINGER_ENVS["shapechanger/Finger-v1"].episode_steps,
-            nondeterministic=True,  # As with every robot.
+            nondeterministic=True,  # A robot.
         )
     if REMOTE_VEHICLE not in gym.registry:
         gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
             REMOTE_VEHICLE,
             "shapechanger.envs.remote.vehicle:RemoteVehicleEnv",
-            nondeterministic=True,  # A seed cannot tell a real robot where to stand.
+            nondeterministic=True,  # A robot.
         )
 
 
 def find(env_id: str) -> CatalogueEntry:
-    """The entry of an id; its name alone, such as `BigAnt`, will do.
+    """Return the entry of an id, or of a name such as `BigAnt`.
 
     Raises:
         UnknownName: If there is none.
@@ -259,7 +259,7 @@ def find(env_id: str) -> CatalogueEntry:
 
 
 def find_task(env_id: str) -> str | None:
-    """The id of an env of no family, such as `Car` or `Finger`; None if it is none of these."""
+    """Return the id of an env without a family, such as `Car` or `Finger`; None for others."""
     full = f"{NAMESPACE}/{_name(env_id)}-v1"
     known = full in VEHICLE_ENVS or full in FINGER_ENVS or full == REMOTE_FINGER
     return full if known else None

@@ -1,4 +1,4 @@
-"""Names, units and ranges for the blocks that MuJoCo observations and actions are made of."""
+"""Names, units and ranges of the blocks of MuJoCo observations and actions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 
 
 def position_features(model: mujoco.MjModel) -> list[Feature]:
-    """A feature for each number of qpos.
+    """Return a feature for each number of qpos.
 
     `joint/angle` or `joint/position` for a hinge or slide; `body/x` ... `body/qz` for a free joint:
     place in the world, m, and orientation as a unit quaternion. Limits of joints are soft: contact
@@ -51,14 +51,14 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Feature]:
-    """A feature for each number of qvel.
+    """Return a feature for each number of qvel.
 
     `joint/velocity` for a hinge or slide; `body/vx` ... `body/wz` for a free joint: velocity in the
     world's frame, m/s, and angular velocity in the body's, rad/s.
 
     Args:
         model: The model.
-        limit: Where the numbers are clipped, on both sides of 0.
+        limit: Absolute value at which the numbers are clipped.
     """
     features: list[Feature] = []
     for j in range(model.njnt):
@@ -79,12 +79,12 @@ def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Fe
 
 
 def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Feature]:
-    """Six features for each body but the world: the clipped `cfrc_ext`, torque before force.
+    """Return six features per body except the world: clipped `cfrc_ext`, torque before force.
 
     Args:
         model: The model.
-        low: Where the numbers are clipped below, N and N·m.
-        high: Where they are clipped above.
+        low: Lower clipping limit, N and N·m.
+        high: Upper clipping limit, N and N·m.
     """
     features: list[Feature] = []
     for b in range(1, model.nbody):
@@ -99,7 +99,7 @@ def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Fea
 
 
 def inertia_features(model: mujoco.MjModel) -> list[Feature]:
-    """Ten features for each body but the world: MuJoCo's `cinert`, in the axes of the world.
+    """Return ten features per body except the world: MuJoCo's `cinert`, in world axes.
 
     `body/inertia/xx` ... `yz`, its inertia about the centre of mass of the whole, kg·m²; `mx` to
     `mz`, its mass times its distance from there, kg·m; and `mass`, kg.
@@ -110,17 +110,17 @@ def inertia_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def twist_features(model: mujoco.MjModel) -> list[Feature]:
-    """Six features for each body but the world: MuJoCo's `cvel`, in the axes of the world.
+    """Return six features per body except the world: MuJoCo's `cvel`, in world axes.
 
-    `body/twist/wx` ... `wz`, its angular velocity, rad/s, and `vx` ... `vz`, the velocity of what
-    turns with it at the centre of mass of the whole, m/s.
+    `body/twist/wx` ... `wz`, its angular velocity, rad/s, and `vx` ... `vz`, the velocity at the
+    centre of mass of the whole of a point fixed to it, m/s.
     """
     quantities = {"wx": "rad/s", "wy": "rad/s", "wz": "rad/s"}
     return _of_each_body(model, "twist", quantities | {"vx": "m/s", "vy": "m/s", "vz": "m/s"})
 
 
 def drive_features(model: mujoco.MjModel) -> list[Feature]:
-    """A feature `joint/drive` for each hinge and slide: what the motors do there, N·m or N."""
+    """Return a feature `joint/drive` per hinge and slide: the motors' torque or force, N·m or N."""
     features: list[Feature] = []
     for j in range(model.njnt):
         kind = _J(model.jnt_type[j])
@@ -132,7 +132,7 @@ def drive_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def action_layout(model: mujoco.MjModel) -> Layout:
-    """A feature `actuator/motor` for each control, with its gear as gain."""
+    """Return a feature `actuator/motor` per control, with its gear as gain."""
     features: list[Feature] = []
     for a in range(model.nu):
         name = model.actuator(a).name
@@ -164,7 +164,13 @@ def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:
 def _of_each_body(
     model: mujoco.MjModel, block: str, quantities: Mapping[str, str]
 ) -> list[Feature]:
-    """A feature `body/block/quantity`, in its unit, for each body but the world."""
+    """Return a feature `body/block/quantity` per quantity of each body except the world.
+
+    Args:
+        model: The model.
+        block: Name of the block.
+        quantities: Unit of each quantity by name.
+    """
     names = [model.body(b).name for b in range(1, model.nbody)]
     return [
         Feature(f"{name}/{block}/{quantity}", unit, element=Element("body", name))

@@ -1,4 +1,4 @@
-"""Inverted pendulums: keep the pole up by pushing the cart."""
+"""Inverted pendulums and double pendulums: keep the poles up by pushing the cart."""
 
 from __future__ import annotations
 
@@ -9,31 +9,39 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.families import DOUBLE_PENDULUM, PENDULUM, BodyLike
-from shapechanger.envs.actions import check_action
-from shapechanger.envs.layouts import position_features, velocity_features
-from shapechanger.envs.reshapable import Reshapable
-from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
-from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.errors import MissingExtra, MorphologyError
-from shapechanger.layout import Element, Feature
-from shapechanger.morphology import compile_body
-
-__all__ = ["InvertedDoublePendulumEnv", "InvertedPendulumEnv"]
 
 try:
     import mujoco
+    from gymnasium.envs.mujoco.inverted_double_pendulum_v5 import (
+        InvertedDoublePendulumEnv as GymnasiumInvertedDoublePendulumEnv,
+    )
     from gymnasium.envs.mujoco.inverted_pendulum_v5 import (
         InvertedPendulumEnv as GymnasiumInvertedPendulumEnv,
     )
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
+from shapechanger.bodies.families import DOUBLE_PENDULUM, PENDULUM, BodyLike
+from shapechanger.envs.actions import check_action
+from shapechanger.envs.layouts import position_features, velocity_features
+from shapechanger.envs.reshapable import Reshapable
+from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
+from shapechanger.envs.stepping.watch import ModelWatch
+from shapechanger.layout import Element, Feature
+from shapechanger.morphology import compile_body
+
+__all__ = ["InvertedDoublePendulumEnv", "InvertedPendulumEnv"]
 
 _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
+_CART_AND_POLES: Final = (*_CART_AND_POLE, int(mujoco.mjtJoint.mjJNT_HINGE))
 
-# The lean at which Gymnasium ends an episode.
+# The lean at which Gymnasium ends an episode of the single pendulum.
 _FALLEN_RAD: Final = 0.2
+# The tip's height at which Gymnasium ends an episode of the unedited double pendulum, m.
+_FALLEN_M: Final = 1.0
+# Where Gymnasium clips the double pendulum's velocities, m/s and rad/s, and the cart's force, N.
+_CLIPPED_AT: Final = 10.0
 
 
 class _Pendulum(Binding):
@@ -47,7 +55,7 @@ class _Pendulum(Binding):
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     TunedStep, GymnasiumInvertedPendulumEnv
 ):
-    """Gymnasium's `InvertedPendulum-v5` with any body of the family of pendulums.
+    """Gymnasium's `InvertedPendulum-v5` with any body of the pendulum family.
 
     Actions, observations, rewards, infos and the start are those of `InvertedPendulum-v5`;
     `observation_layout` and `action_layout` name each number. An episode ends when the pole leans
@@ -55,21 +63,16 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
 
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
-        fast_model: Whether a model that moves to the last bit like the body's, and costs less, may
-            step it, and MuJoCo measures no times (`data.timer`) meanwhile.
-        **arguments: All arguments of `InvertedPendulum-v5`.
+        **arguments: All arguments of `InvertedPendulum-v5`, and those of `Reshapable`.
     """
 
     family = PENDULUM
     replaced = ("do_simulation", "_step_mujoco_simulation", "_get_obs")
 
-    def __init__(
-        self, body: BodyLike = "InvertedPendulum", fast_model: bool = True, **arguments: Any
-    ) -> None:
-        self.fast_model = fast_model
+    def __init__(self, body: BodyLike = "InvertedPendulum", **arguments: Any) -> None:
         self._begin(body, arguments)
         cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
-        self._finish({"fast_model": fast_model, **arguments})
+        self._finish(arguments)
 
     def _bind(self, watch: ModelWatch) -> _Pendulum:
         return _Pendulum(watch, self)
@@ -110,40 +113,20 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
 InvertedPendulumEnv.tuned = InvertedPendulumEnv
 
 
-try:
-    import mujoco
-    from gymnasium.envs.mujoco.inverted_double_pendulum_v5 import (
-        InvertedDoublePendulumEnv as GymnasiumInvertedDoublePendulumEnv,
-    )
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
-
-
-# Where Gymnasium clips the velocities, m/s and rad/s, and the force on the cart, N.
-_CLIPPED_AT: Final = 10.0
-# The poles have fallen when their tip is no higher than this, m, on the model as it is.
-_FALLEN_M: Final = 1.0
-_JOINTS: Final = (
-    mujoco.mjtJoint.mjJNT_SLIDE,
-    mujoco.mjtJoint.mjJNT_HINGE,
-    mujoco.mjtJoint.mjJNT_HINGE,
-)
-
-
 class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Reshapable, GymnasiumInvertedDoublePendulumEnv
 ):
-    """Gymnasium's `InvertedDoublePendulum-v5` with any body that edits make of it.
+    """Gymnasium's `InvertedDoublePendulum-v5` with an editable body.
 
     Actions, observations, rewards, infos and the start are those of `InvertedDoublePendulum-v5`;
-    `observation_layout` and `action_layout` name each number. Reward and end read the height of the
-    poles' tip in parts of their length: Gymnasium's 1 m, of poles that reach up 1.2 m, is 2 m for
-    poles twice as long.
+    `observation_layout` and `action_layout` name each number. Reward and end use the tip's
+    height relative to the poles' length: Gymnasium's limit of 1 m for poles of 1.2 m becomes 2 m
+    for poles twice as long.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON. It
-            has two hinges, as the observation and the reward count on them.
-        **arguments: All arguments of `InvertedDoublePendulum-v5`.
+            must keep two hinges, which the observation and the reward rely on.
+        **arguments: All arguments of `InvertedDoublePendulum-v5`, and those of `Reshapable`.
     """
 
     family = DOUBLE_PENDULUM
@@ -157,7 +140,9 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         super()._follow_body()
         self._fallen = False
         self._foot_m, self._length_m = _foot_and_length(self.model)
-        plain = compile_body(self.family.load(self.fullpath), ())
+        plain = self.model
+        if self.body:
+            plain = compile_body(self.family.load(self.fullpath), ())
         self._plain_foot_m, self._plain_length_m = _foot_and_length(plain)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
@@ -177,17 +162,17 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         ]
 
     def step(self, action: Any) -> Any:
-        """One step of Gymnasium's env, with the end that fits the length of the poles."""
+        """Take one step, and end the episode at the height that fits the length of the poles."""
         observation, reward, _, truncated, info = cast("Any", super()).step(action)
         return observation, reward, self._fallen, truncated, info
 
     def _get_rew(self, x: float, y: float, terminated: bool) -> tuple[float, dict[str, float]]:
-        """Gymnasium's reward for poles of any length.
+        """Return Gymnasium's reward for poles of any length.
 
         Args:
-            x: Where the tip is along the rail, m.
-            y: How high it is, m.
-            terminated: What Gymnasium makes of that height, which does not know the length.
+            x: Place of the tip along the rail, m.
+            y: Height of the tip, m.
+            terminated: Whether the episode would end at that height for poles of the usual length.
         """
         part = (y - self._foot_m) * (self._plain_length_m / self._length_m)
         height = part + self._plain_foot_m
@@ -196,12 +181,12 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
 
 
 def _foot_and_length(model: mujoco.MjModel) -> tuple[float, float]:
-    """How high the first pole's hinge is, and how far above it the tip when both are upright, m.
+    """Return the height of the first hinge, and of the tip above it with both poles upright, m.
 
     Raises:
-        MorphologyError: If the model is no double pendulum.
+        MorphologyError: If the model is not a double pendulum.
     """
-    if tuple(model.jnt_type) == tuple(int(kind) for kind in _JOINTS) and model.nsite > 0:
+    if tuple(model.jnt_type) == _CART_AND_POLES and model.nsite > 0:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         foot = float(data.xanchor[1, 2])

@@ -1,4 +1,4 @@
-"""Gymnasium's renderer, with others drawing in the same process."""
+"""Render MuJoCo models: Gymnasium's renderer made safe for several envs, and still images."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from shapechanger.headless import choose_gl, require_context
 
 __all__ = ["Renderer", "body_reach", "draw", "halve_textures"]
 
-# Frames with at most this many pixels are for cameras that learn rather than for people.
+# Frames of at most this many pixels are camera observations rather than films.
 _MOST_CAMERA_PIXELS: Final = 256 * 256
-# What is drawn once more for each light and each mirror.
+# Effects that render the scene again for each light and each mirror.
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 
 
 class Renderer(MujocoRenderer):
-    """A renderer that touches what it drew itself, and nothing else.
+    """Renderer that is independent of other renderers in the process.
 
-    OpenGL draws into, and deletes from, whichever context is current. Gymnasium makes a context
-    current only when it is new: with two of them one draws black frames, and closing one deletes
-    the textures of the other. It also shuts GLFW down, and all windows with it. And its free camera
-    stays where it is while the robot runs out of the picture.
+    OpenGL draws into and deletes from the current context. Gymnasium makes a context current only
+    when it is new, so of two envs one renders black frames, and closing one deletes the textures of
+    the other. It also terminates GLFW, and all windows with it. And its free camera does not follow
+    the robot.
 
-    Without a graphics card, shadows, reflections and smoothed edges take nearly all of the time
-    that a small frame takes; a window always has them.
+    Without a GPU, shadows, reflections and smoothed edges take nearly all of the time of a small
+    frame; a window always has them.
 
     Args:
         *arguments: As Gymnasium's renderer.
         shadows: Whether frames have shadows, reflections and smoothed edges; None draws them in
             frames of more than 256 x 256 pixels.
-        follow: Number of the body that a free camera follows; None for a camera that stays.
+        follow: Number of the body that a free camera follows; None for a fixed camera.
         **more: As Gymnasium's renderer.
     """
 
@@ -57,11 +57,11 @@ class Renderer(MujocoRenderer):
         self._follow = follow
         pixels = (self.width or 0) * (self.height or 0)
         self._plain = pixels <= _MOST_CAMERA_PIXELS if shadows is None else not shadows
-        # An env that is dropped without being closed must not take the pictures of another along.
+        # An env that is garbage-collected unclosed must not delete the contexts of another.
         weakref.finalize(self, _free, self._viewers).atexit = False
 
     def render(self, render_mode: str | None) -> Any:
-        """A frame of `render_mode`, as Gymnasium's renderer draws it.
+        """Return a frame of `render_mode`, as Gymnasium's renderer does.
 
         Raises:
             RenderError: If nothing can be drawn here.
@@ -95,13 +95,13 @@ class Renderer(MujocoRenderer):
 
 @functools.cache
 def _require_context_once() -> None:
-    """Refuse where no context opens; asked once, because what opens once opens again."""
+    """Require that an OpenGL context opens; checked once per process."""
     require_context()
 
 
 @contextmanager
 def _small_buffers(model: mujoco.MjModel) -> Generator[None]:
-    """Let a context that is made meanwhile have no samples to smooth and no maps of shadows."""
+    """Create contexts without multisampling and shadow maps inside this block."""
     quality = model.vis.quality
     before = quality.offsamples, quality.shadowsize
     quality.offsamples = quality.shadowsize = 0
@@ -112,7 +112,7 @@ def _small_buffers(model: mujoco.MjModel) -> Generator[None]:
 
 
 def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
-    """Free each viewer's part of OpenGL, and then its context."""
+    """Free the OpenGL resources and then the context of each viewer."""
     while viewers:
         _, viewer = viewers.popitem()
         viewer.make_context_current()
@@ -122,20 +122,20 @@ def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
 
 _AZIMUTH_DEG: Final = 105.0
 _ELEVATION_DEG: Final = -25.0
-# With MuJoCo's default angle of view, 45 degrees, a ball of radius 1 fills the height at 2.6; the
+# At MuJoCo's default field of view, 45 degrees, a sphere of radius 1 fills the height at 2.6; the
 # rest is margin.
 _DISTANCE_PER_REACH: Final = 3.0
-# A model without lamps is lit by the camera's own, which is dim by default.
+# Brightness of the headlight for models without lights; its default is dim.
 _HEADLIGHT: Final = 0.5
-# Where the depth buffer, from 0 to 1, holds nothing.
+# Value of the depth buffer, from 0 to 1, where nothing was drawn.
 _FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
-# Pixels; graphics cards draw no picture much larger than this.
+# Largest width and height, pixels; GPUs do not draw much larger images.
 _LARGEST: Final = 8192
 
 
 def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
-    """How far from the middle of the body its farthest point is at `pose` (nq,), m."""
+    """Return the distance from the middle of the body to its farthest point at `pose` (nq,), m."""
     middle, places, sizes = _geoms(model, _posed(model, pose))
     return float((np.linalg.norm(places - middle, axis=1) + sizes).max())
 
@@ -143,16 +143,23 @@ def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
 def draw(
     model: mujoco.MjModel, pose: NDArray[np.float64], width: int, height: int, reach: float
 ) -> NDArray[np.uint8]:
-    """The body at `pose` (nq,), shape (height, width, 3), with `reach` metres around its middle.
+    """Return an image of a body, shape (height, width, 3).
 
-    Bodies drawn with the same reach are drawn to the same scale.
+    Bodies drawn with the same reach have the same scale.
+
+    Args:
+        model: Model of the body.
+        pose: Its pose, (nq,).
+        width: Width in pixels.
+        height: Height in pixels.
+        reach: Radius in view around the middle of the body, m.
 
     Raises:
-        RenderError: If the size is no size, or there is nothing to draw with.
+        RenderError: If the size is out of range, or nothing can be drawn here.
     """
     if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
         raise RenderError(
-            f"A picture is 1 to {_LARGEST} pixels wide and high, got {width} x {height}."
+            f"An image must be 1 to {_LARGEST} pixels wide and high, got {width} x {height}."
         )
     choose_gl()
     lit = _well_lit(model, width, height)
@@ -170,18 +177,18 @@ def draw(
         renderer.close()
     result = np.array(picture, dtype=np.uint8)
     if not has_sky(lit):
-        # A model without a sky is drawn before black, in which dark bodies drown.
+        # Without a sky the background is black, which hides dark bodies.
         result[depth >= _FARTHEST] = _BACKGROUND
     return result
 
 
 def has_sky(model: mujoco.MjModel) -> bool:
-    """Whether the model brings its own background."""
+    """Return whether the model has its own background."""
     return bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
 
 
 def _well_lit(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
-    """A copy of the model that can be drawn this large, and seen."""
+    """Return a copy of the model with a large enough frame buffer and a light."""
     result = copy.copy(model)
     result.vis.global_.offwidth = max(result.vis.global_.offwidth, width)
     result.vis.global_.offheight = max(result.vis.global_.offheight, height)
@@ -201,7 +208,7 @@ def _posed(model: mujoco.MjModel, pose: NDArray[np.float64]) -> mujoco.MjData:
 def _geoms(
     model: mujoco.MjModel, data: mujoco.MjData
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """The middle of the body's geoms, their places (n, 3), and their radii (n,), m."""
+    """Return the middle of the body's geoms, their places (n, 3), and their radii (n,), m."""
     of_body = model.geom_bodyid > 0
     places = data.geom_xpos[of_body]
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
@@ -209,10 +216,10 @@ def _geoms(
 
 
 def halve_textures(spec: mujoco.MjSpec) -> None:
-    """Halve the width and height of all textures that MuJoCo makes up for bodies and skies.
+    """Halve the width and height of all procedural textures of bodies and skies.
 
     They are most of a compiled model: 0.47 of the 0.53 MB of Gymnasium's ant, and 0.12 MB halved.
-    Floors stay as they are: the edges of their tiles would be seen to blur. Pixels move nothing.
+    Floors are not changed, because the edges of their tiles would blur.
     """
     for texture in spec.textures:
         if texture.builtin and texture.type != mujoco.mjtTexture.mjTEXTURE_2D:

@@ -1,15 +1,18 @@
-"""What turns one of Gymnasium's MuJoCo envs into one whose body can be any of its family."""
+"""Mixin that gives a Gymnasium MuJoCo env an editable body."""
 
 from __future__ import annotations
 
 import copy
+import inspect
+from collections.abc import Mapping
+from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, Final, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, SpaceMismatch
+from shapechanger.errors import EnvArgumentError, MissingExtra, SpaceMismatch, UnknownName
 from shapechanger.headless import choose_gl, require_screen
 
 try:
@@ -37,34 +40,41 @@ if TYPE_CHECKING:
 
 __all__ = ["Reshapable"]
 
-# How far the camera is from a body that it follows; 3.5 m for the ant.
+# Distance of the camera from a body that it follows, in multiples of its reach; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
-# MuJoCo's warnings of a pose, a velocity or an acceleration that is not finite, or huge.
+# MuJoCo's warnings of a position, velocity or acceleration that is huge or not finite.
 _DIVERGED: Final = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
     mujoco.mjtWarning.mjWARN_BADQACC,
 )
+# Arguments of every env that Gymnasium's constructors do not have.
+_OWN_ARGUMENTS: Final = {"shadows": None, "fast_model": True}
 
 
 class Reshapable(MujocoEnv):
-    """Mixed in before one of Gymnasium's MuJoCo envs: any body of a family, named spaces.
+    """Mixin that gives a Gymnasium MuJoCo env any body of a family, and named spaces.
 
-    The env keeps its rewards, terminations, infos and arguments. What follows from the body is
-    derived from it: model, spaces, layouts, start pose.
+    The env keeps its rewards, terminations, infos and arguments. Model, spaces, layouts and start
+    pose are derived from the body.
 
-    An env without a `render_mode` keeps textures of bodies and skies at half their width and
+    An env without a `render_mode` stores the textures of bodies and skies at half their width and
     height, which saves a third of its memory.
 
-    One argument is ours and every env's: `shadows` says whether frames have shadows, reflections
-    and smoothed edges; left out, frames of more than 256 x 256 pixels have, as films for people,
-    and smaller ones do not, as those that a camera gives a learner twenty times faster.
+    Two arguments are available in every env:
+
+    - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
+      more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
+      without them, do not.
+    - `fast_model`: whether a cheaper model that moves equally to the last bit may step the physics,
+      while MuJoCo's profiling timer (`data.timer`) is paused. Ants and pendulums have such a model;
+      other envs accept the argument and always step their own.
 
     Attributes:
         family: The bodies that the env can have.
         body: The edits that make the present body from the family's model.
-        observation_layout: What each number of the observation means.
-        action_layout: What each number of the action means.
+        observation_layout: Name, unit and range of each number of the observation.
+        action_layout: Name, unit and range of each number of the action.
         standing_height: Height of the trunk above the floor when it stands with each joint in the
             middle of its range, m; None for a body that does not stand.
     """
@@ -76,15 +86,24 @@ class Reshapable(MujocoEnv):
     action_layout: Layout
     standing_height: float | None
     _spec: EnvSpec | None = None
+    fast_model: bool = True
     # Whether a start state is being drawn.
     _starting: bool = False
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
-        """What must be there before Gymnasium's constructor compiles the model.
+        """Prepare what Gymnasium's constructor needs to compile the model.
 
-        Takes from the arguments what Gymnasium's constructor does not know.
+        Args:
+            body: The body to compile.
+            arguments: Arguments of the env; those that Gymnasium does not know are removed.
+
+        Raises:
+            UnknownName: If an argument or the body does not exist.
+            EnvArgumentError: If an argument has the wrong type.
         """
+        _check_arguments(type(self), self.family.name, arguments)
         self._shadows: bool | None = arguments.pop("shadows", None)
+        self.fast_model = arguments.pop("fast_model", True)
         self.body = self.family.body(body)
         mode = arguments.get("render_mode")
         self._draws = mode is not None
@@ -102,10 +121,10 @@ class Reshapable(MujocoEnv):
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
-        """What follows from the compiled model, and what a pickle needs to build it again."""
+        """Derive what follows from the compiled model, and record what a pickle needs."""
         self._follow_body()
         if self.observation_space.shape != (self.observation_layout.size,):
-            # Gymnasium has written down the size of its own body's.
+            # Gymnasium's constructor has set the size for its own body.
             shape = (self.observation_layout.size,)
             self.observation_space = gym.spaces.Box(-np.inf, np.inf, shape, np.float64)
         self._renew_renderer()
@@ -114,8 +133,10 @@ class Reshapable(MujocoEnv):
         self._ezpickle_kwargs: dict[str, Any] = {"body": to_json(self.body), **arguments}
         if self._shadows is not None:
             self._ezpickle_kwargs["shadows"] = self._shadows
+        if not self.fast_model:
+            self._ezpickle_kwargs["fast_model"] = False
 
-    # The spec is what `gym.make`, Minari and a vector env build the env from again.
+    # `gym.make`, Minari and vector envs build the env again from its spec.
 
     @property
     def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -128,40 +149,43 @@ class Reshapable(MujocoEnv):
         self._record_body()
 
     def _record_body(self) -> None:
-        """Write the present body where pickling and the spec look for it."""
+        """Record the present body for pickling and in the spec."""
         if self._spec is not None:
             self._spec.kwargs["body"] = to_json(self.body)
         self._ezpickle_kwargs["body"] = to_json(self.body)
 
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """Compile the present body in place of the file as it is."""
+        """Compile the present body instead of the plain file."""
         model = compile_body(self._load_family(), self.body)
-        # As in Gymnasium's own method: the frame buffer must be as large as the picture.
+        # As in Gymnasium's own method: the frame buffer must be as large as the frame.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, self.width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, self.height)
         return model, mujoco.MjData(model)
 
     def body_spec(self) -> mujoco.MjSpec:
-        """What the model is compiled from: that of the family with the edits of the body."""
+        """Return the spec of the present body: the family's with the edits applied."""
         return reshape(self._load_family(), self.body)
 
     def _load_family(self) -> mujoco.MjSpec:
-        """The family's model; where nobody looks, with less to look at."""
+        """Return the family's model, with smaller textures if the env never renders."""
         spec = self.family.load(self.fullpath)
         if not self._draws:
             halve_textures(spec)
         return spec
 
     def _follow_body(self) -> None:
-        """Derive from the model what the env needs to know of it."""
-        self.init_qpos = start_pose(self.model)
+        """Derive from the model what the env needs to know about it."""
+        self.init_qpos, self.standing_height = self._start_and_height(self.model)
         self.init_qvel = np.zeros(self.model.nv)
-        self.standing_height = standing_height(self.model)
         self.observation_layout = Layout(tuple(self._observation_features(self.model)))
         self.action_layout = action_layout(self.model)
 
+    def _start_and_height(self, model: mujoco.MjModel) -> tuple[NDArray[np.float64], float | None]:
+        """Return the start pose (nq,) and the standing height, m, of a body of this family."""
+        return start_pose(model), standing_height(model)
+
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        """The features of this task's observation, in order."""
+        """Return the features of this task's observation, in order."""
         return position_features(model) + velocity_features(model)
 
     def reset(
@@ -170,29 +194,32 @@ class Reshapable(MujocoEnv):
         """Start an episode.
 
         Args:
-            seed: Seed of all randomness from here on; None goes on with the present state.
-            options: `{"body": ...}` changes the body: the name of one, edits, or their JSON.
+            seed: Seed of all randomness from here on; None keeps the present generator.
+            options: `{"body": ...}` changes the body: its name, edits, or their JSON.
 
         Raises:
             SpaceMismatch: If the new body would change a space.
-            UnknownName: If the body names what is not there.
+            UnknownName: If there is no such option or body.
             MorphologyError: If the body cannot be built.
         """
-        if options is not None and "body" in options:
+        for name in options or {}:
+            if name != "body":
+                raise UnknownName("option of reset", name, ("body",))
+        if options:
             self._change_body(self.family.body(options["body"]))
         return cast("Any", super()).reset(seed=seed, options=options)
 
     def step(self, action: Any) -> Any:
-        """Act for one step, by Gymnasium's own methods.
+        """Take one step with Gymnasium's own methods.
 
-        Where MuJoCo finds that the simulation has diverged, `info["diverged"]` is true until the
+        After MuJoCo has found that the simulation diverged, `info["diverged"]` is true until the
         next reset.
 
         Args:
             action: Shape (nu,), finite.
 
         Raises:
-            BadAction: If the action is none; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
         """
         check_action(self, action)
         result = cast("Any", super()).step(action)
@@ -203,33 +230,31 @@ class Reshapable(MujocoEnv):
     def step_into(
         self, action: Any, observation: NDArray[np.float64]
     ) -> tuple[Any, bool, bool, dict[str, Any]]:
-        """Act for one step, as `step`, and write what is observed.
+        """Take one step as `step` does, and write the observation into an array.
 
         Args:
             action: Shape (nu,), finite.
-            observation: Is overwritten; shape of the observation space, float64, contiguous.
+            observation: Overwritten; shape of the observation space, float64, contiguous.
 
         Returns:
             Reward, terminated, truncated and info.
         """
-        seen, *rest = self.step(action)
-        observation[:] = seen
-        reward, terminated, truncated, info = rest
+        observation[:], reward, terminated, truncated, info = self.step(action)
         return reward, terminated, truncated, info
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo has found a number in the simulation bad since the last reset.
+        """Whether MuJoCo has found the state huge or not finite since the last reset.
 
-        MuJoCo then starts over from the model's own pose by itself, unless the model forbids it.
+        MuJoCo then restarts from the model's own pose, unless the model forbids it.
         """
         return any(self.data.warning[kind].number for kind in _DIVERGED)
 
     def reset_model(self) -> NDArray[np.float64]:
-        """Draw a start state as Gymnasium does, and make it possible.
+        """Draw a start state as Gymnasium does, and make it feasible.
 
-        Joints that the noise moved beyond their limits are moved back, orientations become unit
-        quaternions again, and a trunk whose feet the noise pushed into the floor is lifted.
+        Joints that the noise moved beyond their limits are moved back, orientations are normalised,
+        and a trunk whose feet the noise pushed into the floor is lifted.
         """
         self._starting = True
         try:
@@ -238,12 +263,12 @@ class Reshapable(MujocoEnv):
             self._starting = False
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
-        """Put the body at a pose (nq,) with velocities (nv,)."""
-        possible = self._possible(qpos) if self._starting else qpos
-        cast("Any", super()).set_state(possible, qvel)
+        """Set the pose (nq,) and the velocities (nv,)."""
+        pose = self._feasible(qpos) if self._starting else qpos
+        cast("Any", super()).set_state(pose, qvel)
 
-    def _possible(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The start pose that a drawn one becomes."""
+    def _feasible(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the feasible start pose next to a drawn one."""
         rules = self._start_rules()
         pose = rules.keep_within_limits(drawn)
         mujoco.mj_normalizeQuat(self.model, pose)
@@ -256,11 +281,11 @@ class Reshapable(MujocoEnv):
         return pose
 
     def _start_rules(self) -> StartRules:
-        """What makes a start pose possible, for the model as it is now."""
+        """Return the rules that make a start pose feasible, for the model as it is now."""
         return StartRules(self.model)
 
     def _change_body(self, body: Body) -> None:
-        """Build another body of the same spaces; on any error the present one stays."""
+        """Build another body with the same spaces; on any error the present one stays."""
         if body == self.body:
             return
         present = self.body
@@ -278,7 +303,7 @@ class Reshapable(MujocoEnv):
         self._renew_renderer()
 
     def _renew_renderer(self) -> None:
-        """Draw the present body from here on."""
+        """Render the present body from here on."""
         renderer = self.mujoco_renderer
         renderer.close()
         trunk = trunk_joint(self.model)
@@ -291,7 +316,7 @@ class Reshapable(MujocoEnv):
             camera,
             self.width,
             self.height,
-            # Whoever says where to look is not turned away from it.
+            # A camera with a given `lookat` does not follow the body.
             follow=None
             if trunk is None or "lookat" in camera
             else int(self.model.jnt_bodyid[trunk]),
@@ -299,7 +324,7 @@ class Reshapable(MujocoEnv):
         )
 
     def _require_same_spaces(self, observation: Layout, action: Layout) -> None:
-        """Refuse layouts that would change a space that learners already hold."""
+        """Refuse layouts that would change a space that learners already rely on."""
         for space, old, new in (
             ("observation", self.observation_layout, observation),
             ("action", self.action_layout, action),
@@ -320,42 +345,89 @@ class Reshapable(MujocoEnv):
                 raise SpaceMismatch(
                     f"This body would change the {space} space from {old.size} to {new.size} "
                     f"numbers ({change}): a reset cannot change a space, so "
-                    "make another env with this body and cross over with a body map."
+                    "make another env with this body and transfer with a body map."
                 )
 
-    # What a transfer study asks of an env, whichever kind it is.
+    # Interface of transfer studies; see `shapechanger.transfer`.
 
     @staticmethod
     def certify_shift(
         source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
     ) -> Certificate:
-        """What changes from one env to the other, wrappers included; both are reset.
+        """Compare two envs, including their wrappers; both are reset.
+
+        Args:
+            source: The env in which a policy is trained.
+            target: The env that it is transferred to.
+            allow_empty: Whether to accept envs that do not differ.
 
         Raises:
-            EmptyShift: If nothing does, and `allow_empty` is false.
+            EmptyShift: If they do not differ and `allow_empty` is false.
         """
         return certify(cast("Wrapped", source), cast("Wrapped", target), allow_empty=allow_empty)
 
     def body_towards(self, target: Reshapable, alpha: float) -> Body:
-        """The body at the part `alpha` in [0, 1] of the way to the body of `target`."""
+        """Return the body at the fraction `alpha` in [0, 1] of the way to the body of `target`."""
         return interpolate(self.body, target.body, alpha)
 
     @property
     def reach(self) -> float:
-        """How far from the middle of the body its farthest point is when it starts, m."""
+        """Distance from the middle of the body to its farthest point at the start, m."""
         return body_reach(self.model, self.init_qpos)
 
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """The body as it starts, shape (height, width, 3).
+        """Return an image of the body at its start, shape (height, width, 3).
 
         Args:
             width: Width in pixels.
             height: Height in pixels.
-            reach: Metres in view around the middle of the body; None for its own reach.
+            reach: Radius in view around the middle of the body, m; None for its own reach.
 
         Raises:
             RenderError: If nothing can be drawn here.
         """
         return draw(self.model, self.init_qpos, width, height, reach or self.reach)
+
+
+def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) -> None:
+    """Refuse arguments that do not exist or have the wrong type.
+
+    Args:
+        env: Class of the env; its Gymnasium base class defines the arguments.
+        family: Name of the family, for messages.
+        arguments: Arguments by name.
+
+    Raises:
+        UnknownName: If there is no such argument.
+        EnvArgumentError: If one has the wrong type.
+    """
+    base = next(each for each in env.__mro__ if each.__module__.startswith("gymnasium."))
+    known: dict[str, Any] = dict(_OWN_ARGUMENTS)
+    for constructor in (MujocoEnv.__init__, base.__init__):
+        parameters = inspect.signature(constructor).parameters.values()
+        known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
+    for name, value in arguments.items():
+        if name not in known:
+            raise UnknownName(f"argument of {family}", name, ("body", *known))
+        if expected := _mismatch(known[name], value):
+            raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
+
+
+# Arguments of Gymnasium's base class that its envs set themselves.
+_FIXED: Final = ("self", "kwargs", "model_path", "observation_space")
+
+
+def _mismatch(default: Any, value: Any) -> str:
+    """Return what a value must be, judged by the argument's default; empty if it fits."""
+    if isinstance(default, bool):
+        return "" if isinstance(value, (bool, np.bool_)) else "True or False"
+    if isinstance(default, (int, float)):
+        return "" if isinstance(value, Real) and not isinstance(value, bool) else "a number"
+    if isinstance(default, tuple):
+        pair: Any = value
+        fits = isinstance(pair, (tuple, list, np.ndarray)) and len(pair) == 2
+        fits = fits and all(isinstance(each, Real) for each in pair)
+        return "" if fits else "two numbers"
+    return ""

@@ -1,4 +1,4 @@
-"""What Gymnasium's running bodies have in common once they can change their shape."""
+"""Half cheetah, hopper, walker, swimmer and humanoid with editable bodies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,20 @@ import warnings
 from typing import Any, ClassVar, Final, cast
 
 import gymnasium as gym
-import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import MissingExtra, MorphologyError
+
+try:
+    import mujoco
+    from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
+    from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
+    from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
+    from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
+    from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv as GymnasiumWalker2dEnv
+except (ImportError, gym.error.DependencyNotInstalled) as error:
+    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.bodies.families import HALF_CHEETAH, HOPPER, HUMANOID, SWIMMER, WALKER2D, BodyLike
 from shapechanger.envs.layouts import (
@@ -19,7 +32,6 @@ from shapechanger.envs.layouts import (
     velocity_features,
 )
 from shapechanger.envs.reshapable import Reshapable
-from shapechanger.errors import MissingExtra, MorphologyError
 from shapechanger.layout import Feature
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
@@ -36,7 +48,9 @@ __all__ = [
     "Walker2dEnv",
 ]
 
-# The joints by which a trunk moves in the world.
+# Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
+_CLIPPED_AT: Final = 10.0
+# The joints that move a trunk in the world.
 IN_A_PLANE: Final = ("slide", "slide", "hinge")
 IN_SPACE: Final = ("free",)
 
@@ -49,21 +63,21 @@ _KINDS: Final = {
 
 
 class Runner(Reshapable):
-    """Mixed in before one of Gymnasium's runners, which start upright with straight legs.
+    """Mixin for Gymnasium's runners, which start upright with straight legs.
 
-    The start pose is Gymnasium's, with each joint at the nearest limit where the model puts it
-    beyond, and the trunk no lower than the feet need. Noise is drawn as in Gymnasium; joints stay
-    inside their limits and feet above the floor. The standing height is that of the start pose: in
-    the middle of their ranges these legs are folded.
+    The start pose is Gymnasium's, with each joint moved to its nearest limit where the model puts
+    it beyond, and the trunk high enough for the feet. Noise is drawn as in Gymnasium; joints stay
+    inside their limits and feet above the floor. The standing height is that of the start pose,
+    because in the middle of their ranges these legs are folded.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
             for the family's first.
-        **arguments: All arguments of Gymnasium's env.
+        **arguments: All arguments of Gymnasium's env, and those of `Reshapable`.
 
     Attributes:
-        root: Kinds of the joints that the task reads the trunk's place from.
-        place_size: How many numbers of the trunk's place the observation leaves out by default.
+        root: Types of the joints that the task reads the trunk's place from.
+        place_size: How many numbers of the trunk's place the observation omits by default.
         velocity_limit: Where the observation clips velocities, m/s and rad/s.
     """
 
@@ -77,10 +91,9 @@ class Runner(Reshapable):
         cast("Any", super()).__init__(**arguments)
         self._finish(arguments)
 
-    def _follow_body(self) -> None:
-        super()._follow_body()
-        self.init_qpos = start_pose(self.model, inside=0.0)
-        self.standing_height = standing_height(self.model, self.init_qpos)
+    def _start_and_height(self, model: mujoco.MjModel) -> tuple[NDArray[np.float64], float | None]:
+        pose = start_pose(model, inside=0.0)
+        return pose, standing_height(model, pose)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         trunk = [
@@ -90,7 +103,7 @@ class Runner(Reshapable):
         ]
         if tuple(trunk) != self.root:
             raise MorphologyError(
-                f"The task reads where the {self.family.name} is from the joints of its trunk, "
+                f"The task reads the place of the {self.family.name} from the joints of its trunk, "
                 f"which must be {', '.join(self.root)}; here they are {', '.join(trunk) or 'none'}."
             )
         features = position_features(model)[self.place_size if self._place_hidden else 0 :]
@@ -98,15 +111,15 @@ class Runner(Reshapable):
 
 
 class HealthyRunner(Runner):
-    """A runner that is healthy while its trunk is neither too low nor too high.
+    """Runner that is healthy while its trunk is neither too low nor too high.
 
-    The heights are Gymnasium's for the body as it is; for any other they grow with the height at
-    which it stands.
+    For the unedited body the heights are Gymnasium's; for any other they scale with its standing
+    height.
 
     Args:
         body: As in `Runner`.
-        healthy_z_range: Heights of the trunk between which the body is healthy, m, as the joint
-            that raises it counts them; None derives them from the body.
+        healthy_z_range: Heights of the trunk between which the body is healthy, m, as positions of
+            the joint that raises it; None derives them from the body.
         **arguments: All other arguments of Gymnasium's env.
     """
 
@@ -133,9 +146,11 @@ class HealthyRunner(Runner):
             self._healthy_z_range = self._derived_z_range()
 
     def _derived_z_range(self) -> tuple[float, float]:
-        """Gymnasium's range, as much higher as the body stands higher than the model as it is."""
+        """Scale Gymnasium's range by the standing height relative to the unedited body's."""
+        if not self.body:
+            return self._gymnasiums_z_range
         lift, plain = trunk_lift(self.model), compile_body(self.family.load(self.fullpath), ())
-        plain_lift, plain_stands = trunk_lift(plain), _stands(plain)
+        plain_lift, (_, plain_stands) = trunk_lift(plain), self._start_and_height(plain)
         if not (lift and plain_lift and plain_stands and self.standing_height):
             return self._gymnasiums_z_range
         growth = self.standing_height / plain_stands
@@ -144,38 +159,20 @@ class HealthyRunner(Runner):
 
     @property
     def healthy_z_range(self) -> tuple[float, float]:
-        """Heights between which the body is healthy, m, as the joint of the trunk counts them."""
+        """Heights between which the body is healthy, m, as positions of the trunk's joint."""
         return self._healthy_z_range
 
 
-def _stands(model: mujoco.MjModel) -> float | None:
-    return standing_height(model, start_pose(model, inside=0.0))
-
-
 def _grown(number: float, growth: float, before: Lift, after: Lift) -> float:
-    """The number that raises the trunk of one body, for another that is `growth` times as high."""
+    """Convert a position of one trunk's joint to a body that stands `growth` times as high."""
     height_m = before.at_zero_m + before.up * number
     return after.number_at(growth * height_m)
-
-
-try:
-    import mujoco
-    from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
-    from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
-    from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
-    from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv as GymnasiumWalker2dEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
-
-
-# Where Gymnasium clips the velocities that Hopper and Walker2d see, m/s and rad/s.
-_CLIPPED_AT: Final = 10.0
 
 
 class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Runner, GymnasiumHalfCheetahEnv
 ):
-    """Gymnasium's `HalfCheetah-v5` with any body that edits make of it.
+    """Gymnasium's `HalfCheetah-v5` with an editable body.
 
     Actions, observations, rewards and infos are those of `HalfCheetah-v5`. See `Runner` for the
     arguments, and for the start pose, which follows from the body.
@@ -185,8 +182,8 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         with warnings.catch_warnings():
-            # MuJoCo deprecates how Gymnasium's file says what the cheetah weighs; another way of
-            # saying it would change the last bits.
+            # MuJoCo deprecates how Gymnasium's file sets the cheetah's mass; any other way would
+            # change the last bits.
             warnings.filterwarnings("ignore", message=".*settotalmass.*")
             return super()._initialize_simulation()
 
@@ -194,7 +191,7 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumHopperEnv
 ):
-    """Gymnasium's `Hopper-v5` with any body that edits make of it.
+    """Gymnasium's `Hopper-v5` with an editable body.
 
     Actions, observations, rewards and infos are those of `Hopper-v5`. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body.
@@ -207,7 +204,7 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumWalker2dEnv
 ):
-    """Gymnasium's `Walker2d-v5` with any body that edits make of it.
+    """Gymnasium's `Walker2d-v5` with an editable body.
 
     Actions, observations, rewards and infos are those of `Walker2d-v5`. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body.
@@ -220,31 +217,24 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Runner, GymnasiumSwimmerEnv
 ):
-    """Gymnasium's `Swimmer-v5` with any body that edits make of it.
+    """Gymnasium's `Swimmer-v5` with an editable body.
 
     Actions, observations, rewards and infos are those of `Swimmer-v5`. It swims in the horizontal
-    plane, and stands on nothing. See `Runner` for the arguments.
+    plane and has no standing height. See `Runner` for the arguments.
     """
 
     family = SWIMMER
     place_size = 2
 
 
-try:
-    import mujoco
-    from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
-
-
 class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumHumanoidEnv
 ):
-    """Gymnasium's `Humanoid-v5` with any body that edits make of it.
+    """Gymnasium's `Humanoid-v5` with an editable body.
 
     Actions, observations, rewards and infos are those of `Humanoid-v5`. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body: the knees
-    start bent by 2 degrees, which is their limit, where Gymnasium's start straight.
+    start at their limit, bent by 2 degrees, where Gymnasium's start straight.
     """
 
     family = HUMANOID

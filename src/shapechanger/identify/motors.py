@@ -1,4 +1,4 @@
-"""Lag, delay and strength of the motors, from what tensions follow on which commands."""
+"""Lag, delay and strength of the motors, from the tensions that follow the commands."""
 
 from __future__ import annotations
 
@@ -11,17 +11,34 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
-from shapechanger.identify.kinematics import covariance
+from shapechanger.identify.kinematics import robust_covariance
 from shapechanger.identify.log import FingerLog
 
-__all__ = ["CommandSignal", "Motors", "fit_motors"]
+__all__ = ["FINE_S", "CommandSignal", "Motors", "fit_motors"]
+
+FINE_S: Final = 0.001
+"""Step at which motors are simulated on their own, s."""
+
+# Start of the log that is left out, s: motors still follow commands from before it.
+_FORGETS_S: Final = 0.3
+# Bounds of the parameters.
+_LONGEST_DELAY_S: Final = 0.15
+_LAGS_S: Final = (0.002, 0.2)
+_STRENGTHS: Final = (0.3, 2.0)
+# Delays to start from: the cost has local minima one control period apart.
+_INITIAL_DELAYS_S: Final = (0.005, 0.03, 0.06, 0.1)
+_LEAST_NOISE_N: Final = 1e-4
+# Relative step of finite differences; clipping gives the residual corners.
+_STEP: Final = 1e-3
+# Share of the rows with a saturated tendon from which the strength can be estimated.
+_SATURATED: Final = 0.01
 
 
 class CommandSignal:
     """The commands of a log as functions of time.
 
     Args:
-        log: What was commanded; before its first row the first command is taken to have acted.
+        log: The log; its first command is assumed to have acted before its first row.
     """
 
     def __init__(self, log: FingerLog) -> None:
@@ -32,16 +49,17 @@ class CommandSignal:
             [np.zeros((1, log.commands.shape[1])), np.cumsum(steps, axis=0)]
         )
 
-    def late(self, start: float, dt: float, steps: int, delay: float) -> NDArray[np.float64]:
-        """What acts in each of some steps, (steps, 7): the mean over the step.
-
-        Means make it a smooth function of the delay.
+    def delayed(self, start: float, dt: float, steps: int, delay: float) -> NDArray[np.float64]:
+        """Mean command over each time step, which is a smooth function of the delay.
 
         Args:
-            start: When the first step begins, s.
+            start: Start of the first step, s.
             dt: Length of a step, s.
-            steps: How many.
-            delay: How much later commands act, s.
+            steps: Number of steps.
+            delay: Delay of the commands, s.
+
+        Returns:
+            Commands, -1 to 1, (steps, 7).
         """
         edges = start + dt * np.arange(steps + 1) - delay
         sums = np.empty((steps + 1, self._sums.shape[1]))
@@ -49,50 +67,38 @@ class CommandSignal:
             sums[:, i] = np.interp(edges, self._t, column)
         return (sums[1:] - sums[:-1]) / dt
 
-    def followed(
+    def activations(
         self, start: float, dt: float, steps: int, delay: float, lag: float
     ) -> NDArray[np.float64]:
-        """What motors have made of it at the end of each step, (steps, 7).
+        """Activations of the motors, which follow the commands with a first-order lag.
 
         Args:
-            start: When the first step begins, s; the motors are at their command then.
+            start: Start of the first step, s; the motors are at their command then.
             dt: Length of a step, s.
-            steps: How many.
-            delay: See `late`.
+            steps: Number of steps.
+            delay: Delay of the commands, s.
             lag: Time constant of the motors, s.
+
+        Returns:
+            Activations at the end of each step, -1 to 1, (steps, 7).
         """
-        given = self.late(start, dt, steps, delay)
+        given = self.delayed(start, dt, steps, delay)
         keeps = np.exp(-dt / lag)
         start_at = keeps * given[:1]
         filtered = cast("Any", lfilter([1.0 - keeps], [1.0, -keeps], given, axis=0, zi=start_at))
         return np.asarray(filtered[0], np.float64)
 
 
-_FINE_S: Final = 0.001
-# s. By then the motors have forgotten what was before the log.
-_FORGETS_S: Final = 0.3
-_LONGEST_DELAY_S: Final = 0.15
-_LAGS_S: Final = (0.002, 0.2)
-_STRENGTHS: Final = (0.3, 2.0)
-# Where the search begins; the delay from several places, as it has valleys a period apart.
-_BEGIN_DELAYS_S: Final = (0.005, 0.03, 0.06, 0.1)
-_LEAST_NOISE_N: Final = 1e-4
-# Of a parameter, what differences are taken over: what is clipped has corners.
-_STEP: Final = 1e-3
-# Of the rows, where some tendon must be at its strongest for the strength to be told.
-_SATURATED: Final = 0.01
-
-
 @dataclass(frozen=True, slots=True)
 class Motors:
-    """What the tensions say about the motors.
+    """Lag, delay and strength of a finger's motors.
 
     Attributes:
         lag: Time constant between a command and its force, s.
-        delay: How much later a command acts, s.
-        strength: Largest tensions, over those that they are thought to have.
+        delay: Delay of the commands, s.
+        strength: Largest tensions, over those of the finger assumed in the fit.
         sd: Standard errors of these three.
-        saturates: Whether a tendon was at its strongest, so that the strength could be told.
+        saturates: Whether a tendon reached its largest tension, so that `strength` is an estimate.
         tension_noise: Standard deviation of measured tensions, N.
     """
 
@@ -105,47 +111,51 @@ class Motors:
 
 
 def fit_motors(log: FingerLog, known: FingerParameters = NOMINAL) -> Motors:
-    """Fit the motors to a log.
+    """Fit lag, delay and strength of the motors to a log.
 
     Args:
         log: The log.
-        known: A finger with the tensions that they are thought to pull.
+        known: Finger with the assumed range of tensions.
     """
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)
     commands = CommandSignal(log)
     speeds = np.gradient(log.lengths, log.control_dt, axis=0)
-    pulled = drive.stiffness * log.lengths + drive.damping * speeds
-    steps = int(np.ceil(log.seconds / _FINE_S)) + 1
-    fine = log.t[0] + _FINE_S * np.arange(1, steps + 1)
+    passive = drive.stiffness * log.lengths + drive.damping * speeds
+    steps = int(np.ceil(log.seconds / FINE_S)) + 1
+    fine = log.t[0] + FINE_S * np.arange(1, steps + 1)
     rows = log.t >= log.t[0] + _FORGETS_S
 
-    def asked(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        made = commands.followed(float(log.t[0]), _FINE_S, steps, x[1], x[0])
-        there = np.empty(log.commands.shape)
-        for i, column in enumerate(made.T):
-            there[:, i] = np.interp(log.t, fine, column)
-        return (drive.offset + drive.gain * there + pulled)[rows]
+    def demanded(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Tensions before they are clipped to their range, N."""
+        activations = commands.activations(float(log.t[0]), FINE_S, steps, x[1], x[0])
+        at_rows = np.empty(log.commands.shape)
+        for i, column in enumerate(activations.T):
+            at_rows[:, i] = np.interp(log.t, fine, column)
+        return (drive.offset + drive.gain * at_rows + passive)[rows]
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        forces = np.clip(asked(x), known.least_tension, x[2] * most)
-        return (forces - log.tensions[rows]).ravel()
+        tensions = np.clip(demanded(x), known.least_tension, x[2] * most)
+        return (tensions - log.tensions[rows]).ravel()
 
-    bounds = ([_LAGS_S[0], 0.0, _STRENGTHS[0]], [_LAGS_S[1], _LONGEST_DELAY_S, _STRENGTHS[1]])
-    scale = [0.01, 0.01, 0.1]
-
-    begins = [np.array([NOMINAL.motor_lag, delay, 1.0]) for delay in _BEGIN_DELAYS_S]
-    begin = min(begins, key=lambda x: float(np.abs(residual(x)).sum()))
+    starts = [np.array([NOMINAL.motor_lag, delay, 1.0]) for delay in _INITIAL_DELAYS_S]
     solve: Any = least_squares
-    best = solve(residual, begin, bounds=bounds, x_scale=scale, loss="soft_l1", diff_step=_STEP)
+    best = solve(
+        residual,
+        min(starts, key=lambda x: float(np.abs(residual(x)).sum())),
+        bounds=([_LAGS_S[0], 0.0, _STRENGTHS[0]], [_LAGS_S[1], _LONGEST_DELAY_S, _STRENGTHS[1]]),
+        x_scale=[0.01, 0.01, 0.1],
+        loss="soft_l1",
+        diff_step=_STEP,
+    )
     x = np.asarray(best.x, np.float64)
     left = residual(x).reshape(int(rows.sum()), -1)
     noise = max(_LEAST_NOISE_N, float(1.4826 * np.median(np.abs(left))))
-    # What is far off, such as where a servo gave up, weighs little.
+    # Outliers weigh little, such as those of a servo that switched itself off.
     weights = np.minimum(1.0, 3.0 * noise / np.maximum(np.abs(left), _LEAST_NOISE_N))
     jacobian = np.asarray(best.jac).reshape(*left.shape, -1)
-    saturated = (asked(x) > x[2] * most).any(axis=1).mean()
-    sd = np.sqrt(np.diag(covariance(jacobian, left * weights, log.control_dt)))
+    saturated = (demanded(x) > x[2] * most).any(axis=1).mean()
+    sd = np.sqrt(np.diag(robust_covariance(jacobian, left * weights, log.control_dt)))
     return Motors(
         lag=float(x[0]),
         delay=float(x[1]),

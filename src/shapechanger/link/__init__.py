@@ -1,4 +1,4 @@
-"""What a robot and a workstation say to each other; pure, so both sides can share it."""
+"""Protocol between a robot and its clients, without sockets, for both sides."""
 
 from __future__ import annotations
 

@@ -1,28 +1,27 @@
-"""The messages between a program or a person and a robot, one binary WebSocket message each.
+"""Messages between a client and a robot, each one binary WebSocket message.
 
-A message is a msgpack map with its kind under `kind`; JPEG bytes travel as they are. Unknown keys
-are ignored, so that a newer minor version can be understood; unknown kinds are refused.
+A message is a msgpack map with its type under `kind`; JPEG bytes are sent as they are. Unknown
+keys are ignored, so that newer minor versions stay readable; unknown types are refused.
 
-How a connection goes:
+The course of a connection:
 
 ```
-robot   Challenge          who I am, which version, a nonce
-client  Hello              which version, who I am, the proof that I hold the key
-robot   Welcome | Refused  what I sense and move; or why not, and the connection ends
-client  Take               may I command? Answered by Lease
-client  Arm                (a person, by default) the outputs may move from now on
-robot   Observation        the newest one, each time the client has credit
-client  Command            what to do, in answer to which observation; gives credit for the next
-client  Suggest            what it would do, while somebody else commands; gives credit too
-client  Record Mark Undo   (a person) what is driven becomes an episode on the robot's disk
-robot   RecorderState      how that goes, to everybody
-client  Browse Fetch Judge what was recorded: the list, a piece of an episode, steps good or bad
+robot   Challenge          name of the robot, version, nonce
+client  Hello              version, name and role of the client, proof that it holds the key
+robot   Welcome | Refused  description of the robot; or the reason why the connection ends
+client  Take               asks for control; answered by Lease
+client  Arm                (a person, by default) lets the outputs move
+robot   Observation        the newest one, whenever the client has credit
+client  Command            values for the outputs, and the observation it answers; gives credit
+client  Suggest            the same from a client without control, to show; gives credit
+client  Record Mark Undo   (a person) records an episode on the robot's disk
+robot   RecorderState      state of the recorder, to all clients
+client  Browse Fetch Judge asks for the list of episodes, or a piece of one; marks steps as bad
 robot   Recordings Piece   the answers
 ```
 
-Times are nanoseconds of the robot's monotonic clock. Two machines' clocks are never subtracted: how
-late a command is follows from the observation that it answers, because the robot knows when it
-sent that one.
+Times are nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted:
+the age of a command is the time since the robot sent the observation that it answers.
 """
 
 from __future__ import annotations
@@ -76,63 +75,64 @@ __all__ = [
 ]
 
 VERSION: Final = 1
-"""Version of the messages; both sides must have the same."""
+"""Version of the messages, which must be the same on both sides."""
 
 MAX_CLIENT_MESSAGE: Final = 64 * 1024
-"""Bytes of the largest message that a robot reads; a larger one is an attack or a bug."""
+"""Largest message that a robot reads, bytes; a larger one is an attack or a bug."""
 
 MAX_ROBOT_MESSAGE: Final = 4 * 1024 * 1024
-"""Bytes of the largest message that a client reads."""
+"""Largest message that a client reads, bytes."""
 
 MAX_PIECE: Final = 256 * 1024
-"""Bytes of a `Piece`, about: it ends with the line that reaches them. Larger ones would keep
-observations waiting on a slow radio."""
+"""Approximate size of a `Piece`, bytes, to keep observations from waiting on a slow radio."""
 
 MAX_EPISODES: Final = 200
-"""Episodes in one `Recordings`; `Browse.before` asks for those before."""
+"""Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
 
 Role = Literal["person", "program"]
-"""Who drives. A person takes the robot from a program at once; never the other way round."""
+"""Kind of client. A person takes control from a program at once, never the other way round."""
 
 Pace = Literal["realtime", "lockstep"]
-"""Who keeps the time: the robot and the client each on their own, or the robot waits for a command
-and answers with the observation one control period later."""
+"""Pace: both sides follow their clocks, or the robot waits for a command and answers with the
+observation one control period later."""
 
 _M = TypeVar("_M")
 
-# Names come from people, and end up in logs and on screens.
+# Names are written by people, and end up in logs and on screens.
 _Name = Annotated[str, Meta(max_length=64)]
 _Words = Annotated[str, Meta(max_length=1024)]
 _Sequence = Annotated[int, Meta(ge=0, le=2**53)]
 _Values = Annotated[tuple[float, ...], Meta(max_length=64)]
-# One folder of the recordings and never another one: no separator, and no dot in front.
+# A folder directly in that of the recordings: no separator, and no leading dot.
 _Episode = Annotated[str, Meta(max_length=128, pattern=r"^[0-9A-Za-z][0-9A-Za-z._-]*\Z")]
 _Before = Annotated[str, Meta(max_length=128, pattern=r"^([0-9A-Za-z][0-9A-Za-z._-]*)?\Z")]
-_Step = Annotated[int, Meta(ge=0, le=2**53)]
 
 
 class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_only=True):
-    """Something that is said in one go."""
+    """A message of either side."""
 
     def __repr__(self) -> str:
-        """Its fields, of bytes only how many: neither pictures nor proofs belong in a log."""
-        fields = (f"{name}={_shown(getattr(self, name))}" for name in self.__struct_fields__)
+        """Show bytes by their number only: frames and proofs do not belong in a log."""
+        fields = (
+            f"{name}=<{len(value)} bytes>" if isinstance(value, bytes) else f"{name}={value!r}"
+            for name, value in msgspec.structs.asdict(self).items()
+        )
         return f"{type(self).__name__}({', '.join(fields)})"
 
 
-# What a client says.
+# Messages of a client.
 
 
 class Hello(_Message, frozen=True):
-    """The first message of a client.
+    """First message of a client.
 
     Attributes:
-        version: Version of the messages that the client speaks.
+        version: Version of the messages that the client uses.
         proof: Answer to the challenge, see `shapechanger.link.authentication`.
-        name: Who it is, for people to read.
-        role: Who drives.
-        pace: Who keeps the time.
-        frames: Whether observations shall carry pictures.
+        name: Display name.
+        role: Kind of client.
+        pace: Whether the clocks or the client set the pace.
+        frames: Whether observations carry frames.
     """
 
     version: int
@@ -144,16 +144,14 @@ class Hello(_Message, frozen=True):
 
 
 class Command(_Message, frozen=True):
-    """What the robot shall do until the next command, or until it is too old.
+    """Values for the outputs, in force until the next command or until they expire.
 
     Attributes:
-        seq: Number of the command; each is larger than the one before.
-        answers: `seq` of the observation that it was decided on.
+        seq: Number of the command, larger than the one before.
+        answers: `seq` of the observation that the command answers.
         values: One number for each action of the robot, in the order of its action layout.
-        ttl_ms: How long the command may act, counted from its arrival; the robot's own deadline
-            holds where it is shorter.
-        scale: The client's own cap, 0 to 1, times the values; it can only lower what the robot
-            allows.
+        ttl_ms: Lifetime from the arrival, ms; the robot's deadline holds where it is shorter.
+        scale: Cap of the client, 0 to 1, by which the values are multiplied.
     """
 
     seq: _Sequence
@@ -164,31 +162,27 @@ class Command(_Message, frozen=True):
 
 
 class Acknowledge(_Message, frozen=True):
-    """Asks for the next observation without commanding anything.
-
-    Attributes:
-        seq: `seq` of the observation that was received; 0 for none yet.
-    """
+    """Request for the observation after number `seq`, without a command; 0 for the first."""
 
     seq: _Sequence = 0
 
 
 class Take(_Message, frozen=True):
-    """Asks to be the one who commands."""
+    """Request for control."""
 
 
 class Release(_Message, frozen=True):
-    """Gives the command back; the robot stops and disarms."""
+    """Return of control; the robot stops and disarms."""
 
 
 class Arm(_Message, frozen=True):
-    """Lets the outputs move; from a person it also ends an emergency stop.
+    """Request to let the outputs move; from a person it also ends an emergency stop.
 
     Attributes:
-        answers: `seq` of an observation that was received just now, as in a command: one that was
-            long on its way must not arm a robot that nobody looks at any more.
-        emergency: How many emergency stops the sender has seen (`Observation.emergencies`). One
-            that came since is not ended, because the sender did not know of it.
+        answers: `seq` of a recent observation, as in a command: a delayed request must not arm a
+            robot that its operator no longer watches.
+        emergency: Number of emergency stops that the sender has seen
+            (`Observation.emergencies`). A later one stays in force.
     """
 
     answers: _Sequence
@@ -196,39 +190,31 @@ class Arm(_Message, frozen=True):
 
 
 class Disarm(_Message, frozen=True):
-    """Keeps the outputs at rest from now on."""
+    """Request to keep the outputs at rest."""
 
 
 class EmergencyStop(_Message, frozen=True):
-    """Stops everything, whoever commands, until a person arms the robot again.
-
-    Attributes:
-        reason: Why, for people to read.
-    """
+    """Stop of all outputs, from any client, until a person arms the robot again."""
 
     reason: _Words = ""
 
 
 class Ping(_Message, frozen=True):
-    """Asks for a `Pong`.
-
-    Attributes:
-        token: Comes back as it is.
-    """
+    """Request for a `Pong` with the same token."""
 
     token: _Sequence = 0
 
 
 class Suggest(_Message, frozen=True):
-    """What a client that does not command would do now; the robot does not do it.
+    """Values that a client without control would command; the robot does not apply them.
 
-    It is shown to everybody (`Observation.suggested`), recorded as what a policy wanted, and gives
-    credit for the next observation, as a command does. The robot forgets it after its
-    `Welcome.deadline_ms`, and when its sender leaves or commands.
+    A suggestion is shown to all clients (`Observation.suggested`) and recorded, and gives credit
+    for the next observation, as a command does. It expires after `Welcome.deadline_ms`, and when
+    its sender leaves or takes control.
 
     Attributes:
-        seq: Number of the suggestion; each is larger than the one before. A refusal names it.
-        answers: `seq` of the observation that it was decided on.
+        seq: Number of the suggestion, larger than the one before. A refusal names it.
+        answers: `seq` of the observation that the suggestion answers.
         values: One number for each action of the robot, in the order of its action layout.
     """
 
@@ -238,15 +224,14 @@ class Suggest(_Message, frozen=True):
 
 
 class Record(_Message, frozen=True):
-    """Begins or ends an episode on the robot's disk; only a person may.
+    """Begin or end of an episode on the robot's disk; only from a person.
 
-    Answered by `RecorderState`, which everybody gets, or by `Refused`. Whoever commands is
-    recorded, a person or a program, whenever the outputs may move; when the last person leaves, it
-    ends.
+    Answered by `RecorderState` to all clients, or by `Refused`. Commands of any client are
+    recorded while the robot is armed. The episode ends when the last person disconnects.
 
     Attributes:
-        on: Whether to record from now on.
-        name: What the episode is about, for people to read.
+        on: Whether to record.
+        name: Title of the episode.
     """
 
     on: bool
@@ -254,68 +239,57 @@ class Record(_Message, frozen=True):
 
 
 class Mark(_Message, frozen=True):
-    """Puts a mark on the newest step of the episode that is being recorded; only a person may.
-
-    Attributes:
-        text: What it says.
-    """
+    """Mark with a text for the newest step of the episode being recorded; only from a person."""
 
     text: _Words = ""
 
 
 class Undo(_Message, frozen=True):
-    """Drops the newest steps of the episode that is being recorded; only a person may.
+    """Request to drop the last `seconds` of the episode being recorded; only from a person.
 
-    They stay on the disk, and are not learned from.
-
-    Attributes:
-        seconds: How far back.
+    The steps stay on the disk, and are not used for training.
     """
 
     seconds: Annotated[float, Meta(gt=0.0, le=3_600.0)] = 5.0
 
 
 class Browse(_Message, frozen=True):
-    """Asks for the list of the robot's recordings; answered by `Recordings`.
-
-    Attributes:
-        before: Only episodes whose id sorts before this one; empty for the newest.
-    """
+    """Request for `Recordings` with ids before `before`, or the newest ones for ""."""
 
     before: _Before = ""
 
 
 class Fetch(_Message, frozen=True):
-    """Asks for a part of an episode; answered by `Piece`.
+    """Request for a part of an episode; answered by `Piece`.
 
-    One question about recordings at a time: the next one is refused until the answer has left.
+    A further question about recordings is refused until the answer has been sent.
 
     Attributes:
-        episode: Its id.
+        episode: Id of the episode.
         first: Number of the first line of `steps.jsonl`, from 0.
-        count: How many lines at most.
+        count: Most lines to send.
     """
 
     episode: _Episode
-    first: _Step = 0
+    first: _Sequence = 0
     count: Annotated[int, Meta(ge=1, le=100_000)] = 1_000
 
 
 class Judge(_Message, frozen=True):
-    """Says that steps of an episode are bad, or good after all; only a person may.
+    """Judgement that steps of an episode are bad, or good after all; only from a person.
 
     Answered by `Recordings` with that episode alone.
 
     Attributes:
-        episode: Its id; not of the one that is being recorded.
+        episode: Id of the episode, which must not be the one being recorded.
         first: Number of the first step.
-        last: Number of the last step, which counts too.
-        keep: Whether they are to be learned from.
+        last: Number of the last step, inclusive.
+        keep: Whether to use the steps for training.
     """
 
     episode: _Episode
-    first: _Step
-    last: _Step
+    first: _Sequence
+    last: _Sequence
     keep: bool = False
 
 
@@ -339,15 +313,15 @@ ClientMessage = (
 )
 
 
-# What a robot says.
+# Messages of a robot.
 
 
 class Challenge(_Message, frozen=True):
-    """The first message of a robot.
+    """First message of a robot.
 
     Attributes:
-        version: Version of the messages that the robot speaks.
-        nonce: What the proof is made from; new for each connection.
+        version: Version of the messages that the robot uses.
+        nonce: Random bytes for the proof, new for each connection.
         robot: Name of the robot.
     """
 
@@ -357,24 +331,24 @@ class Challenge(_Message, frozen=True):
 
 
 class Welcome(_Message, frozen=True):
-    """The client is known; this is what the robot is.
+    """Description of the robot for an authenticated client.
 
     Attributes:
         robot: Name of the robot.
-        body: What it is, such as "car".
+        body: Kind of robot, such as "car".
         action_layout: JSON of the `Layout` of `Command.values`.
         state_layout: JSON of the `Layout` of `Observation.state`.
-        image_size: Width and height of the pictures in pixels; None without a camera.
-        control_hz: How many commands a second the robot expects.
-        deadline_ms: How long the newest command acts at most.
-        max_observation_age_ms: How old an observation may be that a command answers.
+        image_size: Width and height of the frames, pixels; None without a camera.
+        control_hz: Commands per second that the robot expects.
+        deadline_ms: Longest time that a command acts, ms.
+        max_observation_age_ms: Oldest observation that a command may answer, ms.
         reward: Weights of the task, from the robot's profile, by name.
-        reset: Commands that bring the robot back, from its profile: the values of a step and how
-            many seconds it lasts; empty for none.
-        arming: Who may arm it.
-        clock: Where its time comes from.
+        reset: Commands that return the robot to the start, from its profile: values and duration,
+            s, of each; empty for none.
+        arming: Who may arm the robot.
+        clock: Source of the robot's time.
         session: Number of this connection.
-        can_record: Whether it has a place to keep recordings.
+        can_record: Whether the robot has a folder for recordings.
     """
 
     robot: str
@@ -394,11 +368,11 @@ class Welcome(_Message, frozen=True):
 
 
 class Refused(_Message, frozen=True):
-    """Something that the robot does not do.
+    """Refusal of a message.
 
     Attributes:
-        reason: Why, in a sentence.
-        seq: `seq` of the command that is refused; None for anything else.
+        reason: Reason, a sentence.
+        seq: `seq` of the refused command or suggestion; None for any other message.
         fatal: Whether the connection ends.
     """
 
@@ -408,33 +382,32 @@ class Refused(_Message, frozen=True):
 
 
 class Observation(_Message, frozen=True):
-    """What the robot senses, and what it did.
+    """Sensor values, and the state of the outputs.
 
     Attributes:
-        seq: Number of the observation; each is larger than the one before.
-        captured_ns: When the picture was taken; when the state was read, without a picture.
-        state_ns: When the state was read.
-        sent_ns: When this left.
-        frame: The picture as JPEG; None where there is none that is newer than the last one sent.
-        frame_seq: Number of the picture; the same number is the same picture. 0 for none yet.
-        state: The numbers of the state layout.
-        sources: Where a quantity comes from: name of the sensor, "estimated" or "absent".
-        action_applied: What the outputs do now, in the order and units of the command, after caps,
-            slew and reflexes.
-        applied_seq: `seq` of the command behind it; None while the robot stands still by itself.
-        applied_ns: When that command reached the outputs.
-        command_ns: When that command arrived.
-        stop_reason: Why the robot does not do what it was told, in words; empty when it does.
+        seq: Number of the observation, larger than the one before.
+        captured_ns: Capture time of the frame; without a camera, `state_ns`.
+        state_ns: Time at which the state was read.
+        sent_ns: Time at which the observation was sent.
+        frame: The frame as JPEG; None if the newest one was sent already.
+        frame_seq: Number of the frame; equal numbers mean the same frame. 0 for none yet.
+        state: Numbers of the state layout.
+        sources: Source of each quantity: name of the sensor, "estimated" or "absent".
+        action_applied: Applied outputs, in the order and units of the command, after caps, slew
+            and reflexes.
+        applied_seq: `seq` of the command behind them; None while the robot rests by itself.
+        applied_ns: Time at which that command reached the outputs.
+        command_ns: Time at which that command arrived.
+        stop_reason: Reason why the robot does not follow the command, a sentence; "" if it does.
         armed: Whether the outputs may move.
         emergency: Whether an emergency stop is in force.
-        emergencies: How many emergency stops there were since the robot's start.
-        holder: Name of whoever commands; empty for nobody.
-        mine: Whether that is this client.
-        holder_role: Who drives; empty for nobody.
-        commanded: The newest command that is in force, times its scale, in the order and units of
-            the command; empty for none.
-        suggested: What a client that does not command would do; empty for none.
-        suggested_by: Who that is, for people to read; empty for none.
+        emergencies: Number of emergency stops since the robot's start.
+        holder: Name of the client in control; "" for none.
+        mine: Whether this client has control.
+        holder_role: Role of the client in control; "" for none.
+        commanded: Values of the command in force, times its scale; empty for none.
+        suggested: Values of the newest suggestion; empty for none.
+        suggested_by: Name of the client that sent it; "" for none.
     """
 
     seq: int
@@ -462,12 +435,12 @@ class Observation(_Message, frozen=True):
 
 
 class Lease(_Message, frozen=True):
-    """Who commands from now on.
+    """The client in control, after a change or a refused request.
 
     Attributes:
-        mine: Whether that is this client.
-        holder: Name of whoever commands; empty for nobody.
-        reason: Why it changed, or why it did not, in words.
+        mine: Whether this client has control.
+        holder: Name of the client in control; "" for none.
+        reason: Reason for the change or the refusal, a sentence.
     """
 
     mine: bool
@@ -476,12 +449,12 @@ class Lease(_Message, frozen=True):
 
 
 class Event(_Message, frozen=True):
-    """Something that happened, for people to read.
+    """Event on the robot, for people to read.
 
     Attributes:
-        name: What it was, such as "emergency", "armed", "disarmed" or "bump".
+        name: Kind of event, such as "emergency", "armed", "disarmed" or "bump".
         text: A sentence.
-        at_ns: When.
+        at_ns: Time of the event.
     """
 
     name: str
@@ -490,29 +463,23 @@ class Event(_Message, frozen=True):
 
 
 class Pong(_Message, frozen=True):
-    """The answer to a `Ping`.
-
-    Attributes:
-        token: As it came.
-        now_ns: The robot's time.
-    """
+    """Answer to a `Ping`, with its token and the robot's time."""
 
     token: int
     now_ns: int
 
 
 class RecorderState(_Message, frozen=True):
-    """How the recording goes: at each change, and once a second while it goes on.
+    """State of the recorder, sent at each change and once a second while recording.
 
     Attributes:
-        episode: Id of the episode; of the last one, after it ended; empty for none yet, and while
-            the disk makes a new one.
+        episode: Id of the current or last episode; "" for none yet, and while a new one is made.
         recording: Whether steps are recorded.
-        steps: How many there are.
-        dropped: How many of them were undone.
-        seconds: From its first step to the newest that counts, s.
-        marks: How many marks there are.
-        text: Why it ended by itself, such as a full disk, in a sentence; empty otherwise.
+        steps: Number of steps.
+        dropped: Number of steps that were dropped.
+        seconds: Time from the first step to the newest kept one, s.
+        marks: Number of marks.
+        text: Reason why the episode ended by itself, such as a full disk; "" otherwise.
     """
 
     episode: _Before = ""
@@ -529,14 +496,13 @@ class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         id: Name of its folder.
-        steps: How many steps it has.
-        kept: How many of them are not dropped.
-        seconds: How long the steps that are kept last, s.
-        closed: Whether it was ended properly; one that is being recorded was not.
-        created: When it began, ISO 8601 in UTC.
-        driver: Who drove, for people to read.
-        outcome: How it ended, such as "collision"; empty for just ended. Of one that cannot be
-            read, why not.
+        steps: Number of steps.
+        kept: Number of steps that are not dropped.
+        seconds: Duration of the kept steps, s.
+        closed: Whether it was closed; False for the episode being recorded.
+        created: Start, ISO 8601 in UTC.
+        driver: Name of the driver.
+        outcome: How it ended, such as "collision", or ""; the error if it cannot be read.
     """
 
     id: _Episode
@@ -550,10 +516,10 @@ class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Recordings(_Message, frozen=True):
-    """What was recorded, newest first.
+    """List of episodes, newest first.
 
     Attributes:
-        episodes: At most `MAX_EPISODES` of them.
+        episodes: At most `MAX_EPISODES` episodes.
         more: Whether there are older ones, see `Browse.before`.
     """
 
@@ -562,17 +528,16 @@ class Recordings(_Message, frozen=True):
 
 
 class Piece(_Message, frozen=True):
-    """A part of an episode, as it is on the robot's disk.
+    """Part of an episode, as it is on the robot's disk.
 
     Attributes:
-        episode: Its id.
-        first: Number of the first line, as in the question.
-        total: How many complete lines `steps.jsonl` has now.
-        lines: The lines from `first` on, without their ends; none behind the last one. Fewer than
-            were asked for where they would make a message that is too large.
-        frames: For each line the JPEG that its `frame` names; None where it names none, or the same
-            as the line before in this piece.
-        header: The text of `episode.json` now.
+        episode: Id of the episode.
+        first: Number of the first line, as in the request.
+        total: Number of complete lines in `steps.jsonl` now.
+        lines: Lines from `first` on, without line ends; fewer than requested at the end of the
+            file, and where they would make the message too large.
+        frames: JPEG that the `frame` of each line names; None for none, or that of the line before.
+        header: Text of `episode.json` now.
     """
 
     episode: _Episode
@@ -602,30 +567,26 @@ _ROBOT_DECODER: Final = msgspec.msgpack.Decoder(RobotMessage)
 
 
 def encode(message: ClientMessage | RobotMessage) -> bytes:
-    """A message as bytes."""
+    """Encode a message."""
     return _ENCODER.encode(message)
 
 
 def decode_client_message(data: bytes) -> ClientMessage:
-    """What a client said.
+    """Decode a message of a client.
 
     Raises:
-        LinkError: If these bytes are too many or no message of a client.
+        LinkError: If the bytes are too many, or not a message of a client.
     """
     return _decoded(_CLIENT_DECODER, data, MAX_CLIENT_MESSAGE)
 
 
 def decode_robot_message(data: bytes) -> RobotMessage:
-    """What a robot said.
+    """Decode a message of a robot.
 
     Raises:
-        LinkError: If these bytes are too many or no message of a robot.
+        LinkError: If the bytes are too many, or not a message of a robot.
     """
     return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
-
-
-def _shown(value: object) -> str:
-    return f"<{len(value)} bytes>" if isinstance(value, bytes) else repr(value)
 
 
 def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _M:
@@ -634,4 +595,4 @@ def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _
     try:
         return decoder.decode(data)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise LinkError(f"This is no message: {error}.") from error
+        raise LinkError(f"Not a valid message: {error}.") from error

@@ -1,4 +1,9 @@
-"""The workstation's side: the client and the env of a robot."""
+"""Client of a robot on the network.
+
+`client.RobotClient` commands a robot. `known_robots` stores the robots that the user trusts,
+`discovery` finds robots on the local network, and `observations` turns their messages into
+observations and rewards of Gymnasium envs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A robot as a program sees it: command, observe, stop; no `await` in sight.
+"""Synchronous client of a robot: command, observe, stop.
 
 >>> with RobotClient.connect(recall("new-bright")) as robot:
 ...     robot.take()
@@ -20,7 +20,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
-from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
 from shapechanger.errors import LinkError, RobotRefused
@@ -29,60 +28,48 @@ from shapechanger.link.address import parse_address
 from shapechanger.link.authentication import parse_key
 from shapechanger.link.messages import ClientMessage, Event, RobotMessage, Welcome
 from shapechanger.remote.connection import Access, RobotConnection, open_connection
-from shapechanger.remote.inbox import Inbox, Received
+from shapechanger.remote.inbox import Inbox, Received, Request, Requests
 from shapechanger.remote.known_robots import KnownRobot, parse_trust, untrusted
 
 __all__ = ["RobotClient"]
 
-_MOST_EVENTS: Final = 256
-# How long a call may take beyond the link's own limit, s.
-_MARGIN_S: Final = 2.0
-# How long a robot may look for an answer on its disk, s.
-_DISK_S: Final = 30.0
-
-
-@dataclass
-class _Question:
-    """What somebody waits for.
-
-    Attributes:
-        kind: Kind of the answer.
-        answer: Where it goes.
-        accepts: Whether a message of that kind is the answer.
-    """
-
-    kind: type[RobotMessage]
-    answer: Future[Any] = field(default_factory=Future[Any])
-    accepts: Callable[[Any], bool] = lambda _: True
+_MAX_EVENTS: Final = 256
+_MARGIN_S: Final = 2.0  # Of a call beyond the link's own time limit, s.
+_DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
 
 
 def _own_name() -> str:
-    """Who connects, where nobody says it: the user and the host."""
+    """Return the default name of a client: user and host."""
     try:
         user = getpass.getuser()
-    except (KeyError, OSError):  # In a container there may be none.
-        user = "somebody"
+    except (KeyError, OSError):  # A container may have no user name.
+        user = "unknown"
     return f"{user}@{socket.gethostname()}"[:64]
 
 
-def _here(failure: LinkError) -> LinkError:
-    """The same failure without the calls of the thread that met it, which help nobody."""
+def _check(message: ClientMessage) -> None:
+    """Raise a `LinkError` for a field out of range before anything is sent."""
+    messages.decode_client_message(messages.encode(message))
+
+
+def _copy(failure: LinkError) -> LinkError:
+    """Return the same error without the traceback of the connection's thread."""
     return type(failure)(*failure.args)
 
 
 class RobotClient:
-    """A connection to a robot, kept by one thread of its own.
+    """Connection to a robot, kept by a thread of its own.
 
-    All methods may be called from any thread. Whatever cannot be done is a `LinkError`, or
-    `RobotRefused` where the robot itself says no.
+    All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
+    the robot refuses.
 
     Args:
-        access: Who connects to what, and how.
-        clock: This machine's time, s; never runs backwards.
+        access: Settings of the connection.
+        clock: Monotonic clock of this machine, s.
 
     Raises:
-        RobotRefused: If the robot is another one than expected, or does not want us.
-        LinkError: If nobody answers, or nobody who speaks as we do.
+        RobotRefused: If the robot's certificate differs, or it refuses the client.
+        LinkError: If no robot answers, or one with another version of the link.
     """
 
     def __init__(self, access: Access, clock: Callable[[], float] = time.monotonic) -> None:
@@ -91,8 +78,8 @@ class RobotClient:
         self._process = os.getpid()
         self._inbox = Inbox(clock)
         self._lock = threading.Lock()
-        self._questions: list[_Question] = []
-        self._events: deque[Event] = deque(maxlen=_MOST_EVENTS)
+        self._requests = Requests()
+        self._events: deque[Event] = deque(maxlen=_MAX_EVENTS)
         self._refusals: dict[int, str] = {}
         self._recorder: messages.RecorderState | None = None
         self._asking = threading.Lock()
@@ -110,8 +97,8 @@ class RobotClient:
             self._welcome = self._ready.result()
         except LinkError as failure:
             self.close()
-            raise _here(failure) from None
-        except BaseException:  # Ctrl-C too: no thread stays behind.
+            raise _copy(failure) from None
+        except BaseException:  # Ctrl-C too: leave no thread behind.
             self.close()
             raise
 
@@ -132,23 +119,23 @@ class RobotClient:
         """Connect to a robot.
 
         Args:
-            robot: One that is remembered, see `shapechanger.remote.known_robots.recall`; or an address,
-                as HOST or HOST:PORT.
+            robot: A known robot, from `shapechanger.remote.known_robots.recall`; or an address,
+                HOST or HOST:PORT.
             key: The robot's key, for an address.
             fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-            role: Who drives.
-            name: Who connects, for people to read; the user and the host, by default.
-            pace: Who keeps the time.
-            frames: Whether observations shall carry pictures.
-            timeout_s: How long the handshake may take, and silence last until the link is lost.
-            clock: This machine's time, s.
+            role: Whether a person or a program drives.
+            name: Display name of the client; user and host by default.
+            pace: Whether the clocks or the client set the pace.
+            frames: Whether observations carry frames.
+            timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
+            clock: Monotonic clock of this machine, s.
 
         Raises:
-            RobotRefused: If the robot is another one than expected, or does not want us.
-            LinkError: If nobody answers; without a fingerprint, with the one that is shown there.
+            RobotRefused: If the robot's certificate differs, or it refuses the client.
+            LinkError: If no robot answers. Without a fingerprint the message shows the robot's.
         """
         if not timeout_s > 0.0:
-            raise LinkError(f"The link's timeout is more than 0 s, got timeout_s={timeout_s:g}.")
+            raise LinkError(f"timeout_s must be above 0, got {timeout_s:g}.")
         if not isinstance(robot, KnownRobot):
             if not fingerprint:
                 raise untrusted(parse_address(robot), timeout_s)
@@ -167,51 +154,50 @@ class RobotClient:
 
     @property
     def welcome(self) -> Welcome:
-        """What the robot is."""
+        """Description of the robot."""
         return self._welcome
 
     @property
     def pace(self) -> messages.Pace:
-        """Who keeps the time."""
+        """Whether the clocks or the client set the pace."""
         return self._access.pace
 
     @property
     def alive(self) -> bool:
-        """Whether the link stands, in this process."""
+        """True while the link is up, in the process that made it."""
         return self._failure is None and self._process == os.getpid()
 
     @property
     def newest(self) -> Received | None:
-        """The newest observation, however old; None before the first."""
+        """The newest observation of any age; None before the first."""
         return self._inbox.newest
 
     @property
     def recorder(self) -> messages.RecorderState | None:
-        """What the robot said last of its recorder; None for nothing yet."""
+        """Last reported state of the robot's recorder, or None."""
         return self._recorder
 
     def take(self) -> None:
-        """Be the one who commands.
+        """Take control.
 
         Raises:
-            RobotRefused: If somebody else does, and keeps to it.
+            RobotRefused: If another client keeps control.
         """
         lease: messages.Lease = self._ask(messages.Take(), messages.Lease)
         if not lease.mine:
-            raise RobotRefused(lease.reason or f"{lease.holder or 'Somebody'} commands the robot.")
+            raise RobotRefused(lease.reason or f"{lease.holder or 'Another client'} has control.")
 
     def arm(self) -> None:
-        """Let the outputs move; a person also ends an emergency stop that was seen before.
+        """Let the outputs move; from a person this also ends an emergency stop seen before.
 
         Raises:
-            RobotRefused: If the robot says no, or does not say yes in time.
+            RobotRefused: If the robot refuses, or is not armed in time.
         """
         seen = self.newest or self.ask()
-        # It answers what is true now, and ends only what was known before.
+        # Answer a new observation, but end only an emergency stop that was seen before the call.
         newest = self.ask()
-        refusal = _Question(messages.Refused)
-        with self._lock:
-            self._questions.append(refusal)
+        refusal = Request(messages.Refused)
+        self._requests.add(refusal)
         self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
         until = self._clock() + self._access.timeout_s
         try:
@@ -222,7 +208,7 @@ class RobotClient:
                 if newest.message.armed:
                     return
         finally:
-            self._forget(refusal)
+            self._requests.remove(refusal)
         reason = newest.message.stop_reason
         raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
 
@@ -234,13 +220,13 @@ class RobotClient:
         ttl_ms: int | None = None,
         scale: float = 1.0,
     ) -> int:
-        """Say what to do, until the next command or until it is too old.
+        """Send a command, in force until the next one or until it expires.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
-            answers: `seq` of the observation that it was decided on.
-            ttl_ms: How long it may act; None for as long as the robot allows.
-            scale: A cap of one's own, 0 to 1, times the values.
+            answers: `seq` of the observation that the command answers.
+            ttl_ms: Lifetime, ms; None for the robot's deadline.
+            scale: Cap, 0 to 1, by which the values are multiplied.
 
         Returns:
             The number of the command.
@@ -249,48 +235,56 @@ class RobotClient:
             self._seq += 1
             seq = self._seq
         ttl_ms = self._welcome.deadline_ms if ttl_ms is None else ttl_ms
-        told = tuple(float(value) for value in values)
+        floats = tuple(float(value) for value in values)
         self._post(
-            messages.Command(seq=seq, answers=answers, values=told, ttl_ms=ttl_ms, scale=scale)
+            messages.Command(seq=seq, answers=answers, values=floats, ttl_ms=ttl_ms, scale=scale)
         )
         return seq
 
     def suggest(self, values: Sequence[float], *, answers: int) -> int:
-        """Say what to do while somebody else commands; the robot shows it, and does not do it.
+        """Send a suggestion while another client has control; the robot only shows it.
 
-        It counts as long as a command would, and asks for the next observation as one does.
+        A suggestion lives as long as a command, and asks for the next observation as one does.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
-            answers: `seq` of the observation that it was decided on.
+            answers: `seq` of the observation that the suggestion answers.
 
         Returns:
-            The number of the suggestion, to ask `refusal` for.
+            The number of the suggestion, for `refusal`.
         """
         with self._lock:
             self._seq += 1
             seq = self._seq
-        told = tuple(float(value) for value in values)
-        self._post(messages.Suggest(seq=seq, answers=answers, values=told))
+        floats = tuple(float(value) for value in values)
+        self._post(messages.Suggest(seq=seq, answers=answers, values=floats))
         return seq
 
     def acknowledge(self) -> None:
-        """Ask for the next observation without commanding anything."""
+        """Ask for the next observation without a command."""
         newest = self.newest
         self._post(messages.Acknowledge(seq=newest.message.seq if newest else 0))
 
     def observation(self, newer_than: int = 0, timeout_s: float | None = None) -> Received:
-        """The newest observation whose `seq` is larger than `newer_than`; waits for it.
+        """Wait for an observation, and return the newest one.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s; None for that of the link.
 
         Raises:
-            StaleObservation: If none comes in time.
+            StaleObservation: If none arrives in time.
             LinkError: If the link is lost.
         """
         self._require_alive()
         return self._inbox.take(newer_than, self._limit(timeout_s))
 
     def newer(self, newer_than: int, timeout_s: float) -> Received | None:
-        """As `observation`, but None where none comes in time.
+        """Wait for an observation as `observation` does, but return None after the time limit.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s.
 
         Raises:
             LinkError: If the link is lost.
@@ -299,45 +293,49 @@ class RobotClient:
         return self._inbox.wait(newer_than, timeout_s)
 
     def ask(self) -> Received:
-        """An observation that comes after all that was seen.
+        """Ask for a new observation, and wait for it.
 
         Raises:
-            LinkError: If none comes in time, or the link is lost.
+            LinkError: If none arrives in time, or the link is lost.
         """
         newest = self.newest
         self.acknowledge()
         return self.observation(newest.message.seq if newest else 0)
 
     def exchange(self, values: Sequence[float], seen: Received) -> Received:
-        """Command in answer to an observation, and wait for the next one.
+        """Send a command, and wait for the next observation.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            seen: The observation that the command answers.
 
         Raises:
-            LinkError: If none comes in time, or the link is lost.
+            LinkError: If none arrives in time, or the link is lost.
         """
         self.command(values, answers=seen.message.seq)
         return self.observation(seen.message.seq)
 
     def emergency_stop(self, reason: str = "") -> None:
-        """Stop everything, whoever commands, until a person arms the robot again."""
+        """Stop all outputs, without control too, until a person arms the robot again."""
         self._post(messages.EmergencyStop(reason=reason))
 
     def disarm(self) -> None:
-        """Keep the outputs at rest from now on."""
+        """Keep the outputs at rest."""
         self._post(messages.Disarm())
 
     def release(self) -> None:
-        """Give the command back; the robot stops and disarms."""
+        """Give control back; the robot stops and disarms."""
         self._post(messages.Release())
 
     def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
-        """Begin an episode on the robot's disk, or end it; only a person may.
+        """Begin or end an episode on the robot's disk; only as a person.
 
         Args:
-            on: Whether to record from now on.
-            name: What it is about, for people to read.
+            on: Whether to record.
+            name: Title of the episode.
 
         Raises:
-            RobotRefused: If the robot does not record, as on a full disk; or records already.
+            RobotRefused: If the robot cannot record, as on a full disk, or records already.
             LinkError: If it does not answer in time.
         """
         return self._ask_recorder(
@@ -346,15 +344,15 @@ class RobotClient:
         )
 
     def mark(self, text: str = "") -> messages.RecorderState:
-        """Mark the newest step of the episode that is being recorded; errors as of `record`."""
+        """Mark the newest step of the episode being recorded; raises as `record` does."""
         before = 0 if self._recorder is None else self._recorder.marks
         return self._ask_recorder(messages.Mark(text=text), lambda state: state.marks > before)
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
-        """Drop the newest steps of the episode that is being recorded; errors as of `record`.
+        """Drop the newest steps of the episode being recorded; raises as `record` does.
 
         Args:
-            seconds: How far back, s; above 0.
+            seconds: How far back, s, above 0.
         """
         before = 0 if self._recorder is None else self._recorder.dropped
         return self._ask_recorder(
@@ -362,14 +360,14 @@ class RobotClient:
         )
 
     def browse(self, before: str = "", timeout_s: float = _DISK_S) -> messages.Recordings:
-        """What was recorded on the robot, newest first.
+        """List the episodes on the robot, newest first.
 
         Args:
             before: Only episodes whose id sorts before this one; "" for the newest.
-            timeout_s: How long the robot may look, s.
+            timeout_s: Time limit, s.
 
         Raises:
-            RobotRefused: If it keeps no recordings.
+            RobotRefused: If the robot has no folder for recordings.
             LinkError: If it does not answer in time.
         """
         return self._ask_library(messages.Browse(before=before), messages.Recordings, timeout_s)
@@ -377,67 +375,67 @@ class RobotClient:
     def fetch(
         self, episode: str, first: int = 0, count: int = 1_000, timeout_s: float = _DISK_S
     ) -> messages.Piece:
-        """A part of an episode, as it is on the robot's disk; errors as of `browse`.
+        """Read a part of an episode on the robot's disk; raises as `browse` does.
 
         Args:
-            episode: Its id.
+            episode: Id of the episode.
             first: Number of the first line, from 0.
-            count: How many lines at most; fewer come where they would be too large.
-            timeout_s: How long the robot may look, s.
+            count: Most lines to read; fewer are sent where the message would be too large.
+            timeout_s: Time limit, s.
         """
-        asked = messages.Fetch(episode=episode, first=first, count=count)
-        return self._ask_library(asked, messages.Piece, timeout_s)
+        request = messages.Fetch(episode=episode, first=first, count=count)
+        return self._ask_library(request, messages.Piece, timeout_s)
 
     def judge(
         self, episode: str, first: int, last: int, *, keep: bool, timeout_s: float = _DISK_S
     ) -> messages.EpisodeSummary:
-        """Say whether steps of an episode are to be learned from; only a person may.
+        """Keep or drop steps of an episode; only as a person.
 
         Args:
-            episode: Its id.
+            episode: Id of the episode.
             first: Number of the first step.
-            last: Number of the last step, which counts too.
-            keep: Whether they are good.
-            timeout_s: How long the robot may look, s.
+            last: Number of the last step, inclusive.
+            keep: Whether to use the steps for training.
+            timeout_s: Time limit, s.
 
         Returns:
-            The episode as it is then.
+            The episode after the change.
 
         Raises:
-            RobotRefused: If there are no such steps, or it is being recorded.
+            RobotRefused: If there are no such steps, or the episode is being recorded.
             LinkError: If the robot does not answer in time.
         """
-        asked = messages.Judge(episode=episode, first=first, last=last, keep=keep)
-        found: messages.Recordings = self._ask_library(asked, messages.Recordings, timeout_s)
+        request = messages.Judge(episode=episode, first=first, last=last, keep=keep)
+        found: messages.Recordings = self._ask_library(request, messages.Recordings, timeout_s)
         return found.episodes[0]
 
     def ping(self, timeout_s: float | None = None) -> tuple[float, int]:
-        """Ask whether anybody is there.
+        """Measure the round trip.
 
         Returns:
-            How long the answer took, s, and the robot's time when it answered, ns.
+            The round trip, s, and the robot's time at its answer, ns.
         """
-        asked_at = self._clock()
+        start = self._clock()
         pong: messages.Pong = self._ask(messages.Ping(), messages.Pong, timeout_s)
-        return self._clock() - asked_at, pong.now_ns
+        return self._clock() - start, pong.now_ns
 
     def events(self) -> list[Event]:
-        """What happened since the last call, oldest first; the last 256 at most."""
+        """Return the events since the last call, oldest first, at most 256."""
         with self._lock:
             events = list(self._events)
             self._events.clear()
         return events
 
     def refusal(self, seq: int) -> str:
-        """Why the robot refused a command, in words; "" if it did not, or has not said so yet."""
+        """Return the reason why the robot refused a command, or "" if it has not."""
         with self._lock:
             return self._refusals.get(seq, "")
 
     def close(self) -> None:
-        """End the connection, after what was said has left; again does nothing."""
+        """End the connection after pending messages are sent; may be called again."""
         if self._process != os.getpid():
-            return  # A copy made by fork: the connection is the other process's.
-        self._fail(LinkError("The connection was closed here: make a new one."))
+            return  # A copy made by fork: the connection belongs to the other process.
+        self._fail(LinkError("The connection was closed: make a new one."))
         loop = self._loop
         if loop is not None and not loop.is_closed():
             with contextlib.suppress(RuntimeError):  # It may close in between.
@@ -445,10 +443,10 @@ class RobotClient:
         self._thread.join()
 
     def abandon(self) -> None:
-        """As `release` and `close`, but without waiting for anything or taking a lock.
+        """Release and close without waiting or taking a lock.
 
-        For whoever is dropped without being closed: the garbage collector may call this in any
-        thread, in this connection's own too.
+        For clients that are dropped without `close`: the garbage collector may call this in any
+        thread, including that of the connection.
         """
         loop, made = self._loop, self._connection
         if self._process != os.getpid() or loop is None or made is None:
@@ -465,7 +463,7 @@ class RobotClient:
         """End the connection."""
         self.close()
 
-    # Of the caller's threads.
+    # In the callers' threads.
 
     def _limit(self, timeout_s: float | None) -> float:
         return self._access.timeout_s + _MARGIN_S if timeout_s is None else timeout_s
@@ -474,59 +472,53 @@ class RobotClient:
         if self._process != os.getpid():
             raise LinkError("This connection belongs to another process: make one in this one.")
         if self._failure is not None:
-            raise _here(self._failure)
+            raise _copy(self._failure)
 
     def _post(self, message: ClientMessage) -> None:
         self._require_alive()
         if self._loop is None or self._connection is None:
-            raise LinkError("The connection is not made yet.")
+            raise LinkError("The connection is not open yet.")
         try:
             self._loop.call_soon_threadsafe(self._connection.post, message)
-        except RuntimeError:  # The loop ended since.
+        except RuntimeError:  # The loop has ended meanwhile.
             failure = self._failure or LinkError("The link to the robot is lost.")
-            raise _here(failure) from None
+            raise _copy(failure) from None
 
     def _ask_recorder(
         self, message: ClientMessage, accepts: Callable[[messages.RecorderState], bool]
     ) -> messages.RecorderState:
-        messages.decode_client_message(messages.encode(message))  # What is wrong is said here.
+        _check(message)
         with self._asking:
             return self._ask(message, messages.RecorderState, _DISK_S, accepts)
 
     def _ask_library(
         self, message: ClientMessage, kind: type[RobotMessage], timeout_s: float
     ) -> Any:
-        messages.decode_client_message(messages.encode(message))
+        _check(message)
         with self._asking:  # A robot answers one such question at a time.
             return self._ask(message, kind, timeout_s)
 
     def _ask(
         self,
         message: ClientMessage,
-        kind: type[RobotMessage],
+        answer: type[RobotMessage],
         timeout_s: float | None = None,
         accepts: Callable[[Any], bool] = lambda _: True,
     ) -> Any:
-        question = _Question(kind, accepts=accepts)
-        with self._lock:
-            self._questions.append(question)
+        request = Request(answer, accepts=accepts)
+        self._requests.add(request)
         try:
             self._post(message)
-            return question.answer.result(self._limit(timeout_s))
+            return request.answer.result(self._limit(timeout_s))
         except FutureTimeout:
-            asked = type(message).__name__
-            raise LinkError(f"The robot did not answer to {asked!r} in time.") from None
+            kind = type(message).__name__
+            raise LinkError(f"The robot did not answer {kind!r} in time.") from None
         except LinkError as failure:
-            raise _here(failure) from None
+            raise _copy(failure) from None
         finally:
-            self._forget(question)
+            self._requests.remove(request)
 
-    def _forget(self, question: _Question) -> None:
-        with self._lock:
-            if question in self._questions:
-                self._questions.remove(question)
-
-    # Of the thread that keeps the connection.
+    # In the connection's thread.
 
     def _keep(self) -> None:
         try:
@@ -534,11 +526,11 @@ class RobotClient:
         except LinkError as error:
             self._fail(error)
         except BaseException as error:
-            # Whoever waits must learn of it; the thread is the last that could tell.
-            self._fail(LinkError(f"The link to the robot broke: {error!r}."))
+            # Callers that wait must not wait for ever.
+            self._fail(LinkError(f"The link to the robot failed: {error!r}."))
             raise
         else:
-            self._fail(LinkError("The connection was closed here: make a new one."))
+            self._fail(LinkError("The connection was closed: make a new one."))
 
     async def _live(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -548,7 +540,7 @@ class RobotClient:
             await made.run(self._handle, self._stop)
 
     def _handle(self, message: RobotMessage) -> None:
-        """Put a message where it belongs.
+        """Handle a message of the robot.
 
         Raises:
             LinkError: If it ends the link.
@@ -569,35 +561,13 @@ class RobotClient:
                 with self._lock:
                     self._refusals = {message.seq: message.reason}
                 return
-        self._answer(message)
-
-    def _answer(self, message: RobotMessage) -> None:
-        """Hand an answer to the first who waits for it; a refusal is an answer to anything."""
-        refused = isinstance(message, messages.Refused)
-        with self._lock:
-            question = next(
-                (
-                    q
-                    for q in self._questions
-                    if refused or (isinstance(message, q.kind) and q.accepts(message))
-                ),
-                None,
-            )
-            if question is None:
-                return
-            self._questions.remove(question)
-        if isinstance(message, messages.Refused):
-            question.answer.set_exception(RobotRefused(message.reason))
-        else:
-            question.answer.set_result(message)
+        self._requests.answer(message)
 
     def _fail(self, failure: LinkError) -> None:
         with self._lock:
             self._failure = self._failure or failure
             failure = self._failure
-            questions, self._questions = self._questions, []
         self._inbox.fail(failure)
         if not self._ready.done():
             self._ready.set_exception(failure)
-        for question in questions:
-            question.answer.set_exception(failure)
+        self._requests.fail(failure)

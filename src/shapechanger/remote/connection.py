@@ -1,4 +1,4 @@
-"""One connection to a robot: the WebSocket, its handshake, and the watch over its silence."""
+"""WebSocket connection to a robot: handshake, sending, receiving and the silence timeout."""
 
 from __future__ import annotations
 
@@ -24,34 +24,32 @@ except ImportError as error:
 __all__ = ["PATH", "Access", "RobotConnection", "open_connection"]
 
 PATH: Final = "/link"
-"""Where on the robot's server the WebSocket is."""
+"""Path of the WebSocket on the robot's server."""
 
-# s. A robot that answers needs a round trip; one that does not is not waited for.
-_GOODBYE_S: Final = 0.5
-# Of the time after which a silent link is lost: when to ask whether anybody is there, and how often
-# to look.
-_ASK_AFTER: Final = 0.4
-_LOOK_EVERY: Final = 0.1
+_CLOSE_S: Final = 0.5  # Time limit of the closing handshake.
+# Shares of the silence timeout: when to send a ping, and how often to check.
+_PING_AFTER: Final = 0.4
+_CHECK_EVERY: Final = 0.1
 
-# aiohttp's class is made by attrs in a way that pyright does not see through.
-_CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=_GOODBYE_S)  # pyright: ignore[reportCallIssue]
+# attrs makes aiohttp's class in a way that pyright does not understand.
+_CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=_CLOSE_S)  # pyright: ignore[reportCallIssue]
 
 _Handler = Callable[[RobotMessage], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who connects to what, and how.
+    """Settings of a connection.
 
     Attributes:
-        address: Where the robot is.
+        address: Address of the robot.
         key: The robot's key.
         fingerprint: SHA-256 of its certificate; None for no encryption.
-        name: Who connects, for people to read.
-        role: Who drives.
-        pace: Who keeps the time.
-        frames: Whether observations shall carry pictures.
-        timeout_s: How long the handshake may take, and silence last.
+        name: Display name of the client.
+        role: Whether a person or a program drives.
+        pace: Whether the clocks or the client set the pace.
+        frames: Whether observations carry frames.
+        timeout_s: Time limit of the handshake, and of silence, s.
     """
 
     address: Address
@@ -65,10 +63,10 @@ class Access:
 
 
 class RobotConnection:
-    """A robot that has said welcome; made by `open_connection`.
+    """Open connection to a robot, made by `open_connection`.
 
     Attributes:
-        welcome: What the robot is.
+        welcome: Description of the robot.
     """
 
     def __init__(
@@ -77,28 +75,28 @@ class RobotConnection:
         self.welcome = welcome
         self._line = line
         self._access = access
-        self._heard_at = asyncio.get_running_loop().time()
+        self._received_at = asyncio.get_running_loop().time()
         self._pending: list[ClientMessage] = []
         self._something = asyncio.Event()
 
     def post(self, message: ClientMessage) -> None:
-        """Send when the line is free; one of the same kind that still waits is replaced.
+        """Queue a message, in place of one of the same type that still waits.
 
-        So a line that was stuck brings one command, the newest, and never the ones before.
+        After a blocked connection the robot so gets the newest command, and no older ones.
         """
         self._pending = [m for m in self._pending if type(m) is not type(message)]
         self._pending.append(message)
         self._something.set()
 
     async def run(self, handle: _Handler, stop: asyncio.Event) -> None:
-        """Receive and send until told to stop.
+        """Receive and send until `stop` is set.
 
         Args:
-            handle: What to do with each message; it may raise `LinkError` to end the link.
-            stop: When set, what is pending is sent, and the link closed.
+            handle: Called with each message; it may raise `LinkError` to end the connection.
+            stop: When set, pending messages are sent, and the connection is closed.
 
         Raises:
-            LinkError: If the link is lost, or the robot talks nonsense.
+            LinkError: If the connection is lost, or the robot sends an invalid message.
         """
         work = (self._receive(handle), self._send(), self._watch(), stop.wait())
         tasks = [asyncio.ensure_future(each) for each in work]
@@ -110,13 +108,13 @@ class RobotConnection:
             await asyncio.gather(*tasks, return_exceptions=True)
         for task in done:
             task.result()
-        await self._say_goodbye()
+        await self._close()
 
     async def _receive(self, handle: _Handler) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            message = await _heard(self._line)
-            self._heard_at = loop.time()
+            message = await _receive(self._line)
+            self._received_at = loop.time()
             handle(message)
 
     async def _send(self) -> None:
@@ -131,35 +129,35 @@ class RobotConnection:
             try:
                 await self._line.send_bytes(messages.encode(message))
             except (ConnectionError, aiohttp.ClientError) as error:
-                raise _lost(str(error) or "the line broke") from None
+                raise _lost(str(error) or "the connection broke") from None
 
     async def _watch(self) -> None:
-        """End a link that is silent: a radio that dies says no goodbye."""
+        """End a silent connection: a radio that dies closes nothing."""
         loop, limit_s = asyncio.get_running_loop(), self._access.timeout_s
         while True:
-            await asyncio.sleep(_LOOK_EVERY * limit_s)
-            silent_s = loop.time() - self._heard_at
+            await asyncio.sleep(_CHECK_EVERY * limit_s)
+            silent_s = loop.time() - self._received_at
             if silent_s > limit_s:
-                raise _lost(f"nothing was heard for {silent_s:.1f} s")
-            if silent_s > _ASK_AFTER * limit_s:
+                raise _lost(f"no message for {silent_s:.1f} s")
+            if silent_s > _PING_AFTER * limit_s:
                 self.post(Ping())
 
-    async def _say_goodbye(self) -> None:
+    async def _close(self) -> None:
         try:
-            async with asyncio.timeout(_GOODBYE_S):
+            async with asyncio.timeout(_CLOSE_S):
                 await self._send_pending()
                 await self._line.close()
         except (LinkError, TimeoutError):
-            return  # Whoever leaves need not be heard; the robot notices the end of the line.
+            return  # The robot notices the end of the connection anyway.
 
 
 @asynccontextmanager
 async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
-    """Connect, prove that we hold the key, and be welcomed.
+    """Connect and authenticate.
 
     Raises:
-        RobotRefused: If the robot is another one than expected, or does not want us.
-        LinkError: If nobody answers, or nobody who speaks as we do.
+        RobotRefused: If the robot's certificate differs, or it refuses the client.
+        LinkError: If no robot answers, or one with another version of the link.
     """
     expected = access.fingerprint
     line: aiohttp.ClientWebSocketResponse | None = None
@@ -183,32 +181,32 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
             welcome = await _welcomed(line, access)
             limit.reschedule(None)
             yield RobotConnection(line, welcome, access)
-    # What went wrong below is in our words: a program sees one error, and no chain of them.
+    # Callers see one error of ours, without a chain of library errors.
     except TimeoutError:
         raise LinkError(
-            f"The robot at {access.address} did not answer within {access.timeout_s:.1f} s: is it "
+            f"The robot at {access.address} did not answer within {access.timeout_s:.1f} s. Is it "
             "on, and in this network?"
         ) from None
     except aiohttp.ServerFingerprintMismatch as error:
         raise RobotRefused(
             f"{access.address} shows the fingerprint\n  {fingerprint_hex(error.got)}\nand not\n"
-            f"  {fingerprint_hex(error.expected)}\nEither the robot was set up anew, or somebody "
-            "stands in between. Compare it with the one that `shapechanger robot key NAME` shows "
-            "on the robot before you trust it."
+            f"  {fingerprint_hex(error.expected)}\nEither the robot was set up again, or the "
+            "connection is intercepted. Compare it with the one that `shapechanger robot key NAME` "
+            "shows on the robot before you trust it."
         ) from None
     except aiohttp.WSServerHandshakeError as error:
         raise LinkError(
-            f"What answers at {access.address} is no robot of this kind: {error.message}."
+            f"The server at {access.address} is not a robot of this kind: {error.message}."
         ) from None
     except (aiohttp.ClientError, OSError) as error:
         if isinstance(error, LinkError):
             raise
         raise LinkError(
-            f"No robot answers at {access.address} ({error}): is it on, and does "
+            f"No robot answers at {access.address} ({error}). Is it on, and does "
             "`shapechanger robot serve` run on it?"
         ) from None
     finally:
-        # Without the farewell of TLS, which a dead line never answers.
+        # Skip the closing handshake of TLS, which a dead connection never answers.
         for each in sockets:
             with contextlib.suppress(OSError):  # It was never connected, or has ended already.
                 each.shutdown(socket.SHUT_RDWR)
@@ -220,23 +218,24 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
 
 
 async def _let_go(sockets: list[socket.socket]) -> None:
-    """Wait until the loop has noticed that the sockets ended; they would stay open otherwise."""
+    """Wait until the loop has noticed the end of the sockets, which would stay open otherwise."""
     with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(_GOODBYE_S):
+        async with asyncio.timeout(_CLOSE_S):
             while any(each.fileno() != -1 for each in sockets):
                 await asyncio.sleep(0)
 
 
 async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:
-    challenge = await _heard(line)
+    challenge = await _receive(line)
     if isinstance(challenge, messages.Refused):
         raise RobotRefused(challenge.reason)
     if not isinstance(challenge, Challenge):
-        raise LinkError(f"The robot began with {type(challenge).__name__}, not with a challenge.")
+        raise LinkError(f"Expected a Challenge from the robot, got {type(challenge).__name__}.")
     if challenge.version != messages.VERSION:
         older = "robot" if challenge.version < messages.VERSION else "workstation"
         raise LinkError(
-            f"The robot speaks version {challenge.version}, this workstation {messages.VERSION}: "
+            f"The robot uses version {challenge.version} of the link, this workstation "
+            f"{messages.VERSION}: "
             f"update Shapechanger on the {older}."
         )
     hello = Hello(
@@ -248,28 +247,28 @@ async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> We
         frames=access.frames,
     )
     await line.send_bytes(messages.encode(hello))
-    answer = await _heard(line)
+    answer = await _receive(line)
     if isinstance(answer, messages.Refused):
         raise RobotRefused(answer.reason)
     if not isinstance(answer, Welcome):
-        raise LinkError(f"The robot answered with {type(answer).__name__}, not with a welcome.")
+        raise LinkError(f"Expected a Welcome from the robot, got {type(answer).__name__}.")
     return answer
 
 
-async def _heard(line: aiohttp.ClientWebSocketResponse) -> RobotMessage:
-    """The next message.
+async def _receive(line: aiohttp.ClientWebSocketResponse) -> RobotMessage:
+    """Receive the next message.
 
     Raises:
-        LinkError: If there is none, or it is none.
+        LinkError: If the connection ended, or the message is invalid.
     """
-    heard = await line.receive()
-    if heard.type is aiohttp.WSMsgType.BINARY:
-        return messages.decode_robot_message(heard.data)
-    if heard.type is aiohttp.WSMsgType.TEXT:
-        raise LinkError("The robot sent text where a message should be.")
-    if heard.type is aiohttp.WSMsgType.ERROR:
-        raise _lost(str(heard.data) or "the line broke")
-    raise _lost(str(heard.extra or "") or "the robot closed it")
+    received = await line.receive()
+    if received.type is aiohttp.WSMsgType.BINARY:
+        return messages.decode_robot_message(received.data)
+    if received.type is aiohttp.WSMsgType.TEXT:
+        raise LinkError("Expected a binary message from the robot, got text.")
+    if received.type is aiohttp.WSMsgType.ERROR:
+        raise _lost(str(received.data) or "the connection broke")
+    raise _lost(str(received.extra or "") or "the robot closed it")
 
 
 def _lost(why: str) -> LinkError:

@@ -1,35 +1,32 @@
-"""Robots in the same network that say where they are."""
+"""Discovery of robots on the local network, by mDNS."""
 
 from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from shapechanger.errors import MissingExtra
-from shapechanger.link.address import Address
+from shapechanger.link.address import SERVICE, Address
 
 try:
     from zeroconf import ServiceBrowser, ServiceListener, Zeroconf
 except ImportError as error:
     raise MissingExtra("zeroconf", "remote") from error
 
-__all__ = ["SERVICE", "FoundRobot", "find"]
-
-SERVICE: Final = "_shapechanger._tcp.local."
-"""Under what robots announce themselves."""
+__all__ = ["FoundRobot", "find"]
 
 
 @dataclass(frozen=True, slots=True)
 class FoundRobot:
-    """What a robot says of itself to everybody; nothing of it is proven.
+    """Announcement of a robot, which proves nothing.
 
     Attributes:
         name: Name of the robot.
-        body: What it is, such as "car".
-        address: Where it is.
+        body: Kind of robot, such as "car".
+        address: Address of the robot.
         fingerprint: SHA-256 of its certificate in hexadecimal; "" for none.
-        version: Version of the messages that it speaks.
+        version: Version of the messages that it uses.
     """
 
     name: str
@@ -40,7 +37,7 @@ class FoundRobot:
 
 
 class _Collector(ServiceListener):
-    """Asks each service that appears for its details."""
+    """Listener that resolves each service."""
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_ms = int(timeout_s * 1e3)
@@ -49,48 +46,48 @@ class _Collector(ServiceListener):
 
     @property
     def found(self) -> list[FoundRobot]:
-        """Those seen so far, by name."""
+        """The robots found so far, by name."""
         with self._lock:
             return sorted(self._found.values(), key=lambda robot: (robot.name, str(robot.address)))
 
     def add_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """A robot appeared."""
+        """Add a robot."""
         info = zc.get_service_info(type_, name, self._timeout_ms)
         addresses = info.parsed_scoped_addresses() if info else []
         if info is None or info.port is None or not addresses:
             return
-        told = {
+        properties = {
             key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
             for key, value in info.properties.items()
         }
         robot = FoundRobot(
-            name=told.get("id") or name.removesuffix(f".{SERVICE}"),
-            body=told.get("body", ""),
+            name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
+            body=properties.get("body", ""),
             address=Address(addresses[0], info.port),
-            fingerprint=told.get("fp", ""),
-            version=told.get("v", ""),
+            fingerprint=properties.get("fp", ""),
+            version=properties.get("v", ""),
         )
         with self._lock:
             self._found[name] = robot
 
     def update_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """A robot changed what it says."""
+        """Update a robot."""
         self.add_service(zc, type_, name)
 
     def remove_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """A robot left."""
+        """Remove a robot."""
         with self._lock:
             self._found.pop(name, None)
 
 
 def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
-    """The robots that answer within a time, by name.
+    """Find the robots on the local network, sorted by name.
 
-    A network may block what this needs (multicast DNS); connecting by address works all the same.
+    A network may block multicast DNS; an address works all the same.
 
     Args:
-        timeout_s: How long to listen, s.
-        zeroconf: The `zeroconf.Zeroconf` to listen with; None for a new one.
+        timeout_s: Time to listen, s.
+        zeroconf: A `zeroconf.Zeroconf` to use; None for a new one.
     """
     listener = _Collector(timeout_s)
     own = zeroconf or Zeroconf()

@@ -1,7 +1,9 @@
-"""Who it is that answers: the fingerprint is checked, or it is shown to a person to compare.
+"""Known robots: address, key and fingerprint of each, in a file that only the user can read.
 
-Nothing is trusted on first use. A program cannot tell the robot from somebody who stands in
-between; a person who looks at both fingerprints can.
+The files are `~/.config/shapechanger/known/NAME.toml`, or below `$XDG_CONFIG_HOME` if that is set.
+
+No robot is trusted on first use. A program cannot tell the robot from a man in the middle; a
+person who compares the fingerprints can.
 """
 
 from __future__ import annotations
@@ -22,9 +24,9 @@ from shapechanger.link.authentication import (
     fingerprint_hex,
     fingerprint_of,
     fingerprint_short,
+    parse_fingerprint,
     parse_key,
 )
-from shapechanger.link.authentication import parse_fingerprint as _parse_fingerprint
 
 __all__ = [
     "INSECURE",
@@ -41,77 +43,26 @@ __all__ = [
 ]
 
 INSECURE: Final = "insecure"
-"""In the place of a fingerprint: no encryption, and no proof of who answers."""
-
-
-def parse_trust(fingerprint: str) -> bytes | None:
-    """SHA-256 of the certificate to expect; None for "insecure".
-
-    Raises:
-        LinkError: If it is neither a fingerprint nor that word.
-    """
-    return None if fingerprint == INSECURE else _parse_fingerprint(fingerprint)
-
-
-def shown_fingerprint(address: Address, timeout_s: float) -> bytes:
-    """SHA-256 of the certificate that is shown at an address, whoever shows it.
-
-    Raises:
-        LinkError: If nobody shows one.
-    """
-    try:
-        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
-    except OSError as error:
-        raise LinkError(f"Nobody shows a certificate at {address}: {error}.") from None
-    return fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
-
-
-def untrusted(address: Address, timeout_s: float) -> LinkError:
-    """What to say to somebody who connects without a fingerprint.
-
-    Raises:
-        LinkError: If nobody shows one.
-    """
-    shown = shown_fingerprint(address, timeout_s)
-    digits = fingerprint_hex(shown)
-    return LinkError(
-        f"Nothing says that the robot at {address} is yours. It shows the fingerprint\n"
-        f"  {digits}  (in short {fingerprint_short(shown)})\n"
-        "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
-        f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
-    )
-
+"""In place of a fingerprint: no encryption, and no proof of the robot's identity."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")
 _OTHERS: Final = 0o077
 
 
-def check_name(name: str) -> None:
-    """Refuse a name that no robot can be remembered under.
-
-    Raises:
-        LinkError: If it is none.
-    """
-    if not _NAME.fullmatch(name):
-        raise LinkError(
-            f"{name!r} is no name for a robot: up to 64 letters, digits, '-', '_' and '.'."
-        )
-
-
 @dataclass(frozen=True, slots=True)
 class KnownRobot:
-    """What it takes to reach a robot.
+    """A robot that the user trusts.
 
     Attributes:
         name: Name of the robot.
-        address: Host, or HOST:PORT.
-        key: The robot's key, as its `init` wrote it.
-        fingerprint: SHA-256 of its certificate in hexadecimal, or "insecure"; then the key may be
-            empty.
+        address: HOST, or HOST:PORT.
+        key: The robot's key, from `shapechanger robot init`.
+        fingerprint: SHA-256 of its certificate in hexadecimal; or "insecure", and then the key may
+            be empty.
 
     Raises:
-        LinkError: If one of them cannot be meant.
+        LinkError: If an attribute is invalid.
     """
 
     name: str
@@ -127,32 +78,44 @@ class KnownRobot:
             parse_key(self.key)
 
     def __repr__(self) -> str:
-        """Without the key, which belongs in no log."""
+        """Leave out the key, which does not belong in a log."""
         return f"KnownRobot({self.name!r}, {self.address!r}, fingerprint={self.fingerprint!r})"
 
 
+def check_name(name: str) -> None:
+    """Check the name of a robot.
+
+    Raises:
+        LinkError: If it is not a valid name.
+    """
+    if not _NAME.fullmatch(name):
+        raise LinkError(
+            f"A robot's name has up to 64 letters, digits, '-', '_' and '.', got {name!r}."
+        )
+
+
 def known_folder() -> Path:
-    """Where they are."""
+    """Return the folder of the files."""
     config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(config) / "shapechanger" / "known"
 
 
 def known_names() -> tuple[str, ...]:
-    """The names of all robots that are remembered, in order."""
+    """Return the names of all known robots, sorted."""
     return tuple(sorted(path.stem for path in known_folder().glob("*.toml")))
 
 
 def remember(robot: KnownRobot) -> Path:
-    """Write a robot down; one of the same name is replaced.
+    """Save a robot; one of the same name is replaced.
 
     Returns:
         The file.
 
     Raises:
-        OutputError: If it cannot be written; it is then as it was.
+        OutputError: If it cannot be written; an existing file is unchanged.
     """
     folder = known_folder()
-    # The strings of JSON are strings of TOML, but for one character, which no field holds.
+    # JSON strings are TOML strings, but for one character, which no field contains.
     lines = [
         f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
     ]
@@ -160,7 +123,7 @@ def remember(robot: KnownRobot) -> Path:
     written: Path | None = None
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        # A temporary file is made for its owner alone.
+        # Only the user can read a temporary file.
         with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, delete=False) as file:
             written = Path(file.name)
             file.writelines(lines)
@@ -173,32 +136,81 @@ def remember(robot: KnownRobot) -> Path:
 
 
 def recall(name: str) -> KnownRobot:
-    """A robot that was remembered.
+    """Load a known robot.
 
     Raises:
-        UnknownName: If there is none of this name.
-        LinkError: If its file cannot be read, or others can read it too.
+        UnknownName: If there is no robot of this name.
+        LinkError: If its file is invalid, or other users can read it.
     """
-    path = known_folder() / f"{name}.toml"
-    if name not in known_names():
-        raise UnknownName("known robot", name, known_names())
+    path = _file(name)
     if os.name == "posix" and path.stat().st_mode & _OTHERS:
-        raise LinkError(f"Others may read the key in {path}: run `chmod 600 {path}`.")
+        raise LinkError(f"Other users can read the key in {path}: run `chmod 600 {path}`.")
     try:
-        told = tomllib.loads(path.read_text(encoding="utf-8"))
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise LinkError(f"{path} cannot be read: {error}.") from None
-    if set(told) != set(_FIELDS) or not all(isinstance(value, str) for value in told.values()):
-        raise LinkError(f"{path} must hold {', '.join(_FIELDS)}, each a text.")
-    return KnownRobot(name, **told)
+        raise LinkError(f"Cannot read {path}: {error}.") from None
+    if set(fields) != set(_FIELDS) or not all(isinstance(v, str) for v in fields.values()):
+        raise LinkError(f"{path} must have the strings {', '.join(_FIELDS)}.")
+    return KnownRobot(name, **fields)
 
 
 def forget(name: str) -> None:
-    """Remove a robot.
+    """Delete a known robot.
 
     Raises:
-        UnknownName: If there is none of this name.
+        UnknownName: If there is no robot of this name.
     """
-    if name not in known_names():
-        raise UnknownName("known robot", name, known_names())
-    (known_folder() / f"{name}.toml").unlink()
+    _file(name).unlink()
+
+
+def parse_trust(fingerprint: str) -> bytes | None:
+    """Return the SHA-256 of the expected certificate; None for "insecure".
+
+    Raises:
+        LinkError: If the text is neither a fingerprint nor "insecure".
+    """
+    return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
+
+
+def shown_fingerprint(address: Address, timeout_s: float) -> bytes:
+    """Return the SHA-256 of the certificate that a server shows, without trusting it.
+
+    Args:
+        address: Address of the server.
+        timeout_s: Time limit, s.
+
+    Raises:
+        LinkError: If no server shows a certificate.
+    """
+    try:
+        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
+    except OSError as error:
+        raise LinkError(f"No server shows a certificate at {address}: {error}.") from None
+    return fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
+
+
+def untrusted(address: Address, timeout_s: float) -> LinkError:
+    """Return the error for a connection without a fingerprint, which shows the one to compare.
+
+    Args:
+        address: Address of the robot.
+        timeout_s: Time limit, s.
+
+    Raises:
+        LinkError: If no server shows a certificate.
+    """
+    shown = shown_fingerprint(address, timeout_s)
+    digits = fingerprint_hex(shown)
+    return LinkError(
+        f"The robot at {address} is not trusted yet. Its fingerprint is\n"
+        f"  {digits}  (in short {fingerprint_short(shown)})\n"
+        "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
+        f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
+    )
+
+
+def _file(name: str) -> Path:
+    names = known_names()
+    if name not in names:
+        raise UnknownName("known robot", name, names)
+    return known_folder() / f"{name}.toml"

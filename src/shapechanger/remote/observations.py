@@ -1,4 +1,4 @@
-"""From the JPEG of a robot to the picture of an observation."""
+"""Gymnasium spaces, observations and rewards from the messages of a robot."""
 
 from __future__ import annotations
 
@@ -23,39 +23,48 @@ try:
 except ImportError as error:
     raise MissingExtra("simplejpeg", "remote") from error
 
+IMAGE: Final = "camera/image"
+"""Name of the picture in an observation layout."""
 
-# Pixels. A few bytes of JPEG can claim a picture of 65,535 x 65,535, which is 12 GB.
-_MOST_PIXELS: Final = 4096 * 4096
+BUMP: Final = "bump"
+"""Name of the bump event, and of the quantity."""
+
+# A few bytes of JPEG can claim 65,535 x 65,535 pixels, which is 12 GB.
+_MAX_PIXELS: Final = 4096 * 4096
+_ABSENT: Final = "absent"
+_BRIGHTEST: Final = 255
+_NS_PER_S: Final = 1e9
+_QUANTITIES: Final = ("speed", "collision", "stall")
 
 
 def decode_picture(jpeg: bytes) -> NDArray[np.uint8]:
-    """The picture, RGB, shape (height, width, 3).
+    """Decode a JPEG to RGB, shape (height, width, 3).
 
     Raises:
-        LinkError: If these bytes are no picture, or one too large to be meant.
+        LinkError: If the bytes are not a JPEG, or the picture is too large.
     """
     try:
         height, width = (int(n) for n in simplejpeg.decode_jpeg_header(jpeg)[:2])
-        if height * width > _MOST_PIXELS:
+        if height * width > _MAX_PIXELS:
             raise LinkError(f"A picture of {width} x {height} pixels is too large.")
         return simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
     except ValueError as error:
-        raise LinkError(f"The robot sent bytes that are no JPEG: {error}.") from None
+        raise LinkError(f"The robot sent an invalid JPEG: {error}.") from None
 
 
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """The picture at another size, without a library for it.
+    """Resize a picture.
 
-    Where width and height shrink by whole numbers, each pixel is the mean of its box, rounded.
-    Otherwise each is the pixel nearest to its middle. The whole picture is kept, so a change of
-    proportions stretches it.
+    If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
+    Otherwise it is the pixel nearest to its middle. Nothing is cropped, so a change of proportions
+    stretches the picture.
 
     Args:
         picture: Shape (height, width, 3).
-        size: Width and height in pixels, each at least 1.
+        size: Width and height, pixels, each at least 1.
 
     Returns:
-        Shape (size[1], size[0], 3); the picture itself where the size is its own.
+        Shape (size[1], size[0], 3); the picture itself if it has this size.
     """
     height, width = picture.shape[:2]
     wide, high = size
@@ -69,21 +78,14 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     return picture[rows[:, None], columns[None, :]]
 
 
-IMAGE: Final = "camera/image"
-"""Name of the picture in an observation layout."""
-
-_ABSENT: Final = "absent"
-_BRIGHTEST: Final = 255
-
-
 @dataclass(frozen=True, slots=True)
 class View:
-    """What an observation shows.
+    """Observation of an env, and facts for its `info`.
 
     Attributes:
-        observation: What the env returns; shares memory with nothing.
-        fresh: Whether its picture is another one than before; True without pictures.
-        absent: Names of the numbers of the state that nothing measures now.
+        observation: The observation, which shares no memory.
+        fresh: Whether its picture differs from the previous one; True without pictures.
+        absent: Names of the state's features that no sensor measures now.
     """
 
     observation: Any
@@ -92,17 +94,23 @@ class View:
 
 
 class RobotSpaces:
-    """The spaces of one robot, and how its messages fill them.
+    """Spaces and layouts of one robot, and observations from its messages.
 
     Args:
-        welcome: What the robot is.
-        size: Width and height of the pictures in pixels.
-        image: Whether observations have a picture; None for when the robot has a camera.
+        welcome: Description of the robot.
+        size: Width and height of the pictures, pixels.
+        image: Whether observations have a picture; None if the robot has a camera.
         state: Whether observations have the state besides the picture.
 
+    Attributes:
+        action_layout: Layout of an action.
+        action_space: One number for each action of the robot.
+        observation_layout: Layout of an observation; a picture is one block.
+        observation_space: Space of the picture, the state, or both.
+
     Raises:
-        RobotRefused: If a picture is asked for and there is no camera.
-        SpaceMismatch: If the size is no size.
+        RobotRefused: If a picture is required and the robot has no camera.
+        SpaceMismatch: If the size is below 1 pixel.
     """
 
     def __init__(
@@ -111,10 +119,12 @@ class RobotSpaces:
         has_camera = welcome.image_size is not None
         if image and not has_camera:
             raise RobotRefused(
-                f"{welcome.robot} has no camera: leave out `image`, to get its state."
+                f"{welcome.robot} has no camera: leave out `image` to get its state."
             )
         if min(size) < 1:
-            raise SpaceMismatch(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+            raise SpaceMismatch(
+                f"A picture must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
+            )
         self._size = size
         self._has_image = has_camera if image is None else image
         self._has_state = state or not self._has_image
@@ -123,56 +133,52 @@ class RobotSpaces:
             name: place.start for name, place in self._state_layout.slices.items()
         }
         self.action_layout = Layout.from_json(welcome.action_layout)
-        """What the numbers of an action mean."""
         self.action_space = gym.spaces.Box(
             self.action_layout.low.astype(np.float32), self.action_layout.high.astype(np.float32)
         )
-        """One number for each action of the robot."""
         self.observation_layout = self._layout()
-        """What the numbers of an observation mean; a picture is one block."""
         self.observation_space = self._space()
-        """Pictures, the state, or both."""
         self._picture: NDArray[np.uint8] | None = None
         self._picture_seq = 0
         self._viewed_seq = 0
 
     @property
     def has_image(self) -> bool:
-        """Whether observations have a picture."""
+        """True if observations have a picture."""
         return self._has_image
 
     @property
     def picture(self) -> NDArray[np.uint8] | None:
-        """The newest picture at the robot's own size; None before the first."""
+        """The newest picture at the camera's size; None before the first."""
         return self._picture
 
     def values(self, action: Any) -> tuple[float, ...]:
-        """The numbers of a command, clipped to the range of the action.
+        """Return the values of a command, clipped to the range of the action.
 
         Raises:
-            SpaceMismatch: If there are too many or too few, or one of them is no number.
+            SpaceMismatch: If the shape is wrong, or a number is not finite.
         """
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != self.action_space.shape or not np.isfinite(array).all():
             raise SpaceMismatch(
                 f"An action of this robot is {len(self.action_layout)} finite numbers "
-                f"({', '.join(self.action_layout.names)}), got {given.tolist()}."
+                f"({', '.join(self.action_layout.names)}), got {array.tolist()}."
             )
-        clipped = np.clip(given, self.action_layout.low, self.action_layout.high)
+        clipped = np.clip(array, self.action_layout.low, self.action_layout.high)
         return tuple(clipped.tolist())
 
     @property
     def rest(self) -> tuple[float, ...]:
-        """The action that moves nothing: 0, or the bound nearest to it."""
+        """The action at rest: 0, or the bound nearest to it."""
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
     def quantity(self, message: Observation, name: str) -> float | None:
-        """A quantity of the state by its name; None where nothing measures it."""
+        """Return a quantity of the state by name, or None if no sensor measures it."""
         value = self._number(message, name)
         return None if math.isnan(value) or self.source(message, name) == _ABSENT else value
 
     def source(self, message: Observation, name: str) -> str:
-        """Where a quantity comes from: name of the sensor, "estimated" or "absent"."""
+        """Return the source of a quantity: name of the sensor, "estimated" or "absent"."""
         if math.isnan(self._number(message, name)):
             return _ABSENT
         return message.sources.get(name, _ABSENT)
@@ -182,10 +188,9 @@ class RobotSpaces:
         return math.nan if place is None else message.state[place]
 
     def shows(self, received: Received) -> bool:
-        """Whether the picture of an observation is there and can be seen.
+        """Decode the frame of an observation. Return False if there is none, or it is invalid.
 
-        Bytes that are no picture change nothing: the newest picture is then an old one, and
-        `View.fresh` says so.
+        After an invalid frame `picture` is still the previous one, and `View.fresh` is False.
         """
         seq = received.message.frame_seq
         if received.jpeg is None or seq == self._picture_seq:
@@ -198,15 +203,15 @@ class RobotSpaces:
         return True
 
     def view(self, received: Received) -> View:
-        """What an observation shows.
+        """Return the env's observation for an observation of the robot.
 
         Raises:
-            LinkError: If the state is not what the robot promised, or there is no picture yet.
+            LinkError: If the state does not fit the layout, or there is no picture yet.
         """
         message = received.message
         if len(message.state) != self._state_layout.size:
             raise LinkError(
-                f"The robot promised {self._state_layout.size} numbers of state and sent "
+                f"The state layout has {self._state_layout.size} numbers, and the robot sent "
                 f"{len(message.state)}."
             )
         state, absent = self._state(message)
@@ -222,7 +227,7 @@ class RobotSpaces:
         return View(seen, fresh, absent)
 
     def _state(self, message: Observation) -> tuple[NDArray[np.float32], tuple[str, ...]]:
-        """The state; a number that nothing measures is the middle of its range, and is named."""
+        """Return the state with absent values at the middle of their range, and their names."""
         state = np.array(message.state, dtype=np.float32)
         missing = np.isnan(state)
         if not missing.any():
@@ -255,59 +260,52 @@ class RobotSpaces:
         return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image
 
 
-BUMP: Final = "bump"
-"""Name of the event of a bump, and of the quantity."""
-
-_NS_PER_S: Final = 1e9
-_QUANTITIES: Final = ("speed", "collision", "stall")
-
-
 class StepScorer:
-    """Judges the steps of one robot, one after another.
+    """Rewards of one robot's steps, one after another.
 
     Args:
-        senses: Reads the robot's messages.
+        spaces: Reads the robot's messages.
         reward: Weights of the task.
     """
 
-    def __init__(self, senses: RobotSpaces, reward: DriveReward) -> None:
-        self._senses = senses
+    def __init__(self, spaces: RobotSpaces, reward: DriveReward) -> None:
+        self._spaces = spaces
         self._reward = reward
         self._touched = False
 
     def start(self, seen: Observation) -> None:
-        """Begin an episode: what it touches now is no collision of this episode."""
+        """Begin an episode; an obstacle that the robot touches already is no new collision."""
         self._touched = bool(self._touches(seen)[0])
 
     def judge(
         self, before: Observation, seen: Observation, bumped: bool
     ) -> tuple[bool, dict[str, float]]:
-        """Whether the task is over, and the terms of the reward.
+        """Return whether the task is over, and the terms of the reward.
 
         Args:
-            before: The observation before.
-            seen: The one after.
+            before: The observation before the step.
+            seen: The observation after the step.
             bumped: Whether there was a bump, which may be over by now.
         """
         touches = self._touches(seen)[0]
-        stall = self._senses.quantity(seen, "stall")
+        stall = self._spaces.quantity(seen, "stall")
         hits = bool(touches) or bumped
         collided = None if touches is None else hits and not self._touched
         self._touched = hits
         dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
-        speed = self._senses.quantity(seen, "speed")
+        speed = self._spaces.quantity(seen, "speed")
         stalled = None if stall is None else bool(stall)
         return self._reward.ends(collided), self._reward.terms(speed, collided, stalled, dt_s)
 
     def sources(self, seen: Observation) -> dict[str, str]:
-        """Which sensor each quantity of the reward comes from."""
-        sources = {name: self._senses.source(seen, name) for name in _QUANTITIES}
+        """Return the source of each quantity of the reward."""
+        sources = {name: self._spaces.source(seen, name) for name in _QUANTITIES}
         return sources | {"collision": self._touches(seen)[1]}
 
     def _touches(self, seen: Observation) -> tuple[float | None, str]:
-        """Whether it touches something, 0 or 1, and which sensor says so."""
+        """Return whether the robot touches something, 0 or 1, and the source."""
         for quantity in ("collision", BUMP):
-            value = self._senses.quantity(seen, quantity)
+            value = self._spaces.quantity(seen, quantity)
             if value is not None:
-                return value, self._senses.source(seen, quantity)
+                return value, self._spaces.source(seen, quantity)
         return None, _ABSENT

@@ -1,4 +1,4 @@
-"""Pages that need no other file: their markup, their pictures and how they look."""
+"""Reports as self-contained HTML files: of studies, demonstrations, clones and fingers."""
 
 from __future__ import annotations
 

@@ -1,47 +1,50 @@
-"""Numbers as a reader wants them: no more digits than the interval bears, and no -0."""
+"""Formatting of numbers: as many digits as the interval supports, and no -0."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
-from shapechanger.transfer.metrics import Estimate
+if TYPE_CHECKING:
+    from shapechanger.transfer.metrics import Estimate
 
 __all__ = [
     "CONFIDENCE",
     "UNDEFINED",
     "SeedMean",
     "count",
+    "duration_text",
     "estimate_text",
     "interval_text",
     "list_text",
     "number",
     "share_text",
+    "shares_text",
     "spread_text",
     "t_interval",
 ]
 
 UNDEFINED: Final = "undefined"
+CONFIDENCE: Final = 0.95
 
-# From here on thousands separators make a number longer than its powers of ten.
+# Above this, thousands separators make a number longer than scientific notation does.
 _HUGE: Final = 1e10
-_MOST_DECIMALS: Final = 6
-# Of a number without an interval; an interval bears two digits of its width.
+_MAX_DECIMALS: Final = 6
+# Significant digits of a number without an interval; an interval gets two digits of its width.
 _SIGNIFICANT: Final = 4
 
 
 def number(value: float, decimals: int | None = None, *, signed: bool = False) -> str:
-    """A number with separated thousands, or with a power of ten where it is huge.
+    """Format a number with thousands separators, or in scientific notation where it is huge.
 
     Args:
-        value: The number, finite.
-        decimals: Digits after the point; None for four digits in all.
-        signed: Whether a number above zero bears its sign, as a difference should.
+        value: A finite number.
+        decimals: Digits after the point; None for four significant digits.
+        signed: Whether a number above zero gets a plus sign, as a difference should.
     """
     sign = "+" if signed and value > 0.0 else ""
     if abs(value) >= _HUGE:
@@ -54,15 +57,22 @@ def number(value: float, decimals: int | None = None, *, signed: bool = False) -
 
 
 def count(value: float) -> str:
-    """A number of steps, whole."""
+    """Format a number of steps."""
     return number(value, 0)
 
 
 def interval_text(value: float, low: float, high: float, *, signed: bool = False) -> str:
-    """An estimate with its interval, as in `+0.31 [+0.22, +0.40]`."""
+    """Format an estimate with its interval, as in `+0.31 [+0.22, +0.40]`.
+
+    Args:
+        value: The estimate.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
+        signed: Whether numbers above zero get a plus sign.
+    """
     decimals = _decimals(high - low, 2)
-    # An end that is not zero must not look as if it were: it decides whether 0 is in the interval.
-    while decimals < _MOST_DECIMALS and any(
+    # An end other than zero must not be rounded to zero: it decides whether the interval has 0.
+    while decimals < _MAX_DECIMALS and any(
         end != 0.0 and round(end, decimals) == 0.0 for end in (low, high)
     ):
         decimals += 1
@@ -71,7 +81,12 @@ def interval_text(value: float, low: float, high: float, *, signed: bool = False
 
 
 def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
-    """An estimate in one line, whether it has a value and an interval or not."""
+    """Format an estimate, with or without a value and an interval.
+
+    Args:
+        estimate: The estimate.
+        signed: Whether numbers above zero get a plus sign.
+    """
     if estimate.value is None:
         return UNDEFINED
     if estimate.low is None or estimate.high is None:
@@ -80,23 +95,37 @@ def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
 
 
 def list_text(values: Sequence[float]) -> str:
-    """Several numbers with the same digits after the point, enough to tell them apart."""
+    """Format several numbers with the same decimals, enough to tell them apart."""
     decimals = _decimals(max(values) - min(values), 3)
     return "; ".join(number(value, decimals) for value in values)
 
 
-def _decimals(size: float, significant: int) -> int:
-    """Digits after the point that show so many significant digits of `size`."""
-    if size == 0.0:
-        return 0
-    return min(max(significant - 1 - math.floor(math.log10(size)), 0), _MOST_DECIMALS)
+def duration_text(seconds: float) -> str:
+    """Format a duration.
+
+    >>> duration_text(4.25), duration_text(59.97), duration_text(754.0)
+    ('4.2 s', '1:00 min', '12:34 min')
+    """
+    if round(seconds, 1) < 60.0:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d} min"
 
 
-CONFIDENCE: Final = 0.95
+def shares_text(counts: Mapping[str, int]) -> str:
+    """Format each name's share of the total.
+
+    >>> shares_text({"policy": 30, "expert": 10}), shares_text({"expert": 4})
+    ('policy 75 %, expert 25 %', 'expert')
+    """
+    total = sum(counts.values())
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{name} {100.0 * count / total:.0f} %" for name, count in counts.items())
 
 
 class SeedMean(NamedTuple):
-    """Means with their t-intervals.
+    """Means over seeds with their t-intervals.
 
     Attributes:
         mean: Mean over the seeds, shape (n,).
@@ -116,6 +145,8 @@ def t_interval(samples: NDArray[np.float64]) -> SeedMean:
         samples: One row for each seed, shape (n_seeds, n). One seed has no interval: both ends are
             its mean.
     """
+    from scipy import stats  # Slow to import, and not needed to format numbers.
+
     n_seeds = samples.shape[0]
     mean = samples.mean(axis=0)
     if n_seeds == 1:
@@ -126,7 +157,7 @@ def t_interval(samples: NDArray[np.float64]) -> SeedMean:
 
 
 def spread_text(values: NDArray[np.float64]) -> str:
-    """The mean of one number for each seed with its t-interval, as in `950 [900, 1,000]`.
+    """Format the mean of one number for each seed with its t-interval, as in `950 [900, 1,000]`.
 
     Args:
         values: Shape (n_seeds,).
@@ -138,9 +169,9 @@ def spread_text(values: NDArray[np.float64]) -> str:
 
 
 def share_text(shares: NDArray[np.float64]) -> str:
-    """The mean of one share for each seed with its t-interval, as in `85 % [71 %, 99 %]`.
+    """Format the mean share over seeds with its t-interval, as in `85 % [71 %, 99 %]`.
 
-    The interval is cut off at 0 and 1, where no share can be beyond.
+    The interval is clipped to 0 and 1.
 
     Args:
         shares: 0 to 1, shape (n_seeds,); empty for an empty text.
@@ -156,3 +187,10 @@ def share_text(shares: NDArray[np.float64]) -> str:
 
 def _percent(share: float) -> str:
     return f"{number(100.0 * share, 0)} %"
+
+
+def _decimals(size: float, significant: int) -> int:
+    """Digits after the point that show so many significant digits of `size`."""
+    if size == 0.0:
+        return 0
+    return min(max(significant - 1 - math.floor(math.log10(size)), 0), _MAX_DECIMALS)

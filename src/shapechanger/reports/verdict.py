@@ -1,4 +1,4 @@
-"""What each arm came to: its returns over seeds, and what they are made of."""
+"""The findings of a study as text: measures, arms, the verdict and its caveats."""
 
 from __future__ import annotations
 
@@ -53,6 +53,151 @@ __all__ = [
     "verdict",
 ]
 
+JUMPSTART: Final = "Jumpstart"
+TOTAL_REWARD_GAIN: Final = "Total reward gain"
+ASYMPTOTIC_GAIN: Final = "Asymptotic gain"
+AUC_RATIO: Final = "auc_ratio"
+FORWARD_TRANSFER: Final = "Forward transfer"
+TIME_TO_THRESHOLD: Final = "Time to threshold"
+
+PURE_NUMBER: Final = "pure number"
+
+_TAYLOR_STONE: Final = "Taylor & Stone, JMLR 10, 2009"
+
+EXPLANATIONS: Final[dict[str, str]] = {
+    JUMPSTART: "Return of the arm minus that of scratch at the first evaluation on the target; in "
+    "total steps, minus that of scratch after as many steps as the source used. Above 0: transfer "
+    f"helped. ({_TAYLOR_STONE})",
+    TOTAL_REWARD_GAIN: "Height of the arm's learning curve above that of scratch, averaged over "
+    f"the whole budget. Above 0: transfer helped. ({_TAYLOR_STONE}, divided by the budget)",
+    ASYMPTOTIC_GAIN: "Return of the arm minus that of scratch at the end of the budget. Above 0: "
+    f"transfer helped. ({_TAYLOR_STONE})",
+    AUC_RATIO: "Area under the arm's learning curve over that of scratch, both in scores. Above 1: "
+    f"transfer helped. ({_TAYLOR_STONE}, as the transfer ratio)",
+    FORWARD_TRANSFER: "The share of the area between scratch's curve and the score 1 that the arm "
+    "wins, with scores cut off at 0 and 1. At most 1; above 0: transfer helped. (Wołczyk et al., "
+    "Continual World, NeurIPS 2021)",
+    TIME_TO_THRESHOLD: "How many steps sooner than scratch the arm reaches a score for the first "
+    "time. Runs that never reach it count with the whole budget; none are dropped. Above 0: "
+    f"transfer helped. ({_TAYLOR_STONE}; Royston & Parmar, BMC Med. Res. Methodol. 13, 2013)",
+}
+
+
+class MeasureRow(NamedTuple):
+    """One measure of one arm against scratch, in target steps and in total steps.
+
+    Attributes:
+        arm: The arm.
+        measure: Name of the measure.
+        unit: "score", "return", "steps" or "pure number".
+        target: Value and interval, counted in target steps.
+        total: Value and interval, counted in total steps.
+        method: Kind of interval, or "none"; both, where the two ways of counting differ.
+        note: A remark; may be empty.
+    """
+
+    arm: Arm
+    measure: str
+    unit: str
+    target: str
+    total: str
+    method: str
+    note: str
+
+
+def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
+    """Format every measure of every arm other than scratch."""
+    rows: list[MeasureRow] = []
+    for arm in study.plan.arms:
+        if arm != "scratch":
+            rows += _rows_of(arm, study.summaries[arm])
+    return tuple(rows)
+
+
+def _rows_of(arm: Arm, summary: Summary) -> list[MeasureRow]:
+    """Rows of one arm, gains first."""
+    ours, total = _named(summary.in_target_steps), _named(summary.in_total_steps)
+    rows: list[MeasureRow] = []
+    for name, estimate in ours.items():
+        unit = PURE_NUMBER if name in (AUC_RATIO, FORWARD_TRANSFER) else summary.unit
+        rows.append(_measure_row(arm, name, unit, estimate, total[name], signed=name != AUC_RATIO))
+    times = zip(
+        summary.in_target_steps.times_to_threshold,
+        summary.in_total_steps.times_to_threshold,
+        strict=True,
+    )
+    for in_target, in_total in times:
+        row = _measure_row(
+            arm,
+            f"{TIME_TO_THRESHOLD} {in_target.threshold:g}: steps saved",
+            "steps",
+            in_target.steps_saved,
+            in_total.steps_saved,
+            signed=True,
+        )
+        reached = _reached(arm, summary, in_target, in_total)
+        rows.append(row._replace(note=" ".join(filter(None, (reached, row.note)))))
+    return rows
+
+
+def _named(measures: Measures) -> dict[str, Estimate]:
+    """The measures that are not times, by name."""
+    return {
+        JUMPSTART: measures.jumpstart,
+        TOTAL_REWARD_GAIN: measures.total_reward_gain,
+        ASYMPTOTIC_GAIN: measures.asymptotic_gain,
+        AUC_RATIO: measures.auc_ratio,
+        FORWARD_TRANSFER: measures.forward_transfer,
+    }
+
+
+def _measure_row(
+    arm: Arm, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
+) -> MeasureRow:
+    """One row; what both ways of counting share appears once."""
+    methods = [estimate.method for estimate in (target, total)]
+    return MeasureRow(
+        arm=arm,
+        measure=measure,
+        unit=unit,
+        target=estimate_text(target, signed=signed),
+        total=estimate_text(total, signed=signed),
+        method=methods[0] if methods[0] == methods[1] else " / ".join(methods),
+        note=_merge_notes(target.note, total.note),
+    )
+
+
+def _merge_notes(target: str, total: str) -> str:
+    """Merge two notes."""
+    if target == total:
+        return target
+    notes = (("In target steps", target), ("In total steps", total))
+    return " ".join(f"{where}: {note}" for where, note in notes if note)
+
+
+def _reached(
+    arm: Arm, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
+) -> str:
+    """How many seeds reached a threshold, and how soon; empty where undefined."""
+    if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
+        return ""
+    reaches = (in_target.arm, in_total.arm, in_target.scratch)
+    missed = any(reach.fraction < 1.0 for reach in reaches)
+    censored = f" Runs that did not reach it count as {count(summary.horizon)}." if missed else ""
+    return (
+        f"Reached by {_seeds(in_target.arm, summary.n_seeds_arm)} of {arm} after a mean of "
+        f"{count(in_target.arm.restricted_mean)} steps; in total steps by "
+        f"{_seeds(in_total.arm, summary.n_seeds_arm)} after {count(in_total.arm.restricted_mean)}; "
+        f"by {_seeds(in_target.scratch, summary.n_seeds_scratch)} of scratch after "
+        f"{count(in_target.scratch.restricted_mean)}.{censored}"
+    )
+
+
+def _seeds(reach: ReachTimes, n_seeds: int) -> str:
+    """Format as in `3 of 5 seeds`."""
+    return f"{round(reach.fraction * n_seeds)} of {n_seeds} seeds"
+
+
 GOOD: Final = 0.9
 """Share of the way from the random policy to the best run that counts as having learnt."""
 
@@ -60,19 +205,19 @@ _KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM)
 
 
 class ArmRow(NamedTuple):
-    """The runs of one kind in one line.
+    """Summary of the runs of one kind.
 
     Attributes:
         kind: The arm; or "random" for the random policy, or "source" for the source policies, in
             the source.
-        seeds: How many runs.
+        seeds: Number of runs.
         first_return: Mean return at the first evaluation, with its t-interval over seeds.
         final_return: Mean return at the end, with its t-interval over seeds.
         length: Mean length of the episodes at the end, in steps.
         success: Share of successful episodes at the end, with its t-interval over seeds; empty
-            where the env says nothing of success.
-        good: How many runs came to 90 % of the way from the random policy to the best run on the
-            target; empty for source policies, and where no run is better than the random policy.
+            where the env does not report success.
+        good: Number of runs that covered 90 % of the way from the random policy to the best run on
+            the target; empty for source policies, and where no run beats the random policy.
         per_seed: Return of each run at the end.
         terms: For each reward term its mean sum over an episode at the end.
     """
@@ -89,16 +234,16 @@ class ArmRow(NamedTuple):
 
 
 def arm_rows(study: Study) -> tuple[ArmRow, ...]:
-    """The kinds of run that the study has, those of the source and the random policy first.
+    """Summarise each kind of run, those of the source and the random policy first.
 
-    The end of a run is the mean of its last evaluations, as many as the plan says; of a source
-    policy it is the last one, because the policy that it was measured on is the one that is moved.
+    The end of a run is the mean of its last evaluations, as many as the plan says; for a source
+    policy it is the last one, because that is the policy that is transferred.
     """
     return tuple(_row(study, kind) for kind in _KINDS if study.of(kind))
 
 
 def successes(study: Study, kind: RunKind) -> NDArray[np.float64]:
-    """Share of successful episodes of each run at the end, shape (n_seeds,); (0,) if unknown."""
+    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
     ends = [[e.success for e in _end(study, result)] for result in study.of(kind)]
     if any(share is None for end in ends for share in end):
         return np.empty(0)
@@ -106,7 +251,7 @@ def successes(study: Study, kind: RunKind) -> NDArray[np.float64]:
 
 
 def finals(study: Study, kind: RunKind) -> NDArray[np.float64]:
-    """Return of each run at the end, shape (n_seeds,)."""
+    """Final return of each run, shape (n_seeds,)."""
     ends = (_end(study, result) for result in study.of(kind))
     return np.array([float(np.mean([e.mean_return for e in end])) for end in ends])
 
@@ -129,12 +274,12 @@ def _row(study: Study, kind: RunKind) -> ArmRow:
 
 
 def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
-    """The evaluations that count as the end of a run."""
+    """The last evaluations of a run, which are averaged."""
     return result.curve[-1 if result.run.kind == "source" else -study.plan.last_k :]
 
 
 def _good(study: Study, kind: RunKind) -> str:
-    """How many runs ever came near the best one, as in `4 of 5`."""
+    """Number of runs that ever came close to the best one, as in `4 of 5`."""
     if kind == "source":
         return ""
     floor = float(finals(study, "random").mean())
@@ -148,7 +293,7 @@ def _good(study: Study, kind: RunKind) -> str:
 
 
 def _terms(ends: list[Evaluation]) -> dict[str, float]:
-    """Mean of each reward term; an evaluation that does not report one has none of it."""
+    """Mean of each reward term; a missing one counts as 0."""
     names = {name: None for evaluation in ends for name in evaluation.terms}
     return {name: float(np.mean([e.terms.get(name, 0.0) for e in ends])) for name in names}
 
@@ -161,7 +306,7 @@ _FEW_SEEDS: Final = 5
 
 
 class _Finding(NamedTuple):
-    """One clause of a sentence: what an estimate says, and the estimate."""
+    """One clause of the verdict, chosen by the direction of an estimate."""
 
     clauses: dict[Direction, str]
     estimate: Estimate
@@ -173,9 +318,9 @@ class _Finding(NamedTuple):
 
 
 def direction(estimate: Estimate) -> Direction:
-    """Whether the interval of a difference lies above 0, below 0, or neither; then it is unclear.
+    """Direction of a difference: up or down if its interval excludes 0, otherwise unclear.
 
-    An estimate without an interval is unclear too, whatever its value.
+    An estimate without an interval is unclear, whatever its value.
     """
     if estimate.low is not None and estimate.low > 0.0:
         return "up"
@@ -185,12 +330,11 @@ def direction(estimate: Estimate) -> Direction:
 
 
 def verdict(study: Study) -> str:
-    """Whether transfer helped: a sentence on target steps, one on total steps, and a warning.
+    """State whether transfer helped: a sentence on target steps, one on total steps, and warnings.
 
-    Fine-tune is judged by its total reward gain, which is chosen in advance, so that nobody can
-    pick the measure that pleases; the asymptotic gain and the time to the highest threshold are
-    told beside it. A study without fine-tune is judged by the jumpstart of its first other arm.
-    Where the envs say what success is, a sentence tells how often each arm succeeds.
+    Fine-tune is judged by its total reward gain, a measure chosen in advance; the asymptotic gain
+    and the time to the highest threshold follow it. A study without fine-tune is judged by the
+    jumpstart of its first other arm. Success rates are added where the envs report success.
     """
     arm = headline_arm(study)
     summary = study.summaries[arm]
@@ -201,34 +345,35 @@ def verdict(study: Study) -> str:
     sentences += _successes(study)
     if direction(scratch_gain(study)) != "up":
         sentences.append(
-            f"Scratch itself did not clearly learn: it ended at {_verdict_end(study, 'scratch')}, and the "
-            f"random policy is worth {_verdict_end(study, 'random')}, so the comparison means little: "
-            "try more target steps."
+            "Scratch itself did not clearly learn: it ended at "
+            f"{_final_text(study, 'scratch')}, and the random policy is worth "
+            f"{_final_text(study, 'random')}, so the comparison means little: try more target "
+            "steps."
         )
     return " ".join(sentences)
 
 
 def headline_arm(study: Study) -> Arm:
-    """The arm that a study is judged by."""
+    """The arm that the verdict is about."""
     return "fine-tune" if "fine-tune" in study.summaries else next(iter(study.summaries))
 
 
 def _successes(study: Study) -> list[str]:
-    """How often each arm succeeds at the end; nothing where the envs do not say what success is."""
+    """The sentence on success rates; none where the envs do not report success."""
     kinds: list[RunKind] = ["source", *study.plan.arms]
-    told = {kind: share_text(successes(study, kind)) for kind in kinds}
+    shares = {kind: share_text(successes(study, kind)) for kind in kinds}
     names = {"source": "the source policy in the source"}
-    parts = [f"{names.get(kind, kind)} {share}" for kind, share in told.items() if share]
+    parts = [f"{names.get(kind, kind)} {share}" for kind, share in shares.items() if share]
     return [f"Success at the end: {'; '.join(parts)}."] if parts else []
 
 
 def scratch_gain(study: Study) -> Estimate:
-    """How much better scratch ended than the random policy, in units of return."""
+    """Final return of scratch minus that of the random policy."""
     return estimate_difference(finals(study, "scratch"), finals(study, "random"))
 
 
 def source_takes_all(summary: Summary) -> bool:
-    """Whether the source has cost the whole budget, so that total steps leave none for the target.
+    """Whether the source used up the budget, so that none is left for the target in total steps.
 
     Every measure in total steps but the jumpstart then compares the random policy with scratch.
     """
@@ -236,41 +381,41 @@ def source_takes_all(summary: Summary) -> bool:
 
 
 def caveats(study: Study) -> tuple[str, ...]:
-    """What a reader must not make of the numbers, one sentence or two each."""
+    """Limits of the numbers, one or two sentences each."""
     summary = next(iter(study.summaries.values()))
     source, budget = count(summary.source_steps), count(summary.horizon)
-    told: list[str] = []
+    sentences: list[str] = []
     if source_takes_all(summary):
-        told.append(
-            f"The source has cost {source} steps and the budget is {budget}, so in total steps "
-            "nothing is left for the target: there only the jumpstart says something, and the "
+        sentences.append(
+            f"The source used {source} steps and the budget is {budget}, so in total steps "
+            "nothing is left for the target: only the jumpstart is meaningful there, and the "
             "other measures compare the random policy with scratch."
         )
     elif summary.source_steps > 0.0:
-        told.append(
+        sentences.append(
             f"In total steps the budget stays {budget}: an arm is worth what the random policy is "
             f"until its {source} source steps have passed."
         )
     if study.plan.source_policy:
-        told.append(
-            "All runs of zero-shot and fine-tune start from the one source policy that was brought "
-            "along: the intervals say nothing about another policy of the same source."
+        sentences.append(
+            "All runs of zero-shot and fine-tune start from the one given source policy: the "
+            "intervals do not cover other policies of the same source."
         )
     if study.plan.individual:
-        told.append(
-            f"Each seed meets another target, whose {study.plan.individual} is the number of the "
-            "seed from 0 on: the intervals are over these, too."
+        sentences.append(
+            f"Each seed has its own target, whose {study.plan.individual} is the index of the "
+            "seed: the intervals are over these, too."
         )
     if study.plan.seeds < _FEW_SEEDS:
-        told.append(
+        sentences.append(
             f"With {study.plan.seeds} seeds the intervals are wide: no clear difference does not "
             "mean that there is none."
         )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def _in_target_steps(summary: Summary) -> str:
-    """The sentence on fine-tune, counted in target steps."""
+    """The sentence on fine-tune in target steps."""
     findings = _findings(summary.in_target_steps, summary.unit)
     towards = direction(findings[0].estimate)
     against = {"up": "down", "down": "up", "unclear": ""}[towards]
@@ -282,7 +427,7 @@ def _in_target_steps(summary: Summary) -> str:
 
 
 def _in_total_steps(summary: Summary) -> str:
-    """The sentence on fine-tune, counted in total steps."""
+    """The sentence on fine-tune in total steps."""
     if source_takes_all(summary):
         return _nothing_left(summary)
     gain = summary.in_total_steps.total_reward_gain
@@ -294,15 +439,15 @@ def _in_total_steps(summary: Summary) -> str:
 
 
 def _findings(measures: Measures, unit: str) -> list[_Finding]:
-    """What the three measures of the verdict say of fine-tune; the first one decides."""
+    """The measures of the verdict on fine-tune; the first one decides."""
     gain, end = measures.total_reward_gain, measures.asymptotic_gain
     found = [
         _Finding(
             {
-                "up": "earned more than scratch over the whole of its learning curve",
-                "down": "earned less than scratch over the whole of its learning curve",
-                "unclear": "earned neither clearly more nor clearly less than scratch over the "
-                "whole of its learning curve",
+                "up": "earned more than scratch over its whole learning curve",
+                "down": "earned less than scratch over its whole learning curve",
+                "unclear": "earned neither clearly more nor clearly less than scratch over its "
+                "whole learning curve",
             },
             gain,
             f"total reward gain {estimate_text(gain, signed=True)}, {unit}",
@@ -335,189 +480,43 @@ def _findings(measures: Measures, unit: str) -> list[_Finding]:
 
 
 def _nothing_left(summary: Summary) -> str:
-    """The sentence on total steps where the source has cost the whole budget."""
+    """The sentence on total steps where the source used up the budget."""
     start = summary.in_total_steps.jumpstart
     compared = {
-        "up": "fine-tune starts above where scratch has come by then",
-        "down": "fine-tune starts below where scratch has come by then",
-        "unclear": "fine-tune starts neither clearly above nor clearly below where scratch has "
-        "come by then",
+        "up": "fine-tune starts above the level that scratch has reached by then",
+        "down": "fine-tune starts below the level that scratch has reached by then",
+        "unclear": "fine-tune starts neither clearly above nor clearly below the level that "
+        "scratch has reached by then",
     }[direction(start)]
     return (
-        "Counted in total steps, the budget cannot show a gain: the source alone has cost "
+        "Counted in total steps, the budget cannot show a gain: the source alone used "
         f"{count(summary.source_steps)} steps of {count(summary.horizon)}, and {compared} "
         f"(jumpstart {estimate_text(start, signed=True)}, {summary.unit})."
     )
 
 
 def _untrained(summary: Summary) -> list[str]:
-    """The sentences on a policy that was moved and not trained on the target."""
+    """The sentences on a policy that is not trained on the target."""
     measures, unit = summary.in_target_steps, summary.unit
     start, end = measures.jumpstart, measures.asymptotic_gain
     late = summary.in_total_steps.jumpstart
     when = (
-        f"at its end, though the source has cost {count(summary.source_steps)} steps"
+        f"at its end, though the source used {count(summary.source_steps)} steps"
         if source_takes_all(summary)
-        else f"after {count(summary.source_steps)} steps, as many as the source has cost"
+        else f"after {count(summary.source_steps)} steps, as many as the source used"
     )
     better = {"up": "better than", "down": "worse than", "unclear": "not clearly different from"}
     return [
-        f"Counted in target steps, transfer {_TRANSFER[direction(start)]} at the start: the moved "
+        f"Counted in target steps, transfer {_TRANSFER[direction(start)]} at the start: the source "
         f"policy, which is not trained on the target, is {better[direction(start)]} an untrained "
         f"one (jumpstart {estimate_text(start, signed=True)}, {unit}) and "
-        f"{better[direction(end)]} what scratch ends with (asymptotic gain "
+        f"{better[direction(end)]} the end of scratch (asymptotic gain "
         f"{estimate_text(end, signed=True)}, {unit}).",
         f"Counted in total steps, it is {better[direction(late)]} scratch {when} "
         f"(jumpstart {estimate_text(late, signed=True)}, {unit}).",
     ]
 
 
-def _verdict_end(study: Study, kind: Literal["scratch", "random"]) -> str:
-    """Where the runs of a kind ended, with the t-interval."""
+def _final_text(study: Study, kind: Literal["scratch", "random"]) -> str:
+    """Final return of a kind of run, with its t-interval."""
     return spread_text(finals(study, kind))
-
-
-JUMPSTART: Final = "Jumpstart"
-TOTAL_REWARD_GAIN: Final = "Total reward gain"
-ASYMPTOTIC_GAIN: Final = "Asymptotic gain"
-AUC_RATIO: Final = "auc_ratio"
-FORWARD_TRANSFER: Final = "Forward transfer"
-TIME_TO_THRESHOLD: Final = "Time to threshold"
-
-PURE_NUMBER: Final = "pure number"
-
-_TAYLOR_STONE: Final = "Taylor & Stone, JMLR 10, 2009"
-
-EXPLANATIONS: Final[dict[str, str]] = {
-    JUMPSTART: "How much better the arm is than scratch at its first evaluation on the target; in "
-    "total steps, than scratch after as many steps as the source has cost. Above 0: transfer "
-    f"helped. ({_TAYLOR_STONE})",
-    TOTAL_REWARD_GAIN: "How much higher the arm's learning curve lies than that of scratch, on "
-    f"average over the whole budget. Above 0: transfer helped. ({_TAYLOR_STONE}, divided by the "
-    "budget)",
-    ASYMPTOTIC_GAIN: "How much better the arm is at the end of the budget. Above 0: transfer "
-    f"helped. ({_TAYLOR_STONE})",
-    AUC_RATIO: "Area under the arm's learning curve over that of scratch, both in scores. Above 1: "
-    f"transfer helped. ({_TAYLOR_STONE}, who call it the transfer ratio)",
-    FORWARD_TRANSFER: "The share of the area between scratch's curve and the score 1 that the arm "
-    "wins, with scores cut off at 0 and 1. At most 1; above 0: transfer helped. (Wołczyk et al., "
-    "Continual World, NeurIPS 2021)",
-    TIME_TO_THRESHOLD: "How many steps sooner than scratch the arm reaches a score for the first "
-    "time. Runs that never do count with the whole budget, none is dropped. Above 0: transfer "
-    f"helped. ({_TAYLOR_STONE}; Royston & Parmar, BMC Med. Res. Methodol. 13, 2013)",
-}
-
-
-class MeasureRow(NamedTuple):
-    """One measure of one arm against scratch, in both ways of counting.
-
-    Attributes:
-        arm: The arm.
-        measure: What is measured, in words.
-        unit: "score", "return", "steps" or "pure number".
-        target: Value and interval, counted in target steps.
-        total: Value and interval, counted in total steps.
-        method: How the intervals were made, in words, or "none"; both ways, where they differ.
-        note: What a reader must know; empty if nothing.
-    """
-
-    arm: Arm
-    measure: str
-    unit: str
-    target: str
-    total: str
-    method: str
-    note: str
-
-
-def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
-    """Every measure of every arm other than scratch."""
-    rows: list[MeasureRow] = []
-    for arm in study.plan.arms:
-        if arm != "scratch":
-            rows += _rows_of(arm, study.summaries[arm])
-    return tuple(rows)
-
-
-def _rows_of(arm: Arm, summary: Summary) -> list[MeasureRow]:
-    """The rows of one arm, gains first."""
-    ours, total = _named(summary.in_target_steps), _named(summary.in_total_steps)
-    rows: list[MeasureRow] = []
-    for name, estimate in ours.items():
-        unit = PURE_NUMBER if name in (AUC_RATIO, FORWARD_TRANSFER) else summary.unit
-        rows.append(_table_row(arm, name, unit, estimate, total[name], signed=name != AUC_RATIO))
-    times = zip(
-        summary.in_target_steps.times_to_threshold,
-        summary.in_total_steps.times_to_threshold,
-        strict=True,
-    )
-    for in_target, in_total in times:
-        row = _table_row(
-            arm,
-            f"{TIME_TO_THRESHOLD} {in_target.threshold:g}: steps saved",
-            "steps",
-            in_target.steps_saved,
-            in_total.steps_saved,
-            signed=True,
-        )
-        reached = _reached(arm, summary, in_target, in_total)
-        rows.append(row._replace(note=" ".join(filter(None, (reached, row.note)))))
-    return rows
-
-
-def _named(measures: Measures) -> dict[str, Estimate]:
-    """The measures that are not times, by what they are called."""
-    return {
-        JUMPSTART: measures.jumpstart,
-        TOTAL_REWARD_GAIN: measures.total_reward_gain,
-        ASYMPTOTIC_GAIN: measures.asymptotic_gain,
-        AUC_RATIO: measures.auc_ratio,
-        FORWARD_TRANSFER: measures.forward_transfer,
-    }
-
-
-def _table_row(
-    arm: Arm, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
-) -> MeasureRow:
-    """One row, with what both ways of counting share told once."""
-    methods = [estimate.method for estimate in (target, total)]
-    return MeasureRow(
-        arm=arm,
-        measure=measure,
-        unit=unit,
-        target=estimate_text(target, signed=signed),
-        total=estimate_text(total, signed=signed),
-        method=methods[0] if methods[0] == methods[1] else " / ".join(methods),
-        note=_once(target.note, total.note),
-    )
-
-
-def _once(target: str, total: str) -> str:
-    """Two notes as one."""
-    if target == total:
-        return target
-    notes = (("In target steps", target), ("In total steps", total))
-    return " ".join(f"{where}: {note}" for where, note in notes if note)
-
-
-def _reached(
-    arm: Arm, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
-) -> str:
-    """How many seeds reached a threshold, and how soon; empty where that is undefined."""
-    if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
-        return ""
-    reaches = (in_target.arm, in_total.arm, in_target.scratch)
-    missed = any(reach.fraction < 1.0 for reach in reaches)
-    censored = f" Runs that did not get there count as {count(summary.horizon)}." if missed else ""
-    return (
-        f"Reached by {_seeds(in_target.arm, summary.n_seeds_arm)} of {arm} after a mean of "
-        f"{count(in_target.arm.restricted_mean)} steps; in total steps by "
-        f"{_seeds(in_total.arm, summary.n_seeds_arm)} after {count(in_total.arm.restricted_mean)}; "
-        f"by {_seeds(in_target.scratch, summary.n_seeds_scratch)} of scratch after "
-        f"{count(in_target.scratch.restricted_mean)}.{censored}"
-    )
-
-
-def _seeds(reach: ReachTimes, n_seeds: int) -> str:
-    """As in `3 of 5 seeds`."""
-    return f"{round(reach.fraction * n_seeds)} of {n_seeds} seeds"

@@ -1,8 +1,8 @@
-"""What lies below the drivers: pins, buses and time, real or a twin's.
+"""Hardware below the drivers: pins, buses and clocks, real or of a twin.
 
-The processes of a robot are told by name where their hardware comes from, as MODULE:FUNCTION and
-one argument for it. `RealHardware` is the Raspberry Pi; a twin brings its own. So the same drivers
-run on both, and nothing of the robot knows a twin.
+The processes of a robot get the source of their hardware as MODULE:FUNCTION and one argument.
+`RealHardware` is the Raspberry Pi, and a twin has its own class, so the same drivers run on both,
+and no code of the robot depends on a twin.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from shapechanger.errors import RobotError
 
-if TYPE_CHECKING:  # They need the SDK, and only a rig has it.
+if TYPE_CHECKING:  # They need the SDK, which only a rig has.
     from shapechanger.robot.drivers.dynamixel.protocol import Port
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
@@ -32,74 +32,74 @@ __all__ = [
 ]
 
 REAL: Final = "shapechanger.robot.hardware:real"
-"""Where the hardware comes from when nothing else is said."""
+"""Default source of the hardware."""
 
 
 class Clock(Protocol):
-    """Where a process takes its time from."""
+    """Clock of a process."""
 
     def now_ns(self) -> int:
-        """The time in nanoseconds; it never runs backwards."""
+        """Return the monotonic time, ns."""
         ...
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Wait in the guard until there is something to do.
+        """Wait in the guard for a readable descriptor or a time.
 
         Args:
-            readable: File descriptors; one that can be read is something to do.
-            until_ns: Time at which there is something to do in any case.
-            at_most_s: Real seconds after which to come back with nothing to do, so that the guard
-                can show that it lives while a twin's time stands still.
+            readable: File descriptors.
+            until_ns: The time, ns.
+            at_most_s: Limit in real time, s, so that the guard can send heartbeats while a twin's
+                time stands still.
 
         Returns:
-            Whether there is something to do. A twin's time moves in grants: there is something to
-            do at each grant, and only then.
+            False if only the limit was reached. A twin's time moves in grants: the result is True
+            at each grant, and only then.
         """
         ...
 
     async def sleep(self, seconds: float) -> int | None:
-        """Let so much time go by in the daemon.
+        """Let `seconds` pass in the daemon.
 
         Returns:
-            When the newest picture was taken that has been sent to the camera's driver by the end,
-            so that the daemon can wait for it; None where pictures come in their own time.
+            Capture time of the newest frame that the camera's driver was sent by the end, ns, so
+            that the daemon can wait for it; None where frames arrive in their own time.
         """
         ...
 
 
 class I2cBus(Protocol):
-    """The part of `smbus2.SMBus` that the drivers use."""
+    """Methods of `smbus2.SMBus` that the drivers use."""
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte to a chip that has no registers."""
+        """Send one byte to a chip without registers."""
         ...
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """One register."""
+        """Read one register."""
         ...
 
     def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Set one register."""
+        """Write one register."""
         ...
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Several registers, from one on."""
+        """Read consecutive registers."""
         ...
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
-        """Set several registers, from one on."""
+        """Write consecutive registers."""
         ...
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         ...
 
 
 class ServoPins(Protocol):
-    """Servo pulses on pins, as `lgpio.tx_servo` makes them."""
+    """Servo pulses on pins, as of `lgpio.tx_servo`."""
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses of this width on a BCM pin from now on; 0 for none."""
+        """Send pulses on a BCM pin, `width_us` wide; 0 ends them."""
         ...
 
     def close(self) -> None:
@@ -108,31 +108,31 @@ class ServoPins(Protocol):
 
 
 class Hardware(Protocol):
-    """Pins, buses and time."""
+    """Pins, buses and clock."""
 
     @property
     def clock(self) -> Clock:
-        """Where time comes from."""
+        """The clock."""
         ...
 
     def pin_factory(self) -> Any:
-        """What gpiozero's devices take as `pin_factory`."""
+        """Return the `pin_factory` for gpiozero's devices."""
         ...
 
     def i2c(self, bus: int) -> I2cBus:
-        """An I2C bus by its number."""
+        """Open an I2C bus by its number."""
         ...
 
     def servo_pins(self) -> ServoPins:
-        """Pins that send servo pulses."""
+        """Open the pins that send servo pulses."""
         ...
 
     def servo_port(self, settings: BusSettings) -> Port:
-        """The port of a servo bus."""
+        """Open the port of a servo bus."""
         ...
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Close all of it."""
         ...
 
 
@@ -140,11 +140,11 @@ class RealClock:
     """The machine's monotonic clock."""
 
     def now_ns(self) -> int:
-        """Nanoseconds of CLOCK_MONOTONIC, which no change of the date moves."""
+        """Return the time of CLOCK_MONOTONIC, ns."""
         return time.monotonic_ns()
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Wait until a descriptor can be read or it is `until_ns`; see `Clock.wait`."""
+        """Wait for a readable descriptor or a time; see `Clock.wait`."""
         left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
         poll = select.poll()
         for fd in readable:
@@ -153,14 +153,14 @@ class RealClock:
         return bool(ready) or time.monotonic_ns() >= until_ns
 
     async def sleep(self, seconds: float) -> None:
-        """Let so many real seconds go by."""
-        import asyncio  # Not in the guard, which has no use for it.
+        """Sleep for `seconds` of real time."""
+        import asyncio  # Imported here, because the guard does not need it.
 
         await asyncio.sleep(seconds)
 
 
 class RealHardware:
-    """The pins and buses of a Raspberry Pi; each library is loaded when it is needed."""
+    """Pins and buses of a Raspberry Pi; each library is imported when it is needed."""
 
     def __init__(self) -> None:
         self._clock = RealClock()
@@ -172,56 +172,61 @@ class RealHardware:
         return self._clock
 
     def pin_factory(self) -> Any:
-        """The factory of gpiozero over lgpio, whatever the environment says.
+        """Return gpiozero's factory for lgpio, independent of the environment variables.
 
-        Its pins are low as soon as they are told so; see `lgpio_pins`.
+        Its pins go low at once; see `lgpio_pins`.
 
         Raises:
-            RobotError: If there are none, or they cannot be opened.
+            RobotError: If the pins do not exist or cannot be opened.
         """
         if self._pin_factory is None:
             try:
                 from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
 
                 self._pin_factory = LowAtOnceFactory()
-            except Exception as error:  # gpiozero's, lgpio's, or that one of them is missing.
+            except Exception as error:  # Of gpiozero or lgpio, or one of them is missing.
                 raise RobotError(
-                    f"This machine's pins cannot be opened ({str(error) or type(error).__name__}); "
+                    f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
                     "`shapechanger robot serve --twin` needs none."
                 ) from error
         return self._pin_factory
 
     def i2c(self, bus: int) -> I2cBus:
-        """A bus over smbus2."""
+        """Open a bus with smbus2."""
         from smbus2 import SMBus
 
         return SMBus(bus)
 
     def servo_pins(self) -> ServoPins:
-        """Pulses over lgpio."""
+        """Open the pins with lgpio."""
         from shapechanger.robot.drivers.lgpio_pins import LgpioServoPins
 
         return LgpioServoPins()
 
     def servo_port(self, settings: BusSettings) -> Port:
-        """A serial port over `dynamixel_sdk`."""
+        """Open a serial port with `dynamixel_sdk`."""
         from shapechanger.robot.drivers.dynamixel.protocol import open_serial_port
 
         return open_serial_port(settings)
 
     def close(self) -> None:
-        """Let go of the pins."""
+        """Close the pins."""
         if self._pin_factory is not None:
             self._pin_factory.close()
             self._pin_factory = None
 
 
 def real(_: str = "") -> RealHardware:
-    """The hardware of this machine."""
+    """Return the hardware of this machine."""
     return RealHardware()
 
 
 def connect(source: str, argument: str) -> Hardware:
-    """The hardware that MODULE:FUNCTION gives for an argument."""
+    """Return the hardware of a source.
+
+    Args:
+        source: MODULE:FUNCTION.
+        argument: Argument of the function.
+    """
     module, _, function = source.partition(":")
     return getattr(importlib.import_module(module), function)(argument)

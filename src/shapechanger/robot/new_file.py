@@ -1,4 +1,4 @@
-"""Writes a file that is whole or not there at all."""
+"""Atomic writing of new files."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ __all__ = ["write_new"]
 
 
 def write_new(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write a file that does not exist yet; its folder is made where it is missing.
+    """Write a new file completely or not at all; a missing folder is made.
 
     Args:
         path: The file.
-        data: What goes into it.
-        mode: Who may read it, from the start; less what the process's mask takes away.
+        data: Content of the file.
+        mode: Permissions from the start, reduced by the process's umask.
 
     Raises:
-        FileExistsError: If it exists.
-        OSError: If it cannot be written; nothing of it is left then.
+        FileExistsError: If the file exists.
+        OSError: If it cannot be written; no partial file is left.
     """
     if os.path.lexists(path):
         raise FileExistsError(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        # With O_EXCL and the mode from the start, nobody can read it in between.
+        # O_EXCL and the mode from the start keep other users from reading it meanwhile.
         fd = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
         with os.fdopen(fd, "wb") as file:
             file.write(data)

@@ -1,4 +1,4 @@
-"""Rewards and endings as functions of named quantities."""
+"""Tasks without bodies: rewards, ends of episodes, and paths to follow."""
 
 from __future__ import annotations
 

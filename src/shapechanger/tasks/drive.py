@@ -1,8 +1,7 @@
-"""The task of driving: go forward fast, hit nothing, do not get stuck.
+"""The driving task: go forward fast without collisions and without getting stuck.
 
-The paper of 2017 asks a car to "avoid collisions while maximizing velocity"; its program paid 0.0
-for everything. Here each term comes from a quantity that something measured, and a term whose
-quantity nothing measures is left out rather than made up.
+The paper of 2017 asks a car to "avoid collisions while maximizing velocity"; its program had a
+reward of 0.0 everywhere. Here each term needs a measured quantity, and is omitted without one.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ __all__ = ["DriveReward"]
 
 @dataclass(frozen=True, slots=True)
 class DriveReward:
-    """Weights of the terms of driving.
+    """Weights of the driving reward.
 
     Attributes:
-        velocity: Reward for a metre forward, 1/m. The speed is signed, so a metre backwards costs
-            as much: an agent that is paid for speed without its sign learns to reverse in circles
+        velocity: Reward per metre forward, 1/m. The speed is signed, so a metre backwards costs as
+            much: rewarded for unsigned speed, an agent learns to reverse in circles
             (gym-donkeycar#70).
-        collision: Reward for a collision, usually below zero; once for each that is new.
-        stall: Reward for a second of pushing without moving, 1/s, usually below zero.
+        collision: Reward per new collision, usually negative.
+        stall: Reward per second of pushing without moving, 1/s, usually negative.
         collision_ends_episode: Whether a collision ends the task.
     """
 
@@ -35,10 +34,13 @@ class DriveReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> DriveReward:
-        """The weights by name, as a robot's profile has them; the others keep their default.
+        """Create the reward from weights by name, as in a robot's profile.
+
+        Args:
+            weights: Weights that replace the defaults.
 
         Raises:
-            UnknownName: If a name is no weight.
+            UnknownName: If there is no such weight.
         """
         names = [field.name for field in fields(cls)]
         for name in weights:
@@ -55,14 +57,13 @@ class DriveReward:
         stalled: bool | None,
         dt_s: float,
     ) -> dict[str, float]:
-        """The terms of one step; the reward is their sum.
+        """Return the terms of one step; the reward is their sum.
 
         Args:
-            speed_mps: Speed along the robot's nose, m/s, below zero backwards; None where nothing
-                measures it.
-            collided: Whether it hit something since the step before; None where nothing tells.
-            stalled: Whether it pushes without moving; None where nothing tells.
-            dt_s: How long the step was, s, at least 0.
+            speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
+            collided: Whether it collided since the step before; None if unknown.
+            stalled: Whether it pushes without moving; None if unknown.
+            dt_s: Duration of the step, s, at least 0.
 
         Returns:
             `reward_velocity`, `reward_collision` and `reward_stall`, without those whose quantity
@@ -78,5 +79,5 @@ class DriveReward:
         return terms
 
     def ends(self, collided: bool | None) -> bool:
-        """Whether the task is over."""
+        """Return whether the episode ends."""
         return self.collision_ends_episode and bool(collided)

@@ -1,4 +1,9 @@
-"""What a finger is asked to do, whether it is simulated or stands on a bench."""
+"""The finger's tasks: measurements, forward kinematics and reward, for simulated and real fingers.
+
+Axes: x points to the tip of the straight finger, y to the thumb, z to the back of the hand; the
+origin is the knuckle. Flexion and radial abduction are positive. The order of angles is knuckle
+flexion, knuckle abduction, middle joint, end joint; the knuckle flexes before it abducts.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +28,7 @@ __all__ = [
 
 
 def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float64]:
-    """Place of the fingertip, m, shape (..., 3).
+    """Return the place of the fingertip, m, shape (..., 3).
 
     Args:
         angles: rad, (..., 4).
@@ -44,13 +49,18 @@ def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float
 
 
 def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float64]:
-    """How the fingertip moves with each angle, m/rad, shape (..., 3, 4)."""
+    """Return the Jacobian of the fingertip's place, m/rad, shape (..., 3, 4).
+
+    Args:
+        angles: rad, (..., 4).
+        phalanges: Lengths of the proximal, middle and distal phalanx, m.
+    """
     q = np.asarray(angles, np.float64)
     flexion, abduction, middle, end = (q[..., j] for j in range(4))
     along, down = _in_plane(q, phalanges)
     both = middle + end
     zero = np.zeros_like(flexion)
-    # (d along, d down) with each angle; and what abduction turns aside.
+    # (d along, d down) by each angle, and the part that abduction turns sideways.
     end_along, end_down = -phalanges[2] * np.sin(both), phalanges[2] * np.cos(both)
     middle_along = end_along - phalanges[1] * np.sin(middle)
     middle_down = end_down + phalanges[1] * np.cos(middle)
@@ -73,26 +83,26 @@ def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray
 def _in_plane(
     q: NDArray[np.float64], phalanges: Sequence[float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far the tip is along the proximal phalanx, and how far towards the palm, m."""
+    """Return the tip's distance along the proximal phalanx and towards the palm, m."""
     proximal, middle, distal = phalanges
     both = q[..., 2] + q[..., 3]
     along = proximal + middle * np.cos(q[..., 2]) + distal * np.cos(both)
     return along, middle * np.sin(q[..., 2]) + distal * np.sin(both)
 
 
-# Distances at which each half of nearness has fallen to its half: one leads the finger there from
-# anywhere in its workspace of some ten centimetres, one rewards the last millimetres.
+# Distances at which the two halves of nearness have fallen by half: one guides the finger from
+# anywhere in its workspace of some ten centimetres, the other rewards the last millimetres.
 _FAR_M: Final = 0.020
 _NEAR_M: Final = 0.002
 
 
 @dataclass(frozen=True, slots=True)
 class FingertipReward:
-    """Weights of the terms.
+    """Weights of the reward for a fingertip near a point or a path.
 
     Attributes:
-        nearness: Reward of a second at the right place, 1/s.
-        effort: Cost of a second at full tension of all tendons, 1/s.
+        nearness: Reward per second at the target, 1/s.
+        effort: Cost per second at full tension of all tendons, 1/s.
     """
 
     nearness: float = 50.0
@@ -100,10 +110,13 @@ class FingertipReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> FingertipReward:
-        """The weights by name; the others keep their default.
+        """Create the reward from weights by name.
+
+        Args:
+            weights: Weights that replace the defaults.
 
         Raises:
-            UnknownName: If a name is no weight.
+            UnknownName: If there is no such weight.
         """
         names = [field.name for field in fields(cls)]
         for name in weights:
@@ -112,12 +125,12 @@ class FingertipReward:
         return cls(**{name: float(value) for name, value in weights.items()})
 
     def terms(self, distance: float, effort: float, dt_s: float) -> dict[str, float]:
-        """The terms of one step; the reward is their sum.
+        """Return the terms of one step; the reward is their sum.
 
         Args:
-            distance: From the fingertip to where it should be, m, at least 0.
-            effort: Mean square of each tension over its largest, 0 to 1.
-            dt_s: How long the step was, s.
+            distance: Distance of the fingertip from its target, m, at least 0.
+            effort: Mean square of the tensions relative to their maxima, 0 to 1.
+            dt_s: Duration of the step, s.
 
         Returns:
             `reward_nearness`, above 0 and at most `nearness * dt_s`, and `reward_effort`, at most
@@ -132,16 +145,15 @@ class FingertipReward:
 
 @dataclass(frozen=True, slots=True)
 class FingerSenses:
-    """One moment of a finger.
+    """Measurements of a finger at one time.
 
     Attributes:
-        angles: Of the joints, rad, (4,).
-        velocities: Of the joints, rad/s, (4,).
-        tensions: Of the tendons, N, (7,).
-        lengths: Of the tendons, as their motors wind them, beyond those of the straight finger, m,
-            (7,).
+        angles: Joint angles, rad, (4,).
+        velocities: Joint velocities, rad/s, (4,).
+        tensions: Tendon tensions, N, (7,).
+        lengths: Tendon lengths at their motors, relative to the straight finger, m, (7,).
         commands: The newest command, -1 to 1, (7,).
-        fingertip: Where the fingertip is by the angles, m, (3,).
+        fingertip: Place of the fingertip by the angles, m, (3,).
     """
 
     angles: NDArray[np.float64]
@@ -152,7 +164,7 @@ class FingerSenses:
     fingertip: NDArray[np.float64]
 
     def numbers(self) -> NDArray[np.float64]:
-        """All of them, (32,), in the order of `features_of_senses`."""
+        """Return all numbers, (32,), in the order of `features_of_senses`."""
         joints = (self.angles, self.velocities)
         tendons = (self.tensions, self.lengths, self.commands)
         return np.concatenate([*joints, *tendons, self.fingertip])
@@ -164,13 +176,13 @@ def features_of_senses(
     tendon_names: Sequence[str],
     most_tension: Sequence[float],
 ) -> list[Feature]:
-    """A feature for each number of `FingerSenses.numbers`.
+    """Return a feature for each number of `FingerSenses.numbers`.
 
     Args:
-        joint_names: In the order of the angles.
-        joint_range: Lowest and highest angle, rad, (4, 2).
-        tendon_names: In the order of the tensions.
-        most_tension: Of each tendon, N.
+        joint_names: Joints in the order of the angles.
+        joint_range: Lowest and highest angle of each joint, rad, (4, 2).
+        tendon_names: Tendons in the order of the tensions.
+        most_tension: Largest tension of each tendon, N.
     """
     joints = [(name, Element("joint", name)) for name in joint_names]
     tendons = [(name, Element("tendon", name)) for name in tendon_names]
@@ -192,5 +204,5 @@ def features_of_senses(
 
 
 def place_features(name: str, element: Element) -> list[Feature]:
-    """Three features, `name/x` to `name/z`, m."""
+    """Return three features, `name/x` to `name/z`, m."""
     return [Feature(f"{name}/{axis}", "m", element=element) for axis in "xyz"]

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
-from shapechanger.transfer.learners.settings import LEARNERS, LearnerSettings
+from shapechanger.transfer.learners.settings import LEARNERS, PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 
 __all__ = [
     "LEARNERS",
     "BodyMap",
     "EnvRef",
-    "LearnerSettings",
     "MappedEnv",
     "Plan",
+    "PpoSettings",
     "TransferTask",
     "layouts_of",
 ]

@@ -1,21 +1,35 @@
-"""An env as a value: its id and its arguments, so that another process can make it."""
+"""Envs as values, and the facts that transfer reads from an env."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from dataclasses import dataclass
+from typing import Any, Protocol, cast, runtime_checkable
 
 import gymnasium as gym
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
-from shapechanger.errors import LayoutError, UnknownName
+from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
 from shapechanger.layout import Layout
 
-__all__ = ["EnvRef", "layouts_of"]
+__all__ = [
+    "EnvRef",
+    "EnvTraits",
+    "HasDemonstrator",
+    "HasHeldOutStarts",
+    "SourceAdaptation",
+    "TaskDemonstrator",
+    "certify_shift",
+    "env_traits",
+    "is_single_instance",
+    "layouts_of",
+]
 
 
 class EnvRef(msgspec.Struct, frozen=True):
-    """An env by its id and arguments.
+    """An env by its id and arguments, so that another process can make it.
 
     Attributes:
         id: A registered id, or `module:id` to import a module first.
@@ -31,37 +45,167 @@ class EnvRef(msgspec.Struct, frozen=True):
         return f"{self.id} ({arguments})" if arguments else self.id
 
     def having(self, more: Mapping[str, Any]) -> EnvRef:
-        """The same env with more arguments, or with others in their place."""
+        """Return the same env with additional or replaced arguments."""
         return EnvRef(self.id, {**self.kwargs, **more})
 
     def make(self, **more: Any) -> gym.Env[Any, Any]:
         """Make the env.
 
         Args:
-            **more: Arguments for this one only, such as `render_mode`.
+            **more: Arguments for this instance only, such as `render_mode`.
 
         Raises:
             UnknownName: If no env has this id.
+            StudyError: If it does not take these arguments.
         """
         try:
             return gym.make(self.id, **{**self.kwargs, **more})
         except (gym.error.UnregisteredEnv, ModuleNotFoundError) as error:
             known = [name for name in gym.registry if name.startswith("shapechanger/")]
             raise UnknownName("environment", self.id, known) from error
+        except TypeError as error:
+            # Gymnasium adds this where the constructor of the env refuses an argument.
+            reason, refused, _ = str(error).partition(" was raised from the environment creator")
+            if not refused:
+                raise
+            raise StudyError(f"{self.id} cannot be made with these options: {reason}.") from error
+
+
+class TaskDemonstrator(Protocol):
+    """An expert for the task of an env."""
+
+    def begin(self) -> None:
+        """Start an episode."""
+        ...
+
+    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the intended action, which is learned, and the executed one."""
+        ...
+
+
+@runtime_checkable
+class HasDemonstrator(Protocol):
+    """An env with an expert for its task."""
+
+    def demonstrator(self, seed: int) -> TaskDemonstrator:
+        """Return the expert; `seed` determines its mistakes."""
+        ...
+
+
+@runtime_checkable
+class HasHeldOutStarts(Protocol):
+    """An env whose surroundings can be drawn from a set that training never uses."""
+
+    def hold_out(self) -> None:
+        """Draw from the held-out set from now on."""
+        ...
+
+
+@runtime_checkable
+class SourceAdaptation(Protocol):
+    """A target env that can adapt its source env to itself."""
+
+    def randomised_source(self) -> dict[str, Any]:
+        """Return source arguments that randomise its body over the plausible ones."""
+        ...
+
+    def identified_source(self, seed: int) -> dict[str, Any]:
+        """Return source arguments identified from motions of this env.
+
+        Args:
+            seed: Seed of the motions.
+        """
+        ...
+
+
+@runtime_checkable
+class _CertifiesShift(Protocol):
+    def certify_shift(self, source: Any, target: Any) -> object: ...
+
+
+@dataclass(frozen=True, slots=True)
+class EnvTraits:
+    """What a study reads from an env once.
+
+    Attributes:
+        observation_layout: Meaning of an observation.
+        action_layout: Meaning of an action.
+        observation_space: Its space.
+        action_space: Its space.
+        exclusive: Whether only one run at a time may use the env, as a robot.
+        individual: Name of the argument that selects one of several individuals; may be empty.
+        has_demonstrator: Whether it has an expert for its task.
+        adapts_source: Whether it can adapt its source.
+    """
+
+    observation_layout: Layout
+    action_layout: Layout
+    observation_space: gym.Space[Any]
+    action_space: gym.Space[Any]
+    exclusive: bool
+    individual: str
+    has_demonstrator: bool
+    adapts_source: bool
+
+
+def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
+    """Read the traits of an env.
+
+    Raises:
+        LayoutError: If it publishes no layouts.
+    """
+    observation, action = layouts_of(env)
+    inner = env.unwrapped
+    return EnvTraits(
+        observation,
+        action,
+        env.observation_space,
+        env.action_space,
+        exclusive=getattr(inner, "exclusive", False),
+        individual=getattr(inner, "individual", ""),
+        has_demonstrator=isinstance(inner, HasDemonstrator),
+        adapts_source=isinstance(inner, SourceAdaptation),
+    )
+
+
+def is_single_instance(env: gym.Env[Any, Any]) -> bool:
+    """Whether only one instance of the env can exist, as of a robot: `side_by_side = False`."""
+    return not getattr(env.unwrapped, "side_by_side", True)
 
 
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """What the observation and the action of an env mean.
+    """Return the observation and the action layout of an env.
 
     Raises:
-        LayoutError: If the env does not say.
+        LayoutError: If it publishes none.
     """
     found = [getattr(env.unwrapped, f"{side}_layout", None) for side in ("observation", "action")]
     if not all(isinstance(layout, Layout) for layout in found):
         name = env.spec.id if env.spec else type(env.unwrapped).__name__
         raise LayoutError(
-            f"{name} publishes no observation_layout and action_layout, so nothing says what its "
-            "numbers mean: add them to the env, as `shapechanger.Layout`s."
+            f"{name} publishes no observation_layout and action_layout, so the meaning of its "
+            "numbers is unknown: add them to the env, as `shapechanger.Layout`s."
         )
     observation, action = cast("list[Layout]", found)
     return observation, action
+
+
+def certify_shift(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
+    """Return the certificate of the change between two envs; empty if the source issues none.
+
+    Raises:
+        EmptyShift: If nothing changes.
+        StudyError: If an env fails in the rollout that the certificate compares.
+    """
+    inner = source.unwrapped
+    if not isinstance(inner, _CertifiesShift):
+        return ""
+    try:
+        return str(inner.certify_shift(source, target))
+    except ShapechangerError:
+        raise
+    except (TypeError, ValueError, ArithmeticError) as error:
+        names = " or ".join(env.spec.id if env.spec else str(env) for env in (source, target))
+        raise StudyError(
+            f"{names} fails in a short rollout ({error}): check the arguments of the env."
+        ) from error

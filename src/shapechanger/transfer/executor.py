@@ -1,4 +1,4 @@
-"""Running jobs in processes of this machine: some at a time, each after those that it waits for."""
+"""Run jobs with dependencies, serially or in processes of this machine."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ OnProgress = Callable[[str, int, bool], None]
 
 @dataclass(frozen=True)
 class Job:
-    """Something to run in a process of its own.
+    """A function call to run in a process of its own.
 
     Attributes:
-        name: Its name, unlike any other's.
-        function: What to call, with `arguments` and a `ReportSteps`; a function of a module, so that
-            another process finds it.
-        arguments: Its arguments, which another process must be able to receive.
-        after: Names of jobs that must have ended before.
+        name: Its unique name.
+        function: Called with `arguments` and a `ReportSteps`; a module-level function, so that
+            another process can import it.
+        arguments: Its arguments; must be picklable.
+        after: Names of the jobs that must end before it starts.
     """
 
     name: str
@@ -45,18 +45,23 @@ class Job:
 
 
 class Executor(Protocol):
-    """Runs jobs somewhere."""
+    """Runs jobs."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs, each after those that it waits for; raise what one of them raised."""
+        """Run all jobs in order of their dependencies; raise what one of them raised.
+
+        Args:
+            jobs: The jobs.
+            on_progress: Called with the progress of each.
+        """
         ...
 
 
 class Serial:
-    """Runs jobs one after another in this process: slower, and easy to look into."""
+    """Runs jobs one after another in this process, for debugging."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; what one of them raises ends the others."""
+        """Run all jobs; see `Executor.run`."""
         ended: set[str] = {name for job in jobs for name in job.after} - {job.name for job in jobs}
         waiting = list(jobs)
         while waiting:
@@ -68,18 +73,18 @@ class Serial:
 
 
 def _reporting(name: str, on_progress: OnProgress) -> ReportSteps:
-    """A report that passes on the steps under the job's name."""
+    """Return a callback that reports steps under the job's name."""
     return lambda steps: on_progress(name, steps, False)
 
 
 class Processes:
-    """Runs jobs in a few processes of this machine, which end with their parent.
+    """Runs jobs in worker processes of this machine, which end with their parent.
 
     Processes are spawned, not forked: a script that calls this must guard its start with
     `if __name__ == "__main__":`.
 
     Args:
-        workers: How many at a time; None for as many as the machine has cores.
+        workers: Number of processes; None for one per core.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -88,10 +93,10 @@ class Processes:
         self._workers = workers or os.cpu_count() or 1
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; the first that fails ends the others and is raised.
+        """Run all jobs; see `Executor.run`. The first failure ends the others.
 
         Raises:
-            ShapechangerError: What a job raised, or a `StudyError` that holds its traceback.
+            ShapechangerError: What a job raised, or a `StudyError` with its traceback.
         """
         waiting = list(jobs)
         ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
@@ -118,7 +123,7 @@ class Processes:
 
 
 class _Worker:
-    """One process that does jobs one after another."""
+    """A process that runs jobs one after another."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -134,7 +139,7 @@ class _Worker:
         self.connection.send((job.function, job.arguments))
 
     def receive(self) -> bool:
-        """Take in one message; whether the job has ended."""
+        """Receive one message; return whether the job has ended."""
         try:
             kind, content = self.connection.recv()
         except EOFError:
@@ -158,8 +163,8 @@ class _Worker:
 
 
 def _serve(connection: Connection) -> None:
-    """Do jobs as they come, until the parent is gone."""
-    # Ctrl-C reaches every process of the terminal; the parent decides what ends.
+    """Run jobs as they arrive, until the parent is gone."""
+    # Ctrl-C reaches every process of the terminal; the parent handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
@@ -178,7 +183,7 @@ def _serve(connection: Connection) -> None:
 
 
 def _throttled(connection: Connection) -> ReportSteps:
-    """A report that passes on a few numbers a second: a run makes thousands."""
+    """Return a callback that forwards a few numbers a second: a run makes thousands."""
     last = 0.0
 
     def report(steps: int) -> None:
@@ -192,7 +197,7 @@ def _throttled(connection: Connection) -> ReportSteps:
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent ends, even by SIGKILL: nobody would take its results."""
+    """End this process when its parent ends, even by SIGKILL."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -1,4 +1,4 @@
-"""Writing so that a file is whole or not there, and reading with an error that names the file."""
+"""Atomic writes, and reads whose errors name the file."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _T = TypeVar("_T")
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its parents.
+    """Make a folder and its parents, and check that it is writable.
 
     Raises:
-        OutputError: If that cannot be done, or nothing can be written there.
+        OutputError: If it cannot be made or written to.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,11 @@ def make_folder(folder: Path) -> None:
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write a file that appears whole, or leaves what was there.
+    """Write a file completely, or leave the old one in place.
+
+    Args:
+        path: The file.
+        content: Its new content.
 
     Raises:
         OutputError: If it cannot be written, for instance because the disk is full.
@@ -49,7 +53,11 @@ def write_atomic(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as indented JSON, whole or not at all.
+    """Write a value as indented JSON, atomically.
+
+    Args:
+        path: The file.
+        value: What msgspec can encode.
 
     Raises:
         OutputError: If it cannot be written.
@@ -58,7 +66,11 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def append_line(path: Path, value: Any) -> None:
-    """Add one line of JSON to a file.
+    """Append a line of JSON to a file.
+
+    Args:
+        path: The file.
+        value: What msgspec can encode.
 
     Raises:
         OutputError: If it cannot be written.
@@ -75,11 +87,11 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
 
     Args:
         path: The file.
-        kind: What it should hold.
-        remedy: What a user can do if it does not, as the end of a sentence.
+        kind: Type of the content.
+        remedy: What the user can do on failure, as the end of a sentence.
 
     Raises:
-        CorruptStudy: If the file cannot be read, or is not what it should be.
+        CorruptStudy: If the file cannot be read or has other content.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)

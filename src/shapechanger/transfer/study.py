@@ -1,4 +1,4 @@
-"""A transfer study: what it found, and the way there, which can be cut off at any point."""
+"""Transfer studies: planning, running, resuming, and the result."""
 
 from __future__ import annotations
 
@@ -7,33 +7,46 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version as version_of
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import msgspec
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import ForeignStudy, StudyError
+from shapechanger.errors import ForeignStudy, ShapechangerError, SpaceMismatch, StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import layouts_of
+from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.ppo import require_budget
-from shapechanger.transfer.learners.settings import CloningSettings, LearnerSettings, Settings
+from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import (
+    GivenPolicy,
     RunResult,
-    given_policy_steps,
+    learner_of,
     load_result,
     perform_run,
-    require_source_adaptation,
 )
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
-from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
+from shapechanger.transfer.plan import (
+    ADAPTED_SOURCE_ARMS,
+    ARMS,
+    EVERY_ARM,
+    Arm,
+    Plan,
+    Run,
+    RunKind,
+    TransferTask,
+)
 
 __all__ = [
     "PLAN_FILE",
     "STUDY_FILE",
     "Study",
+    "TaskTraits",
+    "claim_folder",
+    "default_arms",
+    "inspect_task",
     "is_folder_of",
     "make_plan",
     "run_study",
@@ -43,24 +56,22 @@ __all__ = [
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
 
-_LAST_K: Final = 3
-
-# What the numbers depend on besides the plan.
+# Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):
-    """What a study has found, with all that is needed to check it.
+    """Result of a study.
 
     Attributes:
-        plan: What was done.
-        command: The command that did it; empty if it was called from Python.
-        machine: What it ran on.
-        shift: The certificate of the shift, in words; empty if the envs publish none.
+        plan: Its plan.
+        command: The command that ran it; empty if it was called from Python.
+        machine: The machine that it ran on.
+        shift: The certificate of the shift as text; empty if the envs publish none.
         runs: Every run with its learning curve.
         source_return: Mean return of the source policies in the source, one for each seed; empty
-            if a policy was brought along.
-        summaries: For each arm but scratch its measures.
+            if a policy was given.
+        summaries: The measures of each arm but scratch.
     """
 
     plan: Plan
@@ -72,12 +83,77 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     summaries: dict[Arm, Summary]
 
     def of(self, kind: RunKind) -> list[RunResult]:
-        """The runs of one kind, by index."""
+        """Return the runs of one kind, by index."""
         return [result for result in self.runs if result.run.kind == kind]
 
     def curves(self, kind: RunKind) -> LearningCurves:
-        """The learning curves of one kind of run, in units of return."""
+        """Return the learning curves of one kind of run, in units of return."""
         return _curves(self.of(kind))
+
+
+class TaskTraits(NamedTuple):
+    """What a study reads from its two envs.
+
+    Attributes:
+        source: Traits of the source.
+        target: Traits of the target.
+        certificate: The certificate of the shift as text, empty if the envs publish none; or the
+            error that it was refused with.
+    """
+
+    source: EnvTraits
+    target: EnvTraits
+    certificate: str | ShapechangerError
+
+    @property
+    def shift(self) -> str:
+        """The certificate of the shift.
+
+        Raises:
+            EmptyShift: If nothing changes between source and target.
+            MorphologyError: If the two cannot be compared.
+            StudyError: If an env cannot be stepped.
+        """
+        if isinstance(self.certificate, ShapechangerError):
+            raise self.certificate
+        return self.certificate
+
+
+def inspect_task(task: TransferTask) -> TaskTraits:
+    """Make both envs of a task once, and read what a study needs to know.
+
+    Raises:
+        UnknownName: If an env does not exist.
+        LayoutError: If an env publishes no layouts.
+        StudyError: If an env does not take its arguments.
+    """
+    source = task.source.make()
+    try:
+        target = task.target.make()
+        try:
+            traits = env_traits(source), env_traits(target)
+            try:
+                return TaskTraits(*traits, certify_shift(source, target))
+            except ShapechangerError as error:
+                return TaskTraits(*traits, error)
+        finally:
+            target.close()
+    finally:
+        source.close()
+
+
+def default_arms(traits: TaskTraits) -> tuple[Arm, ...]:
+    """Return the arms of a study that names none.
+
+    Source adaptation helps where source and target are the same task, that is, where their layouts
+    are equal.
+    """
+    source, target = traits.source, traits.target
+    same = (source.observation_layout, source.action_layout) == (
+        target.observation_layout,
+        target.action_layout,
+    )
+    return EVERY_ARM if same and target.adapts_source else ARMS
 
 
 def make_plan(
@@ -89,11 +165,13 @@ def make_plan(
     steps: int | None = None,
     source_steps: int | None = None,
     source_policy: Path | None = None,
+    trust: bool = False,
     arms: Sequence[Arm] = ARMS,
     seed: int = 0,
     rules: Mapping[str, Any] | None = None,
     map_text: str = "",
     units: str = "same",
+    traits: TaskTraits | None = None,
 ) -> Plan:
     """Plan a study.
 
@@ -101,42 +179,67 @@ def make_plan(
         task: Source and target.
         learner: Name of the learner.
         settings: Its settings.
-        seeds: Runs of each arm, at least 2.
-        steps: Target steps of a run; None for the learner's own number.
-        source_steps: Source steps of a source policy; None for the learner's own number.
-        source_policy: File of a policy to bring along in place of training one for each seed.
-        arms: What to compare.
-        seed: Number that the seeds of all runs are drawn from.
+        seeds: Number of runs of each arm, at least 2.
+        steps: Target steps of a run; None for the learner's default.
+        source_steps: Source steps of a source policy; None for the learner's default.
+        source_policy: File of a given source policy; None to train one for each seed.
+        trust: Accept content of that file that can run code.
+        arms: The arms to compare.
+        seed: The seed from which the seeds of all runs are drawn.
         rules: Rules of the body map for entries without a partner, as in `BodyMap.between`.
         map_text: The body map as TOML, in place of `rules` and `units`.
         units: "same" or "torque", as in `BodyMap.between`.
+        traits: What `inspect_task` returned for the task; None to inspect it now.
 
     Raises:
         UnknownName: If an env, an arm or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        StudyError: If the budget or the number of seeds is too small, the policy that was brought
-            along did not learn as the learner does, or nobody shows what the learner is to learn.
-        CorruptStudy: If the file of that policy is missing, or holds none.
-        SpaceMismatch: If that policy belongs to another body.
+        StudyError: If the budget or the number of seeds is too small, the given policy is of
+            another kind of learner, or an env lacks what the learner needs.
+        CorruptStudy: If the given policy is missing, corrupt or refused.
+        SpaceMismatch: If the given policy belongs to another body, or a layout does not fit its
+            space.
     """
-    if not isinstance(settings, LearnerSettings):
-        _require_demonstrators(task, learner)
-    budget = settings.whole_updates(settings.steps if steps is None else steps)
-    require_budget(settings.steps if steps is None else steps, settings)
+    if traits is None:
+        traits = inspect_task(task)
+    learns = learner_of(learner, settings)
+    learns.require(task.source, traits.source)
+    learns.require(task.target, traits.target)
+    if set(arms) & set(ADAPTED_SOURCE_ARMS) and not traits.target.adapts_source:
+        raise StudyError(
+            f"{task.target} cannot adapt {task.source} to itself, which the arms "
+            f"{' and '.join(ADAPTED_SOURCE_ARMS)} need: leave them out."
+        )
+    wanted = settings.steps if steps is None else steps
+    require_budget(wanted, settings)
+    budget = settings.whole_updates(wanted)
     if source_steps is None:
-        own = settings.source_steps if isinstance(settings, LearnerSettings) else 0
-        source_steps = own or budget // 2
+        source_steps = settings.source_steps or budget // 2
     source_budget = settings.whole_updates(source_steps)
-    body_map, individual, exclusive = _looked_at(task, tuple(arms), rules, map_text, units)
     digest = ""
     if source_policy is not None:
-        source_budget = given_policy_steps(source_policy, task.source, learner, settings)
-        digest = _digest(source_policy)
+        origin = learns.origin(source_policy, trust=trust)
+        if origin.env != task.source:
+            raise SpaceMismatch(
+                f"The given policy was trained in {origin.env}, and the source is {task.source}: "
+                "name the env and the body that it was trained in."
+            )
+        source_budget, digest = origin.steps, _digest(source_policy)
     else:
         require_budget(source_budget, settings)
+    layouts = (
+        traits.source.observation_layout,
+        traits.target.observation_layout,
+        traits.source.action_layout,
+        traits.target.action_layout,
+    )
     return Plan(
         task=task,
-        body_map=body_map,
+        body_map=(
+            BodyMap.from_toml(map_text, *layouts)
+            if map_text
+            else BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
+        ),
         learner=learner,
         settings=settings,
         steps=budget,
@@ -145,10 +248,9 @@ def make_plan(
         arms=tuple(arms),
         seed=seed,
         source_policy=digest,
-        # Each evaluation of a clone is another clone, of another number of demonstrations.
-        last_k=1 if isinstance(settings, CloningSettings) else _LAST_K,
-        individual=individual,
-        exclusive=exclusive,
+        last_k=settings.last_k,
+        individual=traits.target.individual,
+        exclusive=traits.target.exclusive,
         versions={
             "shapechanger": shapechanger.__version__,
             "python": platform.python_version(),
@@ -162,41 +264,40 @@ def run_study(
     out: Path,
     *,
     source_policy: Path | None = None,
+    trust: bool = False,
     executor: Executor | None = None,
     on_progress: OnProgress = lambda name, steps, ended: None,
     command: str = "",
+    traits: TaskTraits | None = None,
 ) -> Study:
-    """Do what of a plan is not yet done in `out`, and say what it comes to.
+    """Perform the runs of a plan that are missing in `out`, and return the result.
 
-    A run that was cut off starts again from its beginning, so a study that was killed ends with the
-    same numbers as one that was not.
+    A run that was cut off starts again, so a study that was killed ends with the same numbers as
+    one that was not.
 
     Args:
-        plan: What to do.
-        out: The study's folder; made if it is not there.
+        plan: The plan.
+        out: Folder of the study; made if missing.
         source_policy: The file that `plan.source_policy` is the digest of.
+        trust: Accept content of that file that can run code.
         executor: What runs the runs; None for processes on this machine.
         on_progress: Called with the name of a run, its steps so far and whether it has ended.
-        command: The command that can be typed to repeat it.
+        command: The command that repeats the study.
+        traits: What `inspect_task` returned for the task; None to inspect it now.
 
     Raises:
         EmptyShift: If nothing changes between source and target.
-        OutputError: If `out` cannot be written, now or later; what has ended is kept.
+        OutputError: If `out` cannot be written; finished runs are kept.
         ForeignStudy: If `out` holds another study, or something else.
         CorruptStudy: If a file in `out` cannot be read.
     """
-    digest = _digest(source_policy) if source_policy is not None else ""
-    if digest != plan.source_policy:
+    given = None if source_policy is None else GivenPolicy(source_policy, trust)
+    if (_digest(source_policy) if source_policy else "") != plan.source_policy:
         raise StudyError("The source policy is not the one that this study was planned with.")
-    shift = _shift(plan.task)
+    shift = (inspect_task(plan.task) if traits is None else traits).shift
     claim_folder(plan, out)
     jobs = [
-        Job(
-            run.name,
-            perform_run,
-            (plan, run, str(out), str(source_policy or "")),
-            after=_after(plan, run),
-        )
+        Job(run.name, perform_run, (plan, run, str(out), given), after=_after(plan, run))
         for run in unfinished_runs(plan, out)
     ]
     if jobs:
@@ -208,16 +309,24 @@ def run_study(
 
 
 def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
-    """The runs of a plan that have not ended in `out`.
+    """Return the runs of a plan that have not ended in `out`.
+
+    Args:
+        plan: The plan.
+        out: Folder of the study.
 
     Raises:
-        CorruptStudy: If the file of one that has cannot be read.
+        CorruptStudy: If the file of a finished run cannot be read.
     """
     return tuple(run for run in plan.runs() if load_result(plan, out, run) is None)
 
 
 def is_folder_of(plan: Plan, out: Path) -> bool:
-    """Whether `out` is the folder of this study, done with as many seeds or with fewer.
+    """Whether `out` is the folder of this study, with as many seeds or fewer.
+
+    Args:
+        plan: The plan.
+        out: The folder.
 
     Raises:
         CorruptStudy: If the plan in it cannot be read.
@@ -225,23 +334,17 @@ def is_folder_of(plan: Plan, out: Path) -> bool:
     if not (out / PLAN_FILE).exists():
         return False
     found = _plan_in(out)
-    return found == plan or plan.grows(found)
-
-
-def _plan_in(out: Path) -> Plan:
-    remedy = "give another --out, or delete that folder to begin again; nothing was changed"
-    return read_json(out / PLAN_FILE, Plan, remedy)
-
-
-def _digest(policy: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(policy.read_bytes()).hexdigest()
+    return found == plan or plan.extends(found)
 
 
 def claim_folder(plan: Plan, out: Path) -> None:
-    """Make `out` the folder of this study, or see that it already is.
+    """Make `out` the folder of this study, or check that it already is.
 
-    A study that was begun with fewer seeds goes on with more: no run depends on how many there are.
+    A study can be resumed with more seeds: no run depends on their number.
+
+    Args:
+        plan: The plan.
+        out: The folder.
 
     Raises:
         OutputError: If it cannot be written.
@@ -252,7 +355,7 @@ def claim_folder(plan: Plan, out: Path) -> None:
     path = out / PLAN_FILE
     if path.exists():
         found = _plan_in(out)
-        if plan.grows(found):
+        if plan.extends(found):
             write_json(path, plan)
         elif found != plan:
             raise ForeignStudy(
@@ -265,72 +368,24 @@ def claim_folder(plan: Plan, out: Path) -> None:
     write_json(path, plan)
 
 
-def _looked_at(
-    task: TransferTask,
-    arms: tuple[Arm, ...],
-    rules: Mapping[str, Any] | None,
-    map_text: str,
-    units: str,
-) -> tuple[BodyMap, str, bool]:
-    """The map between two envs' layouts, what tells one target from another, and who shares it."""
-    source, target = task.source.make(), task.target.make()
-    try:
-        source_observation, source_action = layouts_of(source)
-        target_observation, target_action = layouts_of(target)
-        require_source_adaptation(task, arms, target.unwrapped)
-        individual: str = getattr(target.unwrapped, "individual", "")
-        exclusive: bool = getattr(target.unwrapped, "exclusive", False)
-    finally:
-        source.close()
-        target.close()
-    layouts = (source_observation, target_observation, source_action, target_action)
-    if map_text:
-        return BodyMap.from_toml(map_text, *layouts), individual, exclusive
-    body_map = BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
-    return body_map, individual, exclusive
+def _plan_in(out: Path) -> Plan:
+    remedy = "give another --out, or delete that folder to start again; nothing was changed"
+    return read_json(out / PLAN_FILE, Plan, remedy)
 
 
-def _require_demonstrators(task: TransferTask, learner: str) -> None:
-    """Refuse envs in which nobody shows how, for a learner that begins with that.
-
-    Raises:
-        StudyError: If one is such.
-    """
-    for env in (task.source, task.target):
-        made = env.make()
-        try:
-            shows = hasattr(made.unwrapped, "demonstrator")
-        finally:
-            made.close()
-        if not shows:
-            raise StudyError(
-                f"{env} has no demonstrator, and {learner} learns from one: give another --learner."
-            )
-
-
-def _shift(task: TransferTask) -> str:
-    """What changes between source and target, if the envs can tell.
-
-    Raises:
-        EmptyShift: If nothing does.
-    """
-    source, target = task.source.make(), task.target.make()
-    try:
-        certify = getattr(source.unwrapped, "certify_shift", None)
-        return "" if certify is None else str(certify(source, target))
-    finally:
-        source.close()
-        target.close()
+def _digest(policy: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(policy.read_bytes()).hexdigest()
 
 
 def _after(plan: Plan, run: Run) -> tuple[str, ...]:
-    """The runs that must have ended before this one."""
+    """Names of the runs that must end before this one."""
     needs_source = run.kind in ("zero-shot", "fine-tune") and not plan.source_policy
     return (Run("source", run.index).name,) if needs_source else ()
 
 
 def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> Study:
-    """What the results come to."""
+    """Summarise the results of all runs."""
     by_kind: dict[RunKind, list[RunResult]] = {}
     for result in results:
         by_kind.setdefault(result.run.kind, []).append(result)
@@ -361,7 +416,7 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
 
 
 def _curves(results: list[RunResult]) -> LearningCurves:
-    """The curves of several runs."""
+    """Learning curves of several runs."""
     steps = [float(evaluation.steps) for evaluation in results[0].curve]
     returns = [[evaluation.mean_return for evaluation in result.curve] for result in results]
     return LearningCurves(np.array(steps), np.array(returns))

@@ -1,8 +1,8 @@
-"""Several studies that share what they have in common: the runs of a target, and of a source.
+"""Suites: several studies that share the runs of their targets and sources.
 
 Scratch on a target is the same training whatever the source is, and a source policy is the same
-whatever it is moved to; seeds follow from the kind of run and its number alone. So a study that
-begins finds these runs done, where a study beside it did them.
+whatever its target is; seeds follow from the kind and index of a run alone. So a study copies such
+runs from the finished studies of its suite.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from shapechanger.transfer.files import make_folder, read_json
 from shapechanger.transfer.methods import load_result
 from shapechanger.transfer.metrics import Estimate, LearningCurves
 from shapechanger.transfer.plan import Plan, RunKind
-from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, run_study
+from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
 
 __all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_folder", "study_outcomes"]
 
@@ -30,17 +30,17 @@ _DEMONSTRATIONS: Final = "demonstrations"
 
 
 class StudyOutcome(msgspec.Struct, frozen=True):
-    """What one study of a suite says, in steps on the target.
+    """Outcome of one study of a suite, in steps on the target.
 
     Attributes:
         name: SOURCE-to-TARGET.
-        final: What scratch ends with, mean over seeds.
-        zero_shot: What the source policy is worth unchanged; None where that was not asked.
-        fine_tuned: What fine-tuning ends with.
-        scratch_steps: Steps after which scratch first comes to `final`.
-        fine_tune_steps: The same of fine-tuning; None if it never does.
-        unit: Of the gains, see `Summary`.
-        gains: What fine-tuning gains over scratch, in target steps and with intervals: `jumpstart`,
+        final: Final return of scratch, mean over seeds.
+        zero_shot: Return of the source policy without training; None if that arm is missing.
+        fine_tuned: Final return of fine-tuning, mean over seeds.
+        scratch_steps: Steps at which scratch first reaches `final`.
+        fine_tune_steps: Steps at which fine-tuning first reaches `final`; None if it never does.
+        unit: Unit of the gains, see `Summary`.
+        gains: Gains of fine-tuning over scratch, in target steps and with intervals: `jumpstart`,
             `total_reward_gain` and `asymptotic_gain`.
     """
 
@@ -55,12 +55,17 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
     @property
     def halves(self) -> bool:
-        """Whether fine-tuning needs less than half of the steps that scratch needs."""
+        """Whether fine-tuning needs less than half as many steps as scratch."""
         return self.fine_tune_steps is not None and self.fine_tune_steps < self.scratch_steps / 2
 
 
 def study_folder(plan: Plan, out: Path) -> Path:
-    """Where a study of a suite is."""
+    """Return the folder of a study of a suite.
+
+    Args:
+        plan: The plan of the study.
+        out: Folder of the suite.
+    """
     return out / "-to-".join(
         env.id.split("/")[-1].removesuffix("-v1")
         + "".join(f"-{lens}" for lens in env.kwargs.get("lenses", ()))
@@ -75,8 +80,17 @@ def run_in_suite(
     executor: Executor | None = None,
     on_progress: OnProgress = lambda name, steps, ended: None,
     command: str = "",
+    traits: TaskTraits | None = None,
 ) -> Study:
-    """Do a study in its folder below `out`, with what the studies beside it have done already.
+    """Run a study in its folder below `out`, reusing runs of the other studies there.
+
+    Args:
+        plan: The plan of the study.
+        out: Folder of the suite.
+        executor: As in `run_study`.
+        on_progress: As in `run_study`.
+        command: As in `run_study`.
+        traits: As in `run_study`.
 
     Raises:
         ForeignStudy: If its folder holds another study.
@@ -84,14 +98,20 @@ def run_in_suite(
         OutputError: If `out` cannot be written.
     """
     folder = open_study_folder(plan, out)
-    return run_study(plan, folder, executor=executor, on_progress=on_progress, command=command)
+    return run_study(
+        plan, folder, executor=executor, on_progress=on_progress, command=command, traits=traits
+    )
 
 
 def open_study_folder(plan: Plan, out: Path) -> Path:
-    """Make a study's folder below `out`, with what the studies beside it have done already.
+    """Make a study's folder below `out`, with the runs that other studies there share with it.
+
+    Args:
+        plan: The plan of the study.
+        out: Folder of the suite.
 
     Returns:
-        The folder; what is unfinished in it is left to do.
+        The folder of the study.
 
     Raises:
         ForeignStudy: If its folder holds another study.
@@ -108,16 +128,16 @@ def open_study_folder(plan: Plan, out: Path) -> Path:
 
 
 def study_outcomes(studies: Iterable[Study]) -> list[StudyOutcome]:
-    """What each study says, in the order of the studies."""
-    return [_crossing(study) for study in studies]
+    """Return the outcome of each study."""
+    return [_outcome(study) for study in studies]
 
 
 def _share(plan: Plan, folder: Path, sibling: Path) -> None:
-    """Take over the runs of a sibling that are the same here."""
-    remedy = f"delete {sibling} to do that study again"
+    """Copy the runs of another study that are the same here."""
+    remedy = f"delete {sibling} to repeat that study"
     other = read_json(sibling / PLAN_FILE, Plan, remedy)
-    alike = msgspec.structs.replace(other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds)
-    if alike != plan:
+    same = msgspec.structs.replace(other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds)
+    if same != plan:
         return
     kinds: list[RunKind] = []
     if other.task.target == plan.task.target:
@@ -130,11 +150,11 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
             make_folder((folder / shown).parent)
             (folder / shown).hardlink_to(sibling / shown)
         if load_result(plan, folder, run) is None and load_result(other, sibling, run) is not None:
-            _copy_whole(run.folder(sibling), run.folder(folder))
+            _copy_atomic(run.folder(sibling), run.folder(folder))
 
 
-def _copy_whole(theirs: Path, mine: Path) -> None:
-    """Copy the folder of a run; it appears whole or not at all.
+def _copy_atomic(theirs: Path, mine: Path) -> None:
+    """Copy the folder of a run atomically.
 
     Raises:
         OutputError: If it cannot be written.
@@ -150,7 +170,7 @@ def _copy_whole(theirs: Path, mine: Path) -> None:
         raise OutputError(f"Cannot write {mine}: {error.strerror or error}.") from error
 
 
-def _crossing(study: Study) -> StudyOutcome:
+def _outcome(study: Study) -> StudyOutcome:
     scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
     final = float(scratch.returns[:, -1].mean())
     zero_shot = study.of("zero-shot")
@@ -170,7 +190,7 @@ def _crossing(study: Study) -> StudyOutcome:
 
 
 def _first_at(curves: LearningCurves, level: float) -> float | None:
-    """Steps at which the mean over seeds first comes to a level; in between, along a line."""
+    """Steps at which the mean over seeds first reaches a level, linearly interpolated."""
     means = curves.returns.mean(axis=0)
     before_steps, before = 0.0, float("-inf")
     for steps, mean in zip(curves.steps.tolist(), means.tolist(), strict=True):

@@ -1,205 +1,94 @@
 """The twin's board, a process of its own: pins, chips, ledger, world and time.
 
 It is started before the robot and outlives the robot's processes, as hardware does. It ends on
-SIGTERM, or when whoever holds the other end of `--owner-fd` has ended.
+SIGTERM, or with the process at the other end of its owner's descriptor.
 """
 
 from __future__ import annotations
 
-import argparse
 import logging
 import os
 import signal
 import socket
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import FrameType
 from typing import Final
+
+import msgspec
 
 from shapechanger.errors import RobotError, UnknownName, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
-from shapechanger.twin import messages as wire
 from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
-from shapechanger.twin.pin_board import PinBoard, chips_of
-from shapechanger.twin.rig import Rig
-from shapechanger.twin.sensors import PinSensors, Surroundings
-from shapechanger.twin.server import BoardConnection, OwnerGone, Switchboard
+from shapechanger.twin.chips import chips_of
+from shapechanger.twin.messages import (
+    BreakCamera,
+    BreakChip,
+    BreakMagnet,
+    BreakServo,
+    ExchangeServoBytes,
+    LayOutCourse,
+    PlaceVehicle,
+    PressButton,
+    PutVehicleBack,
+    ReadLevels,
+    ReadTensions,
+    ReadWhereabouts,
+    Request,
+    SetBattery,
+    SetDistance,
+    SleepOnBoard,
+    WaitForGrant,
+    Whereabouts,
+)
+from shapechanger.twin.pin_board import PinBoard
+from shapechanger.twin.sensors import Surroundings
+from shapechanger.twin.server import (
+    LATER,
+    BoardConnection,
+    BoardServer,
+    OwnerGone,
+    RealTime,
+    TwinTime,
+)
+from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter
-from shapechanger.twin.timekeeper import MachineTime, TwinTime
+from shapechanger.twin.start import BoardSettings
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.place import Place, open_world
+from shapechanger.twin.world.place import open_world
 from shapechanger.worlds.world import RESTING_V, World
 
-__all__ = ["Board", "Operating", "main"]
+__all__ = ["Board", "main"]
 
 _BUTTONS: Final = ("bumper", "stop")
-
-
-class Operating:
-    """Does what the operator says; see `Operator`.
-
-    Args:
-        world: Where the vehicle is.
-        sensors: What is on the pins.
-        pins: The pins and chips.
-        camera: The front camera; None without one.
-        ledger: Where it is written down.
-        now_ns: The time.
-        rig: The servos on a bus; None without any.
-    """
-
-    def __init__(
-        self,
-        world: World,
-        sensors: PinSensors,
-        pins: PinBoard,
-        camera: FrontCameraPipe | None,
-        ledger: LedgerWriter,
-        now_ns: Callable[[], int],
-        rig: Rig | None = None,
-    ) -> None:
-        self._rig = rig
-        self._world = world
-        self._sensors = sensors
-        self._pins = pins
-        self._camera = camera
-        self._ledger = ledger
-        self._now_ns = now_ns
-
-    def do(self, message: wire.Message) -> wire.Message:
-        """Do it, and answer.
-
-        Raises:
-            RobotError: If it cannot be done.
-        """
-        match message["op"]:
-            case "place":
-                self._world.place(message["seed"])
-                self._ledger.write(self._now_ns(), "place", seed=message["seed"])
-                return {}
-            case "put_back":
-                return self._put_back()
-            case "course":
-                self._world.lay_out(message["seed"])
-                self._ledger.write(self._now_ns(), "course", seed=message["seed"])
-                return {}
-            case "camera":
-                return self._break_camera(message["how"])
-            case "press":
-                return self._press(message["what"], message["down"])
-            case "battery":
-                volts = message["volts"]
-                self._world.resting_v = RESTING_V if volts is None else volts
-                return self._noted(f"battery {volts}")
-            case "distance":
-                self._sensors.say_distance(message["metres"], message["dead"])
-                return self._noted(f"distance {'dead' if message['dead'] else message['metres']}")
-            case "chip":
-                return self._break_chip(message["bus"], message["address"], message["dead"])
-            case "servo_fault":
-                self._servos().break_servo(message["tendon"], message["how"])
-                return self._noted(f"servo {message['tendon']} {message['how'] or 'well'}")
-            case "magnet":
-                self._pins.encoder(message["joint"]).set_magnet(message["how"])
-                return self._noted(f"magnet {message['joint']} {message['how'] or 'well'}")
-            case "tensions":
-                return {"tensions": self._servos().tensions()}
-            case "levels":
-                levels = self._pins.levels
-                return {
-                    "duties": list(levels.duties.items()),
-                    "pulses": [[pin, *pulse] for pin, pulse in levels.pulses.items()],
-                    "channels": [[*at, *pulse] for at, pulse in levels.channels.items()],
-                    "edges_ns": list(levels.edges_ns.items()),
-                    "t": self._now_ns(),
-                }
-            case "where":
-                seen = self._world.inputs()
-                pose = seen.pose
-                return {
-                    "x": pose.x,
-                    "y": pose.y,
-                    "heading": pose.heading,
-                    "speed": seen.speed,
-                    "travelled_m": seen.travelled_m,
-                    "bumped": seen.bumped,
-                    "distance_m": self._world.distance_m(),
-                    "truth": self._world.truth(),
-                    "t": self._now_ns(),
-                }
-            case op:
-                raise RobotError(f"The twin's board does not know what {op!r} is.")
-
-    def _servos(self) -> Rig:
-        if self._rig is None:
-            raise RobotError("This twin has no servo bus.")
-        return self._rig
-
-    def _put_back(self) -> wire.Message:
-        try:
-            self._world.put_back()
-        except WorldError as error:
-            raise RobotError(f"The vehicle cannot be put back: {error}") from error
-        self._ledger.write(self._now_ns(), "put_back")
-        return {}
-
-    def _break_camera(self, how: str) -> wire.Message:
-        if self._camera is None:
-            raise RobotError("This twin has no camera.")
-        faults: dict[str, CameraFault] = {fault: fault for fault in CAMERA_FAULTS}
-        if how not in faults:
-            raise UnknownName("fault of a camera", how, CAMERA_FAULTS)
-        self._camera.fault = faults[how]
-        return self._noted(f"camera {how or 'well'}")
-
-    def _press(self, what: str, down: bool) -> wire.Message:
-        if what not in _BUTTONS:
-            raise UnknownName("button", what, _BUTTONS)
-        if what == "stop":
-            self._sensors.press_stop(down, self._now_ns())
-        else:
-            self._sensors.hold_bumpers(down)
-        return self._noted(f"{what} {'down' if down else 'up'}")
-
-    def _break_chip(self, bus: int, address: int, dead: bool) -> wire.Message:
-        if dead:
-            self._pins.dead_chips.add((bus, address))
-        else:
-            self._pins.dead_chips.discard((bus, address))
-        return self._noted(f"chip {bus} {address} {'dead' if dead else 'well'}")
-
-    def _noted(self, what: str) -> wire.Message:
-        self._ledger.write(self._now_ns(), "fault", what=what)
-        return {}
-
 
 _log = logging.getLogger(__name__)
 
 
 class Board:
-    """All parts of the board, put together.
+    """Pins, chips, sensors and world, with a server for clients.
 
     Args:
-        wiring: What is attached.
-        world: Where the vehicle is.
-        time: Who moves time.
-        ledger: Where changes go.
-        camera: The front camera; None without one.
-        listening: The socket for clients.
-        owner_fd: Descriptor whose end ends the board; None for none.
-        seed: Of everything that is random.
+        wiring: What is attached to the pins.
+        world: World of the vehicle.
+        time: Time of the board.
+        ledger: Record of all changes.
+        camera: Front camera; None without one.
+        listening: Listening socket for clients.
+        owner_fd: Descriptor whose end ends the board.
+        seed: Seed of everything random.
     """
 
     def __init__(
         self,
         wiring: TwinWiring,
         world: World,
-        time: MachineTime | TwinTime,
+        time: RealTime | TwinTime,
         ledger: LedgerWriter,
         camera: FrontCameraPipe | None,
         listening: socket.socket,
-        owner_fd: int | None,
+        owner_fd: int,
         seed: int,
     ) -> None:
         self._world = world
@@ -207,61 +96,144 @@ class Board:
         self._ledger = ledger
         self._camera = camera
         self._surroundings = Surroundings(wiring, world, time.now_ns())
-        sensors = self._surroundings.sensors
+        self._sensors = self._surroundings.sensors
         self._pins = PinBoard(wiring, chips_of(wiring.plan, world), ledger, seed)
-        self._pins.on_output = sensors.output_changed
-        rig = self._surroundings.rig
-        self._operating = Operating(world, sensors, self._pins, camera, ledger, time.now_ns, rig)
-        self._switchboard = Switchboard(
-            listening, owner_fd, self._pins, sensors.levels, time.clock, time.now_ns, self._operate
+        self._pins.on_output = self._sensors.output_changed
+        self._server = BoardServer(
+            listening,
+            owner_fd,
+            self._pins,
+            self._sensors.levels,
+            time.clock,
+            time.now_ns,
+            self._operate,
         )
 
     def run(self) -> None:
         """Run until the owner is gone."""
         try:
-            self._time.run(self._switchboard, self._camera, self._go_on, self._take_picture)
+            self._time.run(self._server, self._camera, self._advance, self._take_picture)
         except OwnerGone:
             _log.info("the owner is gone, so this board ends")
         finally:
-            self._switchboard.close()
+            self._server.close()
             self._ledger.close()
             if self._camera is not None:
                 self._camera.close()
 
-    def _go_on(self, now_ns: int) -> None:
+    def _advance(self, now_ns: int) -> None:
         edges = self._surroundings.advance(now_ns, self._pins.levels)
         for edge in edges:
             self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
-        self._switchboard.tell_edges(edges)
+        self._server.send_edges(edges)
 
     def _take_picture(self, now_ns: int) -> None:
         if self._camera is not None:
             self._camera.take(self._world, now_ns)
 
-    def _operate(self, connection: BoardConnection, message: wire.Message) -> wire.Message | None:
-        if message["op"] == "servo":
-            return self._speak_to_servos(message)
-        if message["op"] == "wait":
-            self._time.wait(connection, message["until"])
-            return None
-        if message["op"] == "sleep":
-            self._time.sleep(connection, message["id"], message["ns"])
-            return None
-        return self._operating.do(message)
+    def _operate(self, connection: BoardConnection, request: Request) -> object:
+        """Execute a request about time, servos or the world."""
+        match request:
+            case WaitForGrant():
+                self._time.wait(connection, request.until_ns)
+                return LATER
+            case SleepOnBoard():
+                self._time.sleep(connection, request.id or 0, request.ns)
+                return LATER
+            case ExchangeServoBytes():
+                rig = self._rig()
+                rig.require(request.device)
+                if request.data:
+                    rig.bus.receive(request.data)
+                return rig.bus.send()
+            case ReadTensions():
+                return self._rig().tensions()
+            case ReadLevels():
+                return self._pins.levels
+            case ReadWhereabouts():
+                return self._whereabouts()
+            case PlaceVehicle():
+                self._world.place(request.seed)
+                self._ledger.write(self._time.now_ns(), "place", seed=request.seed)
+            case PutVehicleBack():
+                try:
+                    self._world.put_back()
+                except WorldError as error:
+                    raise RobotError(f"The vehicle cannot be put back: {error}") from error
+                self._ledger.write(self._time.now_ns(), "put_back")
+            case LayOutCourse():
+                self._world.lay_out(request.seed)
+                self._ledger.write(self._time.now_ns(), "course", seed=request.seed)
+            case _:
+                self._ledger.write(self._time.now_ns(), "fault", what=self._fail(request))
+        return None
 
-    def _speak_to_servos(self, message: wire.Message) -> wire.Message:
-        """Hand bytes to the servo bus, and back what has come."""
-        rig = self._surroundings.rig
-        if rig is None:
+    def _fail(self, request: Request) -> str:
+        """Break, repair or press something, and describe it for the ledger."""
+        match request:
+            case BreakCamera():
+                self._break_camera(request.fault)
+                return f"camera {request.fault or 'well'}"
+            case PressButton():
+                self._press(request.button, request.down)
+                return f"{request.button} {'down' if request.down else 'up'}"
+            case SetBattery():
+                self._world.resting_v = RESTING_V if request.volts is None else request.volts
+                return f"battery {request.volts}"
+            case SetDistance():
+                self._sensors.override_distance(request.metres, dead=request.dead)
+                return f"distance {'dead' if request.dead else request.metres}"
+            case BreakChip():
+                at = request.bus, request.address
+                (self._pins.dead_chips.add if request.dead else self._pins.dead_chips.discard)(at)
+                return f"chip {at[0]} {at[1]} {'dead' if request.dead else 'well'}"
+            case BreakServo():
+                self._rig().break_servo(request.tendon, request.fault)
+                return f"servo {request.tendon} {request.fault or 'well'}"
+            case BreakMagnet():
+                self._pins.encoder(request.joint).set_magnet(request.fault)
+                return f"magnet {request.joint} {request.fault or 'well'}"
+            case _:
+                raise RobotError(f"The board does not execute {type(request).__name__}.")
+
+    def _rig(self) -> Rig:
+        if self._surroundings.rig is None:
             raise RobotError("This twin has no servo bus.")
-        rig.require(message["device"])
-        if message["data"]:
-            rig.line.receive(bytes.fromhex(message["data"]))
-        return {"data": rig.line.send().hex()}
+        return self._surroundings.rig
+
+    def _whereabouts(self) -> Whereabouts:
+        seen = self._world.inputs()
+        return Whereabouts(
+            x=seen.pose.x,
+            y=seen.pose.y,
+            heading=seen.pose.heading,
+            speed=seen.speed,
+            travelled_m=seen.travelled_m,
+            bumped=seen.bumped,
+            distance_m=self._world.distance_m(),
+            truth=self._world.truth(),
+            t=self._time.now_ns(),
+        )
+
+    def _break_camera(self, fault: str) -> None:
+        if self._camera is None:
+            raise RobotError("This twin has no camera.")
+        faults: dict[str, CameraFault] = {known: known for known in CAMERA_FAULTS}
+        if fault not in faults:
+            raise UnknownName("fault of a camera", fault, CAMERA_FAULTS)
+        self._camera.fault = faults[fault]
+
+    def _press(self, button: str, down: bool) -> None:
+        if button not in _BUTTONS:
+            raise UnknownName("button", button, _BUTTONS)
+        if button == "stop":
+            self._sensors.press_stop(down, self._time.now_ns())
+        else:
+            self._sensors.hold_bumpers(down)
 
 
 def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
-    """Let a world open and plan what takes a while, before a guard in real time waits for it."""
+    """Let the world prepare what takes a while, before a guard in real time waits for it."""
     world.put_back()
     world.place(seed)
     if pictures:
@@ -273,66 +245,48 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a board as the command line says."""
-    parser = argparse.ArgumentParser(description="The simulated board of a robot.")
-    parser.add_argument("--plan-fd", type=int, required=True, help="descriptor of the GuardPlan")
-    parser.add_argument("--socket", required=True, help="where to listen")
-    parser.add_argument("--ledger", required=True, help="file to write")
-    parser.add_argument("--clock", choices=("real", "twin"), required=True)
-    parser.add_argument("--owner-fd", type=int, help="descriptor whose end ends this process")
-    parser.add_argument("--fifo", help="where pictures go")
-    parser.add_argument("--size", default="160x120", help="of the pictures")
-    parser.add_argument("--fps", type=float, default=20.0)
-    parser.add_argument("--quality", type=int, default=80)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--world", default="", help="kind of place; none for the plain room")
-    parser.add_argument("--vehicle", default="", help="what drives there, such as car")
-    parser.add_argument("--lens", action="append", default=[], help="what is wrong with the camera")
-    parser.add_argument("--finger", default="", help="parameters of a finger, as JSON")
-    parser.add_argument("--one-shot-ms", type=float, help="of the enable line; none without it")
-    given = parser.parse_args(arguments)
-
+    """Run a board; the arguments are the descriptors of its `BoardSettings` and of its owner."""
+    settings_fd, owner_fd = map(int, sys.argv[1:] if arguments is None else arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
-    with os.fdopen(given.plan_fd, encoding="utf-8") as file:
-        plan = GuardPlan.from_json(file.read())
+    with os.fdopen(settings_fd, "rb") as file:
+        settings = msgspec.json.decode(file.read(), type=BoardSettings)
+    plan = GuardPlan.from_json(settings.plan)
 
-    width, height = (int(number) for number in given.size.split("x"))
     parts = {output.part for output in plan.outputs if output.part}
-    size = (width, height) if given.fifo is not None else None
-    place = Place(given.world, given.vehicle, tuple(given.lens), given.finger)
-    world = open_world(place, parts, size, given.seed)
-    _warm_up(world, given.seed, pictures=size is not None)
-    if given.clock == "real":
-        run_early()  # It stands for hardware, which is never late because a machine is busy.
-    time = TwinTime(plan.tick_hz) if given.clock == "twin" else MachineTime()
+    plan_of_camera = settings.camera
+    size = None if plan_of_camera is None else plan_of_camera.size
+    world = open_world(settings.place, parts, size, settings.seed)
+    _warm_up(world, settings.seed, pictures=size is not None)
+    if settings.clock == "real":
+        run_early()  # Hardware is never late because the machine is busy.
+    time = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
     camera = None
-    if given.fifo is not None:
+    if plan_of_camera is not None:
         camera = FrontCameraPipe(
-            given.fifo,
-            given.fps,
-            given.quality,
-            latest_only=given.clock == "real",
+            settings.fifo,
+            plan_of_camera.fps,
+            plan_of_camera.jpeg_quality,
+            latest_only=settings.clock == "real",
             start_ns=time.now_ns(),
-            seed=given.seed,
-            barcode=not given.world,
+            seed=settings.seed,
+            barcode=not settings.place.world,
         )
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listening.bind(given.socket)
+    listening.bind(settings.socket)
     board = Board(
-        TwinWiring(plan, given.one_shot_ms),
+        TwinWiring(plan, settings.one_shot_ms),
         world,
         time,
-        LedgerWriter(given.ledger),
+        LedgerWriter(settings.ledger),
         camera,
         listening,
-        given.owner_fd,
-        given.seed,
+        owner_fd,
+        settings.seed,
     )
     listening.listen()
-    if given.owner_fd is not None:
-        os.write(given.owner_fd, b"r")  # Ready.
+    os.write(owner_fd, b"r")  # Ready.
     board.run()
 
 

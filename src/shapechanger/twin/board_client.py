@@ -1,103 +1,167 @@
-"""A process's connection to the twin's board."""
+"""Connection of a process to the board, and the clocks that come with it."""
 
 from __future__ import annotations
 
 import os
 import select
 import socket
+import time
 from collections import deque
-from collections.abc import Sequence
-from typing import Any, Final, Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypeVar
+
+import msgspec
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-from shapechanger.robot.hardware import Clock
-from shapechanger.twin import messages as wire
-from shapechanger.twin.messages import BoardLink, EdgeListener
+from shapechanger.twin.messages import (
+    MAX_MESSAGE,
+    BoardGreeting,
+    BoardReply,
+    ClaimPin,
+    ConnectClient,
+    DrivePin,
+    ExchangeServoBytes,
+    GrantTime,
+    InputEdges,
+    LeaveBoard,
+    PulsePin,
+    ReadChip,
+    Request,
+    Role,
+    SleepOnBoard,
+    SleepResult,
+    WaitForGrant,
+    WriteChip,
+    decode_event,
+    encode,
+)
 
-__all__ = ["BoardPort", "Link"]
+__all__ = ["BoardClient", "GrantedClock", "SteadyClock"]
+
+Result = TypeVar("Result")
 
 
-class Link:
-    """One connection, for one thread.
+class BoardClient:
+    """A connection to the board, to be used by one thread; see `BoardPins` for the pins.
+
+    Args:
+        path: Socket on which the board listens.
+        role: What the client is to the board.
 
     Attributes:
-        clock: Where the run's time comes from, "real" or "twin".
-        now_ns: The newest twin time that the board has told; when the clock is real, the time of
-            the connection.
+        clock: Kind of clock, "real" or "twin".
+        now_ns: Newest twin time that the board has sent; with the clock "real", the time of the
+            connection.
         levels: Level of each pin that is claimed as an input.
-        on_edge: Whom `dispatch` tells of edges.
+        on_edge: Called by `dispatch` with pin, level and time of each edge.
+
+    Raises:
+        RobotError: If no board listens there.
     """
 
-    def __init__(self, path: str, role: str) -> None:
+    def __init__(self, path: str, role: Role) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             self._socket.connect(path)
         except OSError as error:
             self._socket.close()
             raise RobotError(f"No twin's board answers at {path}: {error.strerror}.") from error
-        self._asked = 0
+        self._last_id = 0
         self._edges: deque[tuple[int, int, int]] = deque()
         self._grants: deque[int] = deque()
-        self._replies: dict[int, wire.Message] = {}
+        self._replies: dict[int, BoardReply] = {}
         self.levels: dict[int, int] = {}
-        self.on_edge: EdgeListener | None = None
-        answer = self.ask(op="hello", role=role, pid=os.getpid())
-        self.clock: Literal["real", "twin"] = answer["clock"]
-        self.now_ns: int = answer["t"]
+        self.on_edge: Callable[[int, int, int], None] | None = None
+        greeting = self.ask(ConnectClient(role=role, pid=os.getpid()), BoardGreeting)
+        self.clock: Literal["real", "twin"] = greeting.clock
+        self.now_ns = greeting.t
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed here."""
+        """True if `close` was called."""
         return self._socket.fileno() < 0
 
     def fileno(self) -> int:
-        """The descriptor, to wait for."""
+        """Return the descriptor of the connection."""
         return self._socket.fileno()
 
-    def post(self, **message: Any) -> None:
-        """Say something that needs no answer.
+    def post(self, request: Request) -> None:
+        """Send a request without waiting for a reply.
 
         Raises:
             RobotError: If the board is gone.
         """
         try:
-            self._socket.send(wire.encode(message))
+            self._socket.send(encode(request))
         except OSError as error:
             raise RobotError("The twin's board is gone.") from error
 
-    def ask(self, **message: Any) -> wire.Message:
-        """Say something and wait for the answer.
+    def ask(self, request: Request, kind: type[Result] | Any = None) -> Any:
+        """Send a request and wait for its reply.
+
+        Args:
+            request: The request.
+            kind: Type of the result.
 
         Raises:
             RobotError: If the board refuses, or is gone.
             OSError: If a chip does not answer, as smbus2 raises it.
         """
-        self._asked += 1
-        self.post(id=self._asked, **message)
-        while self._asked not in self._replies:
+        self._last_id += 1
+        request.id = self._last_id
+        self.post(request)
+        while request.id not in self._replies:
             self._receive(0)
-        answer = self._replies.pop(self._asked)
-        if "error" in answer:
-            raise RobotError(answer["error"])
-        if "errno" in answer:
-            raise OSError(answer["errno"], os.strerror(answer["errno"]))
-        return answer
+        reply = self._replies.pop(request.id)
+        if reply.error:
+            raise RobotError(reply.error)
+        if reply.errno:
+            raise OSError(reply.errno, os.strerror(reply.errno))
+        return msgspec.msgpack.decode(reply.result, type=kind)
+
+    def claim(
+        self, pin: int, mode: Literal["input", "output"], pull: str, level: int, t: int
+    ) -> int:
+        """Claim a pin; see `BoardPins.claim`."""
+        found = self.ask(ClaimPin(pin=pin, mode=mode, pull=pull, level=level, t=t), int)
+        self.levels[pin] = found
+        return found
+
+    def drive(self, pin: int, duty: float, hz: int, t: int) -> None:
+        """Set an output; see `BoardPins.drive`."""
+        self.post(DrivePin(pin=pin, duty=duty, hz=hz, t=t))
+
+    def pulse(self, pin: int, us: int, hz: int, t: int) -> None:
+        """Send servo pulses; see `BoardPins.pulse`."""
+        self.post(PulsePin(pin=pin, us=us, hz=hz, t=t))
+
+    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
+        """Read registers; see `BoardPins.read_chip`."""
+        request = ReadChip(bus=bus, address=address, register=register, length=length)
+        return self.ask(request, list[int])
+
+    def write_chip(self, bus: int, address: int, register: int, data: list[int], t: int) -> None:
+        """Write registers; see `BoardPins.write_chip`."""
+        self.ask(WriteChip(bus=bus, address=address, register=register, data=data, t=t))
+
+    def exchange_servo_bytes(self, device: str, data: bytes) -> bytes:
+        """Send bytes to the servo bus and return those that have arrived from it."""
+        return self.ask(ExchangeServoBytes(device=device, data=data), bytes)
 
     def drain(self) -> None:
-        """Take in everything that has arrived, without waiting."""
+        """Receive everything that has arrived, without waiting."""
         while self._receive(socket.MSG_DONTWAIT):
             pass
 
     def dispatch(self) -> None:
-        """Tell `on_edge` of all edges that have arrived."""
+        """Call `on_edge` for all edges that have arrived."""
         while self._edges:
             edge = self._edges.popleft()
             if self.on_edge is not None:
                 self.on_edge(*edge)
 
-    def granted(self, at_most_s: float) -> bool:
-        """Wait for a grant of time, which is then `now_ns`; dispatch the edges before it."""
+    def await_grant(self, at_most_s: float) -> bool:
+        """Wait for a grant, which sets `now_ns`, and dispatch the edges before it."""
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         while not self._grants:
@@ -110,109 +174,142 @@ class Link:
         return True
 
     def close(self) -> None:
-        """Say goodbye."""
+        """Leave the board in order."""
         if not self.closed:
             try:
-                self._socket.send(wire.encode({"op": "bye"}))
+                self._socket.send(encode(LeaveBoard()))
             except OSError:
-                pass  # The board left first: nobody is there to be told.
+                pass  # The board ended first.
             finally:
                 self._socket.close()
 
     def _receive(self, flags: int) -> bool:
-        """Take in one message; False if there is none."""
+        """Receive one message; False if there is none."""
         try:
-            data = self._socket.recv(wire.MAX_MESSAGE, flags)
+            data = self._socket.recv(MAX_MESSAGE, flags)
         except BlockingIOError:
             return False
         except OSError as error:
             raise RobotError("The twin's board is gone.") from error
         if not data:
             raise RobotError("The twin's board is gone.")
-        message = wire.decode(data)
-        op = message["op"]
-        if op == "grant":
-            self._grants.append(message["t"])
-        elif op == "inputs":
-            for pin, level, at_ns in message["edges"]:
-                self.levels[pin] = level
-                self._edges.append((pin, level, at_ns))
-        else:
-            self._replies[message["id"]] = message
+        match decode_event(data):
+            case GrantTime(t=t):
+                self._grants.append(t)
+            case InputEdges(edges=edges):
+                for edge in edges:
+                    self.levels[edge.pin] = edge.level
+                    self._edges.append((edge.pin, edge.level, edge.t))
+            case BoardReply() as reply:
+                self._replies[reply.id] = reply
         return True
 
 
-_JUST_NOW_NS: Final = 2_000_000
-
-
-class BoardPort:
-    """What the SDK's packet handler asks of a port; an answer takes no time, as at a `LinePort`.
+class SteadyClock:
+    """The machine's monotonic clock; edges of inputs are dispatched while the guard waits.
 
     Args:
-        link: The connection to the board.
-        clock: The time.
-        settings: Of the bus.
-
-    Attributes:
-        is_using: As the SDK wants it.
-
-    Raises:
-        RobotError: If the board has no servos.
+        client: Connection to the board.
     """
 
-    def __init__(self, link: BoardLink, clock: Clock, settings: BusSettings) -> None:
-        self._link = link
-        self._clock = clock
-        self._asked_ns = 0
-        self._baud = settings.baud
-        self._arrived = bytearray()
-        self.is_using = False
-        self._device = settings.device
-        self._say(b"")
+    def __init__(self, client: BoardClient) -> None:
+        self._client = client
 
-    def clearPort(self) -> None:
-        """Forget what has arrived."""
-        self._arrived.clear()
+    def now_ns(self) -> int:
+        """Return the time of CLOCK_MONOTONIC in nanoseconds."""
+        return time.monotonic_ns()
 
-    def writePort(self, packet: Sequence[int]) -> int:
-        """Send bytes."""
-        data = bytes(packet)
-        self._say(data)
-        return len(data)
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        """Wait until a descriptor can be read or it is `until_ns`; see `Clock.wait`."""
+        latest_ns = min(until_ns, time.monotonic_ns() + int(at_most_s * 1e9))
+        board = self._client.fileno()
+        poll = select.poll()
+        for fd in {*readable, board}:
+            poll.register(fd, select.POLLIN)
+        while True:
+            left_ms = max(0.0, (latest_ns - time.monotonic_ns()) / 1e6)
+            ready = {fd for fd, _ in poll.poll(left_ms)}
+            if board in ready:
+                self._client.drain()
+            self._client.dispatch()
+            now_ns = time.monotonic_ns()
+            if ready - {board} or now_ns >= latest_ns:
+                return bool(ready - {board}) or now_ns >= until_ns
 
-    def readPort(self, length: int) -> bytes:
-        """At most so many bytes of what has arrived."""
-        if length <= 0:
-            return b""
-        data = bytes(self._arrived[:length])
-        del self._arrived[:length]
-        return data
+    async def sleep(self, seconds: float) -> None:
+        """Sleep in real time."""
+        import asyncio  # Only the daemon sleeps; the guard stays light.
 
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Nothing: an answer takes no time."""
+        await asyncio.sleep(seconds)
 
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Nothing: an answer takes no time."""
 
-    def isPacketTimeout(self) -> bool:
-        """Whether nothing more will come."""
-        return not self._arrived
+class GrantedClock:
+    """The twin's own clock, which the board advances.
 
-    def getBytesAvailable(self) -> int:
-        """How many bytes have arrived and were not read."""
-        # A board that was asked just now has nothing new, and each question costs a busy one time.
-        if self._clock.now_ns() - self._asked_ns > _JUST_NOW_NS:
-            self._say(b"")
-        return len(self._arrived)
+    A process that calls `wait` takes part: time advances only while all participants wait.
 
-    def getBaudRate(self) -> int:
-        """Bits a second."""
-        return self._baud
+    Args:
+        client: Connection to the board.
+        path: Socket of the board; each `sleep` in progress needs a connection of its own.
+    """
 
-    def closePort(self) -> None:
-        """Nothing: the link belongs to somebody else."""
+    def __init__(self, client: BoardClient, path: str) -> None:
+        self._client = client
+        self._path = path
+        self._waiting = False
+        self._idle: list[socket.socket] = []
 
-    def _say(self, data: bytes) -> None:
-        self._asked_ns = self._clock.now_ns()
-        answer = self._link.ask(op="servo", device=self._device, data=data.hex())
-        self._arrived += bytes.fromhex(answer["data"])
+    def now_ns(self) -> int:
+        """Return the newest twin time that this process has received."""
+        return self._client.now_ns
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        """Finish the last grant and wait for the next; see `Clock.wait`.
+
+        A grant arrives at each tick of the board, and at `until_ns` if that is earlier.
+        """
+        if not self._waiting:
+            self._client.post(WaitForGrant(until_ns=until_ns))
+            self._waiting = True
+        if not self._client.await_grant(at_most_s):
+            return False
+        self._waiting = False
+        return True
+
+    async def sleep(self, seconds: float) -> int | None:
+        """Let twin time advance, and return when the newest picture was taken."""
+        import asyncio  # Only the daemon sleeps; the guard stays light.
+
+        loop = asyncio.get_running_loop()
+        connected = bool(self._idle)
+        if connected:
+            connection = self._idle.pop()
+        else:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            connection.setblocking(False)
+        try:
+            if not connected:
+                await loop.sock_connect(connection, self._path)
+            request = SleepOnBoard(ns=max(0, round(seconds * 1e9)), id=0)
+            await loop.sock_sendall(connection, encode(request))
+            data = await loop.sock_recv(connection, MAX_MESSAGE)
+            if not data:
+                raise RobotError("The twin's board is gone.")
+        except BaseException as error:
+            # Also when cancelled: a reply that is still due would answer the next sleep.
+            connection.close()
+            if isinstance(error, OSError):
+                raise RobotError("The twin's board is gone.") from error
+            raise
+        self._idle.append(connection)
+        reply = decode_event(data)
+        if not isinstance(reply, BoardReply) or reply.error:
+            raise RobotError(getattr(reply, "error", "") or "The twin's board does not sleep.")
+        slept = msgspec.msgpack.decode(reply.result, type=SleepResult)
+        self._client.now_ns = max(self._client.now_ns, slept.t)
+        return slept.captured_ns
+
+    def close(self) -> None:
+        """Close the connections of `sleep`."""
+        while self._idle:
+            self._idle.pop().close()

@@ -1,4 +1,4 @@
-"""The front camera: pictures of the world as JPEG into a pipe."""
+"""Front camera: writes pictures of the world as JPEG into a pipe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.worlds.world import World
 __all__ = ["CAMERA_FAULTS", "CameraFault", "FrontCameraPipe", "with_capture_time"]
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
-"""What a broken camera does: nothing, the same picture again, noise, or the half of a picture."""
+"""Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""
 
 CAMERA_FAULTS: Final[tuple[CameraFault, ...]] = get_args(CameraFault)
 
@@ -28,28 +28,29 @@ _FIONREAD: Final = 0x541B
 
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
-    """The JPEG with a comment segment that says when the picture was taken."""
+    """Add the capture time to a JPEG, as a comment segment."""
     words = b"captured_ns=%d" % captured_ns
     segment = _COMMENT + (len(words) + 2).to_bytes(2, "big") + words
     return _START_OF_IMAGE + segment + jpeg[len(_START_OF_IMAGE) :]
 
 
 class FrontCameraPipe:
-    """Takes pictures and writes them into a FIFO, without ever waiting for a reader.
+    """Takes pictures and writes them into a FIFO, without ever waiting for its reader.
 
     Args:
-        path: The FIFO.
-        fps: Pictures a second.
-        quality: Of the JPEG, 1 to 100.
-        latest_only: Whether a picture is dropped while the one before has not been read. Otherwise
-            pictures are only dropped when the pipe is full or has no reader.
-        barcode: Whether its first rows show when a picture was taken.
-        seed: Of the noise of a broken camera.
+        path: Path of the FIFO.
+        fps: Pictures per second.
+        quality: Quality of the JPEG, 1 to 100.
+        latest_only: Whether to drop a picture while the one before is unread. Otherwise pictures
+            are dropped only if the pipe is full or has no reader.
+        start_ns: Time of the first picture.
+        seed: Seed of the noise of a broken camera.
+        barcode: Whether the first rows of a picture show its capture time.
 
     Attributes:
-        fault: How it is broken.
-        next_ns: When the next picture is due.
-        newest_ns: When the newest picture was taken that is in the pipe, or was.
+        fault: Fault of the camera; "" for none.
+        next_ns: Time of the next picture.
+        newest_ns: Capture time of the newest picture that was written; None before.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class FrontCameraPipe:
         self.newest_ns: int | None = None
 
     def take(self, world: World, now_ns: int) -> None:
-        """Take the picture that is due; one that comes too late for its turn is left out."""
+        """Take the picture that is due, and skip those whose time has passed."""
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self._start_ns + round(self._taken * self._period_ns)
@@ -100,7 +101,7 @@ class FrontCameraPipe:
             self._write(jpeg, now_ns)
 
     def draw(self, world: World, now_ns: int) -> bytes:
-        """The picture of now as JPEG, with its time in a comment and, if wanted, in a barcode."""
+        """Return the current picture as JPEG, with its time in a comment and maybe a barcode."""
         picture = np.ascontiguousarray(world.picture())
         if self._barcode:
             draw_barcode(picture, now_ns)
@@ -114,12 +115,12 @@ class FrontCameraPipe:
             self._fd = None
 
     def find_reader(self) -> bool:
-        """Open the pipe if somebody reads it; who opens it to read waits for that."""
+        """Open the pipe if it has a reader, which waits for that; return whether it is open."""
         if self._fd is None:
             try:
                 self._fd = os.open(self._path, os.O_WRONLY | os.O_NONBLOCK)
             except OSError as error:
-                if error.errno == errno.ENXIO:  # Nobody reads.
+                if error.errno == errno.ENXIO:  # No reader.
                     return False
                 raise
             fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
@@ -127,7 +128,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Whether somebody wants a picture."""
+        """Return whether the reader wants a picture."""
         if not self.find_reader():
             return False
         if self._rest:
@@ -135,20 +136,20 @@ class FrontCameraPipe:
         return not self._rest and not (self._latest_only and self._unread())
 
     def _unread(self) -> int:
-        """Bytes in the pipe."""
+        """Return the number of bytes in the pipe."""
         if self._fd is None:
             return 0
         waiting = fcntl.ioctl(self._fd, _FIONREAD, b"\0\0\0\0")
         return int.from_bytes(waiting, "little")
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
-        """Write what fits; the rest of a picture comes first the next time."""
+        """Write what fits; the rest of a picture is written first the next time."""
         if self._fd is None:
             return
         try:
             written = os.write(self._fd, data)
         except BlockingIOError:
-            return  # A picture of which nothing fits is dropped, a rest waits on.
+            return  # A picture that does not fit at all is dropped; a rest keeps waiting.
         except BrokenPipeError:
             os.close(self._fd)
             self._fd = None

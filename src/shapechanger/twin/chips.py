@@ -1,30 +1,63 @@
-"""Chips on the board's I2C buses, register by register."""
+"""Chips on the board's I2C buses, register by register.
+
+Each class names the data sheet from which its registers and numbers come.
+"""
 
 from __future__ import annotations
 
 import errno
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Literal, Protocol, get_args
+from functools import partial
+from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.errors import UnknownName
+from shapechanger.robot.drivers.settings import texts, whole, wholes
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.signals import Pulse
-from shapechanger.worlds.world import Readings
+from shapechanger.worlds.world import Readings, World
 
 __all__ = [
-    "Behind",
+    "ChannelsBehind",
     "Chip",
+    "JointWorld",
     "Magnet",
     "SimulatedAs5600",
     "SimulatedIna219",
     "SimulatedMpu6050",
     "SimulatedPca9685",
     "Tca9548a",
+    "chips_of",
 ]
 
 
+class Chip(Protocol):
+    """A chip at one address of an I2C bus."""
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read bytes, starting at a register."""
+        ...
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, starting at a register."""
+        ...
+
+
+@runtime_checkable
+class JointWorld(Protocol):
+    """A world with joints that encoders measure."""
+
+    def measured_angle(self, joint: str) -> float:
+        """Return one reading of a joint's angle, rad, with the noise of its encoder.
+
+        Raises:
+            RobotError: If there is no such joint.
+        """
+        ...
+
+
 Magnet = Literal["", "gone", "weak", "strong"]
-"""How the magnet is; "" for one that is well."""
+"""State of the magnet: in order (""), missing, too weak or too strong."""
 
 _STATUS: Final = 0x0B
 _RAW_ANGLE: Final = 0x0C
@@ -35,11 +68,13 @@ _COUNTS_PER_TURN: Final = 4096
 
 
 class SimulatedAs5600:
-    """Registers that are answered from the angle of a joint.
+    """AS5600: magnetic encoder of a joint.
+
+    Source: ams, AS5600 data sheet v1-06, 2018-06-20, figures 21 to 23 and "I2C Modes".
 
     Args:
-        joint: Name of the joint that the magnet turns with.
-        angle: The angle as it is measured now, rad.
+        joint: Name of the joint on which the magnet sits.
+        angle: Reads the measured angle, rad.
         zero: Counts at the angle 0.
         direction: 1 if the counts rise with the angle, -1 if they fall.
 
@@ -54,20 +89,22 @@ class SimulatedAs5600:
         self._direction = direction
         self._magnet: Magnet = ""
 
-    def set_magnet(self, how: Magnet) -> None:
-        """Let something happen to the magnet; "" makes it well.
+    def set_magnet(self, state: Magnet | str) -> None:
+        """Set the state of the magnet.
 
         Raises:
-            UnknownName: If that cannot happen to it.
+            UnknownName: If there is no such state.
         """
-        if how not in get_args(Magnet):  # It may have come from another process.
-            raise UnknownName("fault of a magnet", str(how), get_args(Magnet))
-        self._magnet = how
+        for known in get_args(Magnet):
+            if state == known:
+                self._magnet = known
+                return
+        raise UnknownName("fault of a magnet", state, get_args(Magnet))
 
     def read(self, register: int, length: int) -> list[int]:
-        """Bytes, from a register on.
+        """Read bytes, starting at a register.
 
-        Behind the low byte of an angle comes its high byte again, where reading began there.
+        A read that starts at an angle repeats its two bytes.
         """
         counts = self._counts()
         if register in (_RAW_ANGLE, _ANGLE):
@@ -75,7 +112,7 @@ class SimulatedAs5600:
         return [self._byte(register + i & 0xFF, counts) for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Nothing: what can be set is not simulated, and nobody sets it."""
+        """Do nothing: the settings are not simulated, and no driver writes them."""
 
     def _counts(self) -> int:
         if self._magnet == "gone":
@@ -91,18 +128,6 @@ class SimulatedAs5600:
         if register in (_RAW_ANGLE + 1, _ANGLE + 1):
             return counts & 0xFF
         return 0
-
-
-class Chip(Protocol):
-    """A chip at one address of an I2C bus."""
-
-    def read(self, register: int, length: int) -> list[int]:
-        """Bytes, from a register on."""
-        ...
-
-    def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, from a register on."""
-        ...
 
 
 _CONFIGURATION: Final = 0
@@ -121,10 +146,12 @@ _CONVERSION_READY: Final = 0x2
 
 
 class SimulatedIna219:
-    """Registers of 16 bits that are answered from the world.
+    """INA219: voltage and current of the battery, in registers of 16 bits.
+
+    Source: Texas Instruments, INA219 data sheet SBOS448G, section 8.6.
 
     Args:
-        readings: What the world shows now.
+        readings: Reads the state of the world.
     """
 
     def __init__(self, readings: Callable[[], Readings]) -> None:
@@ -133,14 +160,14 @@ class SimulatedIna219:
         self._calibration = 0
 
     def read(self, register: int, length: int) -> list[int]:
-        """Bytes of one register; it does not count on."""
+        """Read one register; its two bytes repeat."""
         word = self._word(register).to_bytes(2, "big")
         return [word[i % 2] for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write a register of 16 bits."""
+        """Write one register; the chip accepts only whole ones."""
         if len(data) != 2:
-            return  # The chip takes a register only as a whole.
+            return
         word = data[0] << 8 | data[1]
         if register == _CONFIGURATION:
             self._configuration = _AT_POWER_ON if word & _RESET else word
@@ -185,10 +212,12 @@ _ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
 
 
 class SimulatedMpu6050:
-    """Registers that are answered from the world.
+    """MPU-6050: acceleration and rate of turn, with x ahead, y to the left and z up.
+
+    Source: InvenSense, MPU-6000 and MPU-6050 register map and descriptions, rev. 4.2, 2013.
 
     Args:
-        readings: What the world shows now.
+        readings: Reads the state of the world.
     """
 
     def __init__(self, readings: Callable[[], Readings]) -> None:
@@ -197,13 +226,13 @@ class SimulatedMpu6050:
         self._wake_up()
 
     def read(self, register: int, length: int) -> list[int]:
-        """Bytes, from a register on."""
+        """Read bytes, starting at a register."""
         if register <= _GYRO_ZOUT_L and register + length > _ACCEL_XOUT_H:
             self._measure()
         return [self._registers[(register + i) % 128] for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, from a register on."""
+        """Write bytes, starting at a register."""
         for i, byte in enumerate(data):
             at = (register + i) % 128
             if at == _PWR_MGMT_1 and byte & _MPU6050_RESET:
@@ -240,7 +269,7 @@ def _word(value: float) -> bytes:
 
 
 _OSCILLATOR_HZ: Final = 25e6  # Section 7.3.5.
-_COUNTS: Final = 4096  # Section 7.3.3: a period has so many.
+_COUNTS: Final = 4096  # Per period, section 7.3.3.
 _CHANNELS: Final = 16
 
 _MODE1: Final = 0x00
@@ -249,7 +278,7 @@ _LAST_LED: Final = 0x45
 _FIRST_ALL_LED: Final = 0xFA
 _LAST_ALL_LED: Final = 0xFD
 _PRESCALE: Final = 0xFE
-_LEAST_PRESCALE: Final = 3
+_MIN_PRESCALE: Final = 3
 
 _RESTART: Final = 0x80
 _AUTO_INCREMENT: Final = 0x20
@@ -258,11 +287,14 @@ _FULL: Final = 0x10  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
 
 
 class SimulatedPca9685:
-    """Registers, and what they make of the channels."""
+    """PCA9685: 16 PWM channels, which continue when the process that set them has ended.
+
+    Source: NXP, PCA9685 product data sheet, rev. 4, 16 April 2015; comments name its sections.
+    """
 
     def __init__(self) -> None:
         self._registers = bytearray(256)
-        # Section 7.3, table 4: as the chip wakes up. It sleeps and all channels are fully off.
+        # Section 7.3, table 4: after power-on it sleeps, with all channels fully off.
         self._registers[_MODE1] = 0x11
         self._registers[0x01] = 0x04
         self._registers[0x02:0x06] = bytes((0xE2, 0xE4, 0xE8, 0xE0))
@@ -273,7 +305,7 @@ class SimulatedPca9685:
 
     @property
     def channels(self) -> list[Pulse]:
-        """The pulses of all channels; 0 us for a channel that is off."""
+        """Pulses of all channels; 0 us for a channel that is off."""
         period_s = _COUNTS * (self._registers[_PRESCALE] + 1) / _OSCILLATOR_HZ
         hz = 1.0 / period_s
         return [
@@ -282,12 +314,12 @@ class SimulatedPca9685:
         ]
 
     def read(self, register: int, length: int) -> list[int]:
-        """Bytes, from a register on; the same one again and again without auto-increment."""
+        """Read bytes, starting at a register; without auto-increment all of that register."""
         return [self._registers[at] for at in self._addressed(register, length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, from a register on."""
-        # Whether it counts on is what MODE1 said when the transfer began.
+        """Write bytes, starting at a register."""
+        # Auto-increment is as MODE1 had it when the transfer began.
         for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
             self._write_byte(at, byte)
 
@@ -301,7 +333,7 @@ class SimulatedPca9685:
             self._write_mode1(byte)
         elif at == _PRESCALE:
             if self._registers[_MODE1] & _PCA9685_SLEEP:  # Section 7.3.5: only while it sleeps.
-                self._registers[at] = max(byte, _LEAST_PRESCALE)
+                self._registers[at] = max(byte, _MIN_PRESCALE)
         elif _FIRST_ALL_LED <= at <= _LAST_ALL_LED:
             for channel in range(_CHANNELS):
                 self._registers[_FIRST_LED + 4 * channel + at - _FIRST_ALL_LED] = byte
@@ -324,7 +356,7 @@ class SimulatedPca9685:
         self._registers[_MODE1] = after
 
     def _counts(self, channel: int) -> int:
-        """For how many of the counts of a period a channel is on."""
+        """Return for how many counts of a period a channel is on."""
         if self._registers[_MODE1] & _PCA9685_SLEEP or channel in self._halted:
             return 0
         at = _FIRST_LED + 4 * channel
@@ -339,10 +371,12 @@ class SimulatedPca9685:
 
 
 class Tca9548a:
-    """A control register of one byte, whose bits open channels; none is open at power-on.
+    """TCA9548A: multiplexer of one I2C bus to eight; all are closed at power-on.
+
+    Source: Texas Instruments, TCA9548A data sheet SCPS207F, section 8.5.4.
 
     Args:
-        channels: What is behind each channel, from 0 to 7; all chips have one address there.
+        channels: Chip behind each channel, 0 to 7; all chips have the same address.
     """
 
     def __init__(self, channels: Mapping[int, Chip]) -> None:
@@ -351,21 +385,21 @@ class Tca9548a:
 
     @property
     def open(self) -> list[Chip]:
-        """The chips that hear what is said now."""
+        """Chips behind the open channels."""
         return [chip for channel, chip in self.channels.items() if self._control >> channel & 1]
 
     def read(self, register: int, length: int) -> list[int]:
-        """The control register again and again; to ask for a register is to write it."""
+        """Read the control register; sending the register byte writes it first."""
         self._control = register
         return [self._control] * length
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """The last byte counts, and the one that other chips take for a register is the first."""
+        """Write the control register; of all bytes, the register byte included, the last counts."""
         self._control = (register, *data)[-1]
 
 
-class Behind:
-    """What answers behind a multiplexer at the address of its chips.
+class ChannelsBehind:
+    """The chips behind a multiplexer, at their common address.
 
     Args:
         mux: The multiplexer.
@@ -375,26 +409,79 @@ class Behind:
         self._mux = mux
 
     def read(self, register: int, length: int) -> list[int]:
-        """Bytes of all chips that hear it: where one pulls the line low, it is low.
+        """Read all chips behind open channels: a bit that one of them pulls low is low.
 
         Raises:
-            OSError: If no chip hears it, with the number that the kernel's driver gives.
+            OSError: If no channel is open, with the `errno` of the kernel's driver.
         """
-        said = [0xFF] * length
-        for chip in self._heard():
-            said = [a & b for a, b in zip(said, chip.read(register, length), strict=True)]
-        return said
+        data = [0xFF] * length
+        for chip in self._open_chips():
+            data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
+        return data
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes to all chips that hear it.
+        """Write to all chips behind open channels.
 
         Raises:
-            OSError: If no chip hears it.
+            OSError: If no channel is open.
         """
-        for chip in self._heard():
+        for chip in self._open_chips():
             chip.write(register, data)
 
-    def _heard(self) -> list[Chip]:
-        if not (heard := self._mux.open):
+    def _open_chips(self) -> list[Chip]:
+        if not (chips := self._mux.open):
             raise OSError(errno.EREMOTEIO, "no chip answers")
-        return heard
+        return chips
+
+
+_AS5600: Final = 0x36
+
+
+def _joint_chips(plan: SensorPlan, world: World) -> dict[tuple[int, int], Chip]:
+    """Return a multiplexer and the encoders behind it, by bus and address.
+
+    Args:
+        plan: Encoders of joints.
+        world: World with these joints; in a world without joints all stand at zero.
+
+    Raises:
+        RobotError: If the world has other joints.
+    """
+    measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
+    columns = (wholes(plan.settings, key) for key in ("channels", "zeros", "directions"))
+    behind: dict[int, Chip] = {}
+    for joint, *row in zip(texts(plan.settings, "joints"), *columns, strict=True):
+        measured(joint)  # Raises for an unknown joint.
+        channel, zero, direction = row
+        behind[channel] = SimulatedAs5600(joint, partial(measured, joint), zero, direction)
+    bus, mux = whole(plan.settings, "bus"), Tca9548a(behind)
+    return {(bus, whole(plan.settings, "mux")): mux, (bus, _AS5600): ChannelsBehind(mux)}
+
+
+def _at_zero(joint: str) -> float:
+    return 0.0
+
+
+def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
+    """Return the chips of a robot, by bus and address.
+
+    Raises:
+        RobotError: If the world has other joints than the robot.
+    """
+    readings = world.inputs
+    chips: dict[tuple[int, int], Chip] = {}
+    for output in plan.outputs:
+        if output.settings.get("over") == "pca9685":
+            at = whole(output.settings, "bus"), whole(output.settings, "address")
+            chips.setdefault(at, SimulatedPca9685())
+    for sensor in plan.sensors:
+        if sensor.driver in ("mpu6050", "ina219"):
+            at = whole(sensor.settings, "bus"), whole(sensor.settings, "address")
+            chips[at] = (
+                SimulatedMpu6050(readings)
+                if sensor.driver == "mpu6050"
+                else SimulatedIna219(readings)
+            )
+        elif sensor.driver == "as5600":
+            chips |= _joint_chips(sensor, world)
+    return chips

@@ -1,8 +1,8 @@
-"""A whole robot on a twin in this process: its guard, its drivers, its pins and its world.
+"""A whole robot in this process: guard, drivers, pins and world.
 
-What a served robot does in a guard, a daemon and a board is done here by the same code in one call:
-`step` hands a command to the guard and lets one control period go by. There is no link, no lease
-and no deadline to miss; time moves only in steps, as with `--clock twin`.
+The guard and the drivers are those of a served robot. `step` gives the guard one command and
+advances one control period. There is no link, no control lease and no deadline to miss; time
+advances only in steps, as with `--clock twin`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Final, Literal
 
 import numpy as np
 import simplejpeg
@@ -25,27 +25,26 @@ from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin import messages as wire
-from shapechanger.twin.hardware import TwinBus, TwinServoPins
-from shapechanger.twin.messages import EdgeListener
-from shapechanger.twin.pin_board import Owner, PinBoard, chips_of
-from shapechanger.twin.rig import Rig
+from shapechanger.twin.chips import chips_of
+from shapechanger.twin.hardware import TwinHardware
+from shapechanger.twin.pin_board import Owner, PinBoard
 from shapechanger.twin.sensors import Surroundings
-from shapechanger.twin.servos.bus import LinePort
+from shapechanger.twin.server import START_NS
+from shapechanger.twin.servos.port import ServoPort
+from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import NoLedger
-from shapechanger.twin.timekeeper import START_NS
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
-__all__ = ["InProcessRobot", "LocalBoard", "LocalClock", "LocalHardware", "LocalLink"]
+__all__ = ["InProcessRobot", "LocalBoard", "LocalClock", "LocalPins"]
 
 
-class LocalLink:
-    """The only process at a board, which is this one; see `BoardLink`.
+class LocalPins:
+    """The pins of a board in this process, which is the only one to use them; see `BoardPins`.
 
     Args:
-        pins: The board's pins and chips.
-        input_levels: Levels of the pins that sensors drive, as they are now.
+        pins: Pins and chips of the board.
+        input_levels: Levels of the pins that sensors drive, kept up to date by the sensors.
     """
 
     def __init__(self, pins: PinBoard, input_levels: dict[int, int]) -> None:
@@ -53,127 +52,81 @@ class LocalLink:
         self._input_levels = input_levels
         self._owner = Owner(self, os.getpid())
         self.levels: dict[int, int] = {}
-        self.on_edge: EdgeListener | None = None
+        self.on_edge: Callable[[int, int, int], None] | None = None
         self.closed = False
 
-    def post(self, **message: Any) -> None:
-        """Change an output."""
-        pin, t = message["pin"], message["t"]
-        if message["op"] == "pin":
-            self._pins.drive(self._owner, pin, message["duty"], message["hz"], t)
-        else:
-            self._pins.pulse(self._owner, pin, message["us"], message["hz"], t)
+    def claim(
+        self, pin: int, mode: Literal["input", "output"], pull: str, level: int, t: int
+    ) -> int:
+        """Claim a pin; see `BoardPins.claim`."""
+        found = self._pins.claim(self._owner, pin, mode, pull, level, t)
+        if mode == "input":
+            found = self._input_levels.get(pin, found)
+        self.levels[pin] = found
+        return found
 
-    def ask(self, **message: Any) -> wire.Message:
-        """Claim a pin, or read and write the registers of a chip."""
-        if message["op"] == "claim":
-            return {"level": self._claim(message)}
-        at = message["bus"], message["address"], message["register"]
-        if message["op"] == "read":
-            return {"data": self._pins.read_chip(*at, message["length"])}
-        self._pins.write_chip(self._owner.pid, *at, message["data"], message["t"])
-        return {}
+    def drive(self, pin: int, duty: float, hz: int, t: int) -> None:
+        """Set an output; see `BoardPins.drive`."""
+        self._pins.drive(self._owner, pin, duty, hz, t)
+
+    def pulse(self, pin: int, us: int, hz: int, t: int) -> None:
+        """Send servo pulses; see `BoardPins.pulse`."""
+        self._pins.pulse(self._owner, pin, us, hz, t)
+
+    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
+        """Read registers; see `BoardPins.read_chip`."""
+        return self._pins.read_chip(bus, address, register, length)
+
+    def write_chip(self, bus: int, address: int, register: int, data: list[int], t: int) -> None:
+        """Write registers; see `BoardPins.write_chip`."""
+        self._pins.write_chip(self._owner.pid, bus, address, register, data, t)
 
     def drain(self) -> None:
-        """Do nothing: edges come by `notice`."""
+        """Do nothing: edges arrive by `report_edge`."""
 
-    def notice(self, pin: int, level: int, at_ns: int) -> None:
-        """An input has changed."""
+    def report_edge(self, pin: int, level: int, at_ns: int) -> None:
+        """Take the change of an input, if it is claimed."""
         if pin in self.levels:
             self.levels[pin] = level
             if self.on_edge is not None:
                 self.on_edge(pin, level, at_ns)
 
-    def _claim(self, message: wire.Message) -> int:
-        pin, mode = message["pin"], message["mode"]
-        level = self._pins.claim(
-            self._owner, pin, mode, message["pull"], message["level"], message["t"]
-        )
-        return self._input_levels.get(pin, level) if mode == "input" else level
+    def close(self) -> None:
+        """Use the pins no more."""
+        self.closed = True
 
 
 class LocalClock:
-    """The board's time."""
+    """The time of a board in this process, which only `LocalBoard.advance` moves."""
 
     def __init__(self) -> None:
         self.time_ns = START_NS
 
     def now_ns(self) -> int:
-        """The time in nanoseconds."""
+        """Return the time in nanoseconds."""
         return self.time_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Nobody can wait here: whoever advances the board would have to wait, too."""
-        raise RobotError("The time of a board in one's own process moves only by `advance`.")
+        """Refuse: the caller is the one who would have to advance the board."""
+        raise RobotError("The time of a board in this process advances only by `advance`.")
 
     async def sleep(self, seconds: float) -> int | None:
-        """Nobody can wait here; see `wait`."""
-        raise RobotError("The time of a board in one's own process moves only by `advance`.")
-
-
-class LocalHardware:
-    """Pins, buses and time of a board in this process; see `shapechanger.robot.hardware`."""
-
-    def __init__(self, link: LocalLink, clock: LocalClock, rig: Rig | None = None) -> None:
-        self._link = link
-        self._clock = clock
-        self._rig = rig
-        self._pin_factory: Any = None
-
-    @property
-    def clock(self) -> LocalClock:
-        """The board's time."""
-        return self._clock
-
-    def pin_factory(self) -> Any:
-        """What gpiozero's devices take as `pin_factory`."""
-        if self._pin_factory is None:
-            from shapechanger.twin.hardware import (
-                TwinPinFactory,  # gpiozero only where there are pins.
-            )
-
-            self._pin_factory = TwinPinFactory(self._link, self._clock)
-        return self._pin_factory
-
-    def i2c(self, bus: int) -> TwinBus:
-        """An I2C bus by its number."""
-        return TwinBus(self._link, self._clock, bus)
-
-    def servo_pins(self) -> TwinServoPins:
-        """Pins that send servo pulses."""
-        return TwinServoPins(self._link, self._clock)
-
-    def servo_port(self, settings: BusSettings) -> LinePort:
-        """The port of the servos.
-
-        Raises:
-            RobotError: If the board has none there.
-        """
-        if self._rig is None:
-            raise RobotError(f"There is no {settings.device} at this twin.")
-        self._rig.require(settings.device)
-        return LinePort(self._rig.line, settings.baud)
-
-    def close(self) -> None:
-        """Let go of the pins."""
-        if self._pin_factory is not None:
-            self._pin_factory.close()
-            self._pin_factory = None
-        self._link.closed = True
+        """Refuse; see `wait`."""
+        raise RobotError("The time of a board in this process advances only by `advance`.")
 
 
 class LocalBoard:
-    """A board with a world around it.
+    """A board with its world in this process.
 
     Args:
-        wiring: What is attached to its pins.
-        world: Where the vehicle is.
-        seed: Of the phase of software PWM.
+        wiring: What is attached to the pins.
+        world: World of the vehicle.
+        seed: Seed of the phase of software PWM.
 
     Attributes:
-        pins: Its pins and chips.
-        hardware: What a guard in this process drives.
-        rig: The servos on a bus; None without any.
+        pins: Pins and chips.
+        hardware: Hardware for a guard in this process.
+        rig: Servos on a bus; None without any.
     """
 
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
@@ -182,31 +135,44 @@ class LocalBoard:
         sensors = self._surroundings.sensors
         self.pins = PinBoard(wiring, chips_of(wiring.plan, world), NoLedger(), seed)
         self.pins.on_output = sensors.output_changed
-        self._link = LocalLink(self.pins, sensors.levels)
+        self._local_pins = LocalPins(self.pins, sensors.levels)
         self.rig = self._surroundings.rig
-        self.hardware = LocalHardware(self._link, self._clock, self.rig)
+        self.hardware = TwinHardware(self._local_pins, self._clock, self._open_servo_port)
 
     @property
     def now_ns(self) -> int:
-        """The time."""
+        """Time in nanoseconds."""
         return self._clock.time_ns
 
     def advance(self, now_ns: int) -> None:
-        """Let time, the world and the sensors go on."""
+        """Advance time, the world and the sensors."""
         self._clock.time_ns = now_ns
         for edge in self._surroundings.advance(now_ns, self.pins.levels):
-            self._link.notice(edge.pin, edge.level, edge.t)
+            self._local_pins.report_edge(edge.pin, edge.level, edge.t)
+
+    def _open_servo_port(self, settings: BusSettings) -> ServoPort:
+        if self.rig is None:
+            raise RobotError(f"There is no {settings.device} at this twin.")
+        self.rig.require(settings.device)
+        bus = self.rig.bus
+
+        def exchange(data: bytes) -> bytes:
+            if data:
+                bus.receive(data)
+            return bus.send()
+
+        return ServoPort(exchange, settings.baud)
 
 
 _log = logging.getLogger(__name__)
 
 _SESSION: Final = 1
-# Steps that the guard may take to arm, once all controllers listen.
-_MOST_TRIES: Final = 10
+# Ticks in which the guard must arm, once all speed controllers listen.
+_MAX_ARM_TICKS: Final = 10
 
 
 class _Orders:
-    """Orders from this process, and the newest state; see `Channel`."""
+    """Orders of this process and the newest state of the guard; see `Channel`."""
 
     def __init__(self) -> None:
         self.lost = False
@@ -215,11 +181,11 @@ class _Orders:
         self.refused = ""
 
     def filenos(self) -> list[int]:
-        """There are none, and nobody waits for them."""
+        """Return no descriptors: there is nothing to wait for."""
         return []
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """All orders that were given since the last call."""
+        """Return the orders given since the last call."""
         orders, self.waiting = self.waiting, []
         return orders, []
 
@@ -231,20 +197,20 @@ class _Orders:
 
 
 class InProcessRobot:
-    """A robot in a world, ready to be stepped.
+    """A robot in a world, advanced step by step.
 
     Args:
-        profile: The robot. Its camera's driver is not used: pictures come from the world.
-        world: Where it is.
+        profile: The robot. Pictures come from the world, not from its camera's driver.
+        world: World of the robot.
         pictures: Whether observations have pictures.
-        seed: Of the phase of software PWM.
-        wired_as: What is really attached to its pins; None for what the profile says.
+        seed: Seed of the phase of software PWM.
+        wired_as: The robot as it is really wired; None for the plan of the profile.
 
     Attributes:
-        welcome: What the robot is, as it would tell a client.
+        welcome: Description of the robot, as a daemon sends it to a client.
 
     Raises:
-        RobotError: If the world's vehicle cannot be wired as the profile says.
+        RobotError: If the world does not fit the profile.
     """
 
     def __init__(
@@ -283,43 +249,47 @@ class InProcessRobot:
             session=_SESSION,
         )
         self._guard: Guard | None = None
-        self._pictured = 0  # It counts through all starts: each picture is told from any before.
+        self._pictured = (
+            0  # Counts through all starts, so that every picture has a number of its own.
+        )
         self._start()
 
     @property
     def now_ns(self) -> int:
-        """The robot's time."""
+        """Time of the robot in nanoseconds."""
         return self._board.now_ns
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
-        """Switch the robot off and on again, arm it, and put it at a start.
+        """Restart the robot, arm it, and place it at a start.
 
         Args:
-            place: Puts the vehicle there, before and after it is armed; None to leave it.
+            place: Places the vehicle, before and after it is armed; None to leave it.
 
         Returns:
-            What it sees there.
+            First observation there.
 
         Raises:
-            RobotError: If it does not arm, and why.
+            RobotError: If the robot does not arm.
         """
         if place is not None:
-            place()  # So that a vehicle which drove does not roll on while it is switched on.
+            place()  # So that a moving vehicle does not roll on while the robot starts.
         self._start()
         self._arm()
         if place is not None:
             place()
-            self._advance(self._period_ns)  # As a served robot, which says nothing sooner.
+            self._advance(
+                self._period_ns
+            )  # A served robot sends its first observation after one period, too.
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
         """Act for one control period.
 
         Args:
-            values: One number for each action.
+            values: One value for each action.
 
         Returns:
-            What the robot senses at the end of it, and whether it bumped into something meanwhile.
+            The observation at the end of the period, and whether the robot bumped into something.
         """
         bumps = self._state.bumps
         self._command_ns = self._board.now_ns
@@ -339,13 +309,13 @@ class InProcessRobot:
         return self._observe(), self._state.bumps > bumps
 
     def arm(self) -> None:
-        """Arm the robot, as a person does who has looked after what stopped it.
+        """Arm the robot, as a person does after a stop.
 
         Raises:
-            RobotError: If it does not arm, and why.
+            RobotError: If the robot does not arm.
         """
-        self._orders.refused = refused = ""  # What was refused before says nothing of this.
-        for _ in range(_MOST_TRIES):
+        self._orders.refused = refused = ""  # An earlier refusal is about something else.
+        for _ in range(_MAX_ARM_TICKS):
             now_ns = self._board.now_ns
             self._orders.waiting.append(Order(kind="arm", issued_ns=now_ns, person=True))
             self._advance(self._tick_ns)
@@ -356,22 +326,22 @@ class InProcessRobot:
 
     @property
     def rig(self) -> Rig | None:
-        """The servos on a bus since the last start; None without any."""
+        """Servos on a bus, since the last start; None without any."""
         return self._board.rig
 
     @property
     def pins(self) -> PinBoard:
-        """The pins and chips since the last start."""
+        """Pins and chips, since the last start."""
         return self._board.pins
 
     @property
     def refused(self) -> str:
-        """Why the guard refused the newest command, in words; empty when it did not."""
+        """Reason for which the guard refused the newest command; empty if it did not."""
         refused, self._orders.refused = self._orders.refused, ""
         return refused
 
     def close(self) -> None:
-        """Put the outputs to rest and let go of the pins."""
+        """Bring the outputs to rest and let go of the pins."""
         if self._guard is not None:
             self._guard.close()
             self._board.hardware.close()
@@ -380,7 +350,7 @@ class InProcessRobot:
     @property
     def _state(self) -> GuardState:
         if self._orders.state is None:
-            raise RobotError("The guard has said nothing yet.")
+            raise RobotError("The guard has sent no state yet.")
         return self._orders.state
 
     def _start(self) -> None:
@@ -394,10 +364,10 @@ class InProcessRobot:
         self._advance(self._period_ns)
 
     def _advance(self, ns: int) -> None:
-        """Let time go by, with a round of the guard at each of its ticks."""
+        """Advance time, with a round of the guard at each of its ticks."""
         guard, board = self._guard, self._board
         if guard is None:
-            raise RobotError("The robot was closed.")
+            raise RobotError("This robot is closed.")
         end_ns = board.now_ns + ns
         while board.now_ns < end_ns:
             now_ns = min(board.now_ns + self._tick_ns, end_ns)
@@ -405,7 +375,7 @@ class InProcessRobot:
             guard.round(now_ns)
 
     def _arm(self) -> None:
-        """Arm the robot, once its speed controllers have seen neutral for as long as they want."""
+        """Arm the robot, once its speed controllers have seen neutral for long enough."""
         settings = (output.settings for output in self._plan.outputs)
         patience_s = max((number(one, "arm_s") for one in settings if "arm_s" in one), default=0.0)
         self._advance(round(patience_s * 1e9))

@@ -1,97 +1,353 @@
-"""What the twin's board and its clients say to each other: one JSON object a datagram.
+"""Messages between a board and its clients, one MessagePack object per datagram.
 
-The socket is a Unix one of the kind `SOCK_SEQPACKET`, which keeps messages apart and in order. `op`
-says what a message is; times are nanoseconds of the run's clock.
-
-What a client says (with `id` where it waits for an answer):
-
-```
-hello   role, pid             "hardware", "clock" or "operator"; answered by clock, t
-claim   id, pin, mode, pull, t   a pin as "input" or "output"; answered by level, or error: busy
-pin     pin, duty, hz, t      level (hz 0) or software PWM of an output
-pulse   pin, us, hz, t        servo pulses; 0 us for none; the pin is claimed with the first
-read    id, bus, address, register, length       answered by data, or errno
-write   id, bus, address, register, data, t      answered by nothing more, or errno
-servo   id, device, data      bytes for the servo bus, hex; answered by data that came from it
-wait    until                 done with what was granted; grant the next time
-sleep   id, ns                let time go by; answered by t, captured_ns
-bye                           a client that leaves on purpose
-```
-
-What an operator says besides, see `Operator`: `place`, `camera`, `press`, `battery`, `distance`,
-`chip`, `servo_fault`, `magnet`, `tensions`, `levels` and `where`. It is answered after everything
-that was said before.
-
-What the board says:
-
-```
-reply   id, ...               the answer
-inputs  edges                 [[pin, level, t], ...] of the inputs that were claimed
-grant   t                     it is this time now: work, then wait
-```
+They travel over a Unix socket of type `SOCK_SEQPACKET`, which keeps datagrams separate and in
+order. Times are nanoseconds of the run's clock. A request with an `id` is answered by one
+`BoardReply`; a request without is only reported in the board's log if it fails. Requests of an
+operator are answered after every request that a robot's process sent before them.
 """
 
 from __future__ import annotations
 
-import json
-from typing import Any, Final, Protocol
+from typing import Final, Literal, NamedTuple
 
-__all__ = ["MAX_MESSAGE", "MOST_EDGES", "BoardLink", "EdgeListener", "Message", "decode", "encode"]
+import msgspec
+
+__all__ = [
+    "MAX_EDGES",
+    "MAX_MESSAGE",
+    "BoardEvent",
+    "BoardGreeting",
+    "BoardReply",
+    "BreakCamera",
+    "BreakChip",
+    "BreakMagnet",
+    "BreakServo",
+    "ClaimPin",
+    "ConnectClient",
+    "DrivePin",
+    "Edge",
+    "ExchangeServoBytes",
+    "GrantTime",
+    "InputEdges",
+    "LayOutCourse",
+    "LeaveBoard",
+    "PlaceVehicle",
+    "PressButton",
+    "PulsePin",
+    "PutVehicleBack",
+    "ReadChip",
+    "ReadLevels",
+    "ReadTensions",
+    "ReadWhereabouts",
+    "Request",
+    "Role",
+    "SetBattery",
+    "SetDistance",
+    "SleepOnBoard",
+    "SleepResult",
+    "WaitForGrant",
+    "Whereabouts",
+    "WriteChip",
+    "decode_event",
+    "decode_request",
+    "encode",
+]
 
 MAX_MESSAGE: Final = 64 * 1024
-"""Bytes of the largest message."""
+"""Size of the largest message in bytes."""
 
-MOST_EDGES: Final = 500
-"""How many edges one message holds, so that it stays below `MAX_MESSAGE`."""
+MAX_EDGES: Final = 500
+"""Most edges in one message, so that it stays below `MAX_MESSAGE`."""
 
-Message = dict[str, Any]
-
-_ENCODER: Final = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
-_DECODER: Final = json.JSONDecoder()
+Role = Literal["hardware", "operator", "clock"]
+"""A robot's process, a person beside the robot, or a connection that only sleeps."""
 
 
-def encode(message: Message) -> bytes:
-    """A message as bytes."""
-    return _ENCODER.encode(message).encode()
-
-
-def decode(data: bytes) -> Message:
-    """The message that was sent by `encode`."""
-    return _DECODER.decode(data.decode())
-
-
-class EdgeListener(Protocol):
-    """Is told of the edges of inputs."""
-
-    def __call__(self, pin: int, level: int, at_ns: int, /) -> None:
-        """A pin has changed to a level at a time."""
-        ...
-
-
-class BoardLink(Protocol):
-    """A way to the board: a socket to another process, or the board itself in this one.
+class Edge(NamedTuple):
+    """A change of an input pin.
 
     Attributes:
-        levels: Level of each pin that is claimed as an input.
-        on_edge: Whom to tell of edges.
+        t: Time of the change, ns.
+        pin: BCM number.
+        level: Level from then on, 0 or 1.
     """
 
-    levels: dict[int, int]
-    on_edge: EdgeListener | None
+    t: int
+    pin: int
+    level: int
 
-    @property
-    def closed(self) -> bool:
-        """Whether it was closed here."""
-        ...
 
-    def post(self, **message: Any) -> None:
-        """Say something that needs no answer."""
-        ...
+class Whereabouts(NamedTuple):
+    """True state of the vehicle.
 
-    def ask(self, **message: Any) -> Message:
-        """Say something and get the answer."""
-        ...
+    Attributes:
+        x: Position, m.
+        y: Position, m.
+        heading: Angle from the x axis, rad, counter-clockwise seen from above.
+        speed: Speed along the heading, m/s.
+        travelled_m: Distance rolled by the wheels, m; driving backward counts down.
+        bumped: Whether something presses the bumper.
+        distance_m: Free distance ahead of the nose, m.
+        truth: Quantities that no sensor measures, such as the progress along a course, by name.
+        t: Time, ns.
+    """
 
-    def drain(self) -> None:
-        """Take in everything that has arrived, without waiting."""
-        ...
+    x: float
+    y: float
+    heading: float
+    speed: float
+    travelled_m: float
+    bumped: bool
+    distance_m: float
+    truth: dict[str, float]
+    t: int
+
+
+class _Request(msgspec.Struct, tag_field="op", tag=True, kw_only=True, omit_defaults=True):
+    """A message to the board; `id` is set where the client waits for the reply."""
+
+    id: int | None = None
+
+
+class ConnectClient(_Request):
+    """First message of a client, answered by `BoardGreeting`."""
+
+    role: Role
+    pid: int
+
+
+class ClaimPin(_Request):
+    """Claim a pin, answered by its level; refused while another process holds it."""
+
+    pin: int
+    mode: Literal["input", "output"]
+    pull: str
+    level: int
+    t: int
+
+
+class DrivePin(_Request):
+    """Set the level of an output (`hz` 0), or the duty of its software PWM."""
+
+    pin: int
+    duty: float
+    hz: int
+    t: int
+
+
+class PulsePin(_Request):
+    """Send servo pulses on an output; a width of 0 us ends them."""
+
+    pin: int
+    us: int
+    hz: int
+    t: int
+
+
+class ReadChip(_Request):
+    """Read registers of an I2C chip, answered by their bytes."""
+
+    bus: int
+    address: int
+    register: int
+    length: int
+
+
+class WriteChip(_Request):
+    """Write registers of an I2C chip."""
+
+    bus: int
+    address: int
+    register: int
+    data: list[int]
+    t: int
+
+
+class ExchangeServoBytes(_Request):
+    """Send bytes to the servo bus, answered by the bytes that have arrived from it."""
+
+    device: str
+    data: bytes
+
+
+class WaitForGrant(_Request):
+    """Finish the current grant and wait for the next, due at `until_ns` at the latest."""
+
+    until_ns: int
+
+
+class SleepOnBoard(_Request):
+    """Let the twin's time advance, answered by `SleepResult` when it has."""
+
+    ns: int
+
+
+class LeaveBoard(_Request):
+    """Last message of a client that closes its connection in order."""
+
+
+class PlaceVehicle(_Request):
+    """Place the vehicle at the start that follows from a seed."""
+
+    seed: int
+
+
+class PutVehicleBack(_Request):
+    """Put a vehicle that has collided back on its lane."""
+
+
+class LayOutCourse(_Request):
+    """Replace the surroundings of the vehicle."""
+
+    seed: int
+
+
+class BreakCamera(_Request):
+    """Make the camera fail; "" repairs it."""
+
+    fault: str
+
+
+class PressButton(_Request):
+    """Press or release all bumpers ("bumper") or the stop button ("stop")."""
+
+    button: str
+    down: bool
+
+
+class SetBattery(_Request):
+    """Set the battery's voltage without load; None for a full one."""
+
+    volts: float | None
+
+
+class SetDistance(_Request):
+    """Override what distance sensors measure; None restores the truth, `dead` silences them."""
+
+    metres: float | None
+    dead: bool
+
+
+class BreakChip(_Request):
+    """Make an I2C chip stop answering, or answer again."""
+
+    bus: int
+    address: int
+    dead: bool
+
+
+class BreakServo(_Request):
+    """Make the servo of a tendon fail; "" repairs what can be repaired."""
+
+    tendon: str
+    fault: str
+
+
+class BreakMagnet(_Request):
+    """Change the magnet of a joint's encoder; "" repairs it."""
+
+    joint: str
+    fault: str
+
+
+class ReadTensions(_Request):
+    """Ask for the tension of each tendon, N, by name."""
+
+
+class ReadLevels(_Request):
+    """Ask for the state of all outputs, a `Levels`."""
+
+
+class ReadWhereabouts(_Request):
+    """Ask for the true state of the vehicle, a `Whereabouts`."""
+
+
+Request = (
+    ConnectClient
+    | ClaimPin
+    | DrivePin
+    | PulsePin
+    | ReadChip
+    | WriteChip
+    | ExchangeServoBytes
+    | WaitForGrant
+    | SleepOnBoard
+    | LeaveBoard
+    | PlaceVehicle
+    | PutVehicleBack
+    | LayOutCourse
+    | BreakCamera
+    | PressButton
+    | SetBattery
+    | SetDistance
+    | BreakChip
+    | BreakServo
+    | BreakMagnet
+    | ReadTensions
+    | ReadLevels
+    | ReadWhereabouts
+)
+
+
+class BoardGreeting(msgspec.Struct, frozen=True):
+    """Answer to `ConnectClient`: the kind of clock, and its time."""
+
+    clock: Literal["real", "twin"]
+    t: int
+
+
+class SleepResult(msgspec.Struct, frozen=True):
+    """Answer to `SleepOnBoard`: the time, and when the newest picture was taken, if any was."""
+
+    t: int
+    captured_ns: int | None
+
+
+class _Event(msgspec.Struct, tag_field="op", tag=True, omit_defaults=True, frozen=True):
+    """A message from the board."""
+
+
+class BoardReply(_Event, frozen=True):
+    """Answer to one request: an encoded result, an error message or an `errno`."""
+
+    id: int
+    result: msgspec.Raw = msgspec.Raw(b"\xc0")  # None.
+    error: str = ""
+    errno: int = 0
+
+
+class InputEdges(_Event, frozen=True):
+    """Edges of the inputs that the client has claimed, in order of time."""
+
+    edges: list[Edge]
+
+
+class GrantTime(_Event, frozen=True):
+    """Twin time until which the client may work; then it waits again."""
+
+    t: int
+
+
+BoardEvent = BoardReply | InputEdges | GrantTime
+
+encode = msgspec.msgpack.encode
+_REQUESTS: Final = msgspec.msgpack.Decoder(Request)
+_EVENTS: Final = msgspec.msgpack.Decoder(BoardEvent)
+
+
+def decode_request(data: bytes) -> Request:
+    """Decode a message to the board.
+
+    Raises:
+        msgspec.MsgspecError: If it is malformed.
+    """
+    return _REQUESTS.decode(data)
+
+
+def decode_event(data: bytes) -> BoardEvent:
+    """Decode a message from the board.
+
+    Raises:
+        msgspec.MsgspecError: If it is malformed.
+    """
+    return _EVENTS.decode(data)

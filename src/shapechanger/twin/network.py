@@ -1,4 +1,4 @@
-"""A bad network: a TCP proxy that delays, slices, holds back or tears what passes through it."""
+"""A bad network: a TCP proxy that delays, slices or blocks data, or resets connections."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import struct
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Self
 
 __all__ = ["BadNetwork"]
 
 _CHUNK: Final = 16 * 1024
-_MOST_HELD: Final = 1024 * 1024  # Bytes that one direction holds back before it stops reading.
-_LOOK_S: Final = 0.01
-# Linger for 0 s: the system then sends a reset in place of the orderly end.
+_MAX_QUEUED: Final = 1024 * 1024  # Bytes that one direction queues before it stops reading.
+_POLL_S: Final = 0.01
+# Linger for 0 s: closing then sends a reset instead of an orderly end.
 _RESET: Final = struct.pack("ii", 1, 0)
 
 
@@ -25,35 +26,37 @@ class _Stream:
     """One direction of a connection.
 
     Attributes:
-        source: Where bytes come from.
-        sink: Where they go.
-        held: What waits, each with the time at which it may go, s.
-        size: How many bytes wait.
+        source: Socket to read from.
+        sink: Socket to write to.
+        queue: Data to write, each with the earliest time for it, s.
+        size: Number of bytes in the queue.
     """
 
     source: socket.socket
     sink: socket.socket
-    held: deque[tuple[float, bytes]] = field(default_factory=deque[tuple[float, bytes]])
+    queue: deque[tuple[float, bytes]] = field(default_factory=deque[tuple[float, bytes]])
     size: int = 0
 
 
 class BadNetwork:
-    """Listens on a port of 127.0.0.1 and passes everything on to another one.
-
-    Attributes:
-        latency_s: How long each byte takes.
-        slice_bytes: At most how many bytes are passed on at once; 0 for any number.
-        silent: Whether nothing passes any more while connections stay open, as when a radio dies.
+    """Forwards connections from a free port of 127.0.0.1 to another one.
 
     Args:
-        port: The port of 127.0.0.1 to pass on to.
+        port: Port of 127.0.0.1 to forward to.
+        clock: Time of the latency, s.
+
+    Attributes:
+        latency_s: Delay of each byte, s.
+        slice_bytes: Most bytes to forward at once; 0 for any number.
+        silent: Whether to block all data while connections stay open, as when a radio dies.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.latency_s = 0.0
         self.slice_bytes = 0
         self.silent = False
         self._port = port
+        self._clock = clock
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._listener, selectors.EVENT_READ)
@@ -64,33 +67,33 @@ class BadNetwork:
         self._thread.start()
 
     def __enter__(self) -> Self:
-        """The network itself."""
+        """Return the network."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take it down."""
+        """Close the network."""
         self.close()
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Port on which it listens."""
         return self._listener.getsockname()[1]
 
     def reset(self) -> None:
-        """Tear all connections, as a router does that has lost its memory."""
+        """Reset all connections, as a router does after a restart."""
         with self._lock:
             for stream in self._streams:
                 stream.source.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
             self._drop_all()
 
     def half_close(self) -> None:
-        """End all connections in the direction of the robot only."""
+        """End the direction towards the robot of all connections."""
         with self._lock:
             for stream in self._streams[::2]:
                 stream.sink.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
-        """End everything."""
+        """End all connections and the thread."""
         self._ended.set()
         self._thread.join()
         with self._lock:
@@ -100,7 +103,7 @@ class BadNetwork:
 
     def _run(self) -> None:
         while not self._ended.is_set():
-            for key, _ in self._selector.select(_LOOK_S if self._idle() else 0.001):
+            for key, _ in self._selector.select(_POLL_S if self._idle() else 0.001):
                 with self._lock:
                     if key.fileobj is self._listener:
                         self._accept()
@@ -111,14 +114,14 @@ class BadNetwork:
                     self._write(stream)
 
     def _idle(self) -> bool:
-        return self.silent or not any(stream.held for stream in self._streams)
+        return self.silent or not any(stream.queue for stream in self._streams)
 
     def _accept(self) -> None:
         client, _ = self._listener.accept()
         try:
             robot = socket.create_connection(("127.0.0.1", self._port), 5.0)
         except OSError:
-            client.close()  # As a network does behind which nobody listens.
+            client.close()  # As if the robot refused the connection.
             return
         for one in (client, robot):
             one.setblocking(False)
@@ -128,7 +131,7 @@ class BadNetwork:
             self._selector.register(stream.source, selectors.EVENT_READ, stream)
 
     def _read(self, stream: _Stream) -> None:
-        if stream.size >= _MOST_HELD or stream not in self._streams:
+        if stream.size >= _MAX_QUEUED or stream not in self._streams:
             return
         try:
             data = stream.source.recv(_CHUNK)
@@ -141,13 +144,13 @@ class BadNetwork:
             return
         step = self.slice_bytes or len(data)
         for start in range(0, len(data), step):
-            stream.held.append((time.monotonic() + self.latency_s, data[start : start + step]))
+            stream.queue.append((self._clock() + self.latency_s, data[start : start + step]))
         stream.size += len(data)
 
     def _write(self, stream: _Stream) -> None:
-        now_s = time.monotonic()
-        while stream.held and not self.silent and stream.held[0][0] <= now_s:
-            due, data = stream.held[0]
+        now_s = self._clock()
+        while stream.queue and not self.silent and stream.queue[0][0] <= now_s:
+            due, data = stream.queue[0]
             try:
                 sent = stream.sink.send(data)
             except BlockingIOError:
@@ -157,12 +160,12 @@ class BadNetwork:
                 return
             stream.size -= sent
             if sent < len(data):
-                stream.held[0] = (due, data[sent:])
+                stream.queue[0] = (due, data[sent:])
                 return
-            stream.held.popleft()
+            stream.queue.popleft()
 
     def _drop(self, stream: _Stream) -> None:
-        """End a connection in both directions."""
+        """End both directions of a connection."""
         pair = {stream.source, stream.sink}
         for other in tuple(self._streams):
             if other.source in pair:

@@ -1,6 +1,7 @@
-"""Says from the ledger alone whether a robot moved when it should not have.
+"""Judge from the ledger alone whether a robot moved without permission.
 
-It knows what is wired and when commands arrived, and nothing of the robot's programs.
+The inputs are the ledger, the wiring and the arrival times of commands, but nothing from the
+robot's own programs.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ __all__ = ["ExpectedCommand", "Interval", "propelled", "time_to_rest", "unauthor
 
 
 class ExpectedCommand(NamedTuple):
-    """A command that the robot had reason to obey.
+    """A command that the robot was to obey.
 
     Attributes:
-        arrival_ns: When it arrived, on the ledger's clock.
-        ttl_ms: How long it may act; the deadline holds where it is shorter.
+        arrival_ns: Arrival, on the ledger's clock.
+        ttl_ms: Time to live, ms; the deadline applies if it is shorter.
     """
 
     arrival_ns: int
@@ -28,13 +29,13 @@ class ExpectedCommand(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """A stretch of time in which an output was not at rest.
+    """A time interval in which an output was not at rest.
 
     Attributes:
-        output: Its name.
-        start_ns: When it began.
-        end_ns: When it ended; infinite if it does not.
-        value: The largest value by size; 0 where it is not known.
+        output: Name of the output.
+        start_ns: Start.
+        end_ns: End; infinite if it does not end.
+        value: Value of the largest size; 0 if unknown.
     """
 
     output: str
@@ -44,10 +45,14 @@ class Interval(NamedTuple):
 
 
 def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
-    """When each output that propels was not at rest.
+    """Return when each propelling output was not at rest.
 
-    A pin between the edges of its PWM counts by its duty. The last levels last for ever, except
-    that a one-shot of the enable line ends them.
+    A pin with PWM counts by its duty. The last levels last for ever, unless the one-shot of the
+    enable line ends them.
+
+    Args:
+        ledger: Transitions, ordered by time.
+        wiring: Wiring of the robot.
     """
     found: list[Interval] = []
     running: dict[str, tuple[int, float]] = {}
@@ -74,14 +79,14 @@ def unauthorised(
     deadline_ms: float,
     slack_ms: float = 0.0,
 ) -> list[Interval]:
-    """When an output that propels was not at rest without a fresh command.
+    """Return when a propelling output was not at rest without a fresh command.
 
     Args:
-        ledger: The transitions, in the order of their times.
-        wiring: What is attached.
-        commands: When each accepted command arrived, in nanoseconds, and its time to live in ms.
-        deadline_ms: How long a command acts at most.
-        slack_ms: How much later than that an output may come to rest.
+        ledger: Transitions, ordered by time.
+        wiring: Wiring of the robot.
+        commands: Arrival of each accepted command, ns, and its time to live, ms.
+        deadline_ms: Longest effect of a command, ms.
+        slack_ms: How much later than that an output may come to rest, ms.
     """
     allowed = _union(
         (arrival_ns, arrival_ns + (min(ttl_ms, deadline_ms) + slack_ms) * 1e6)
@@ -104,10 +109,15 @@ def unauthorised(
 
 
 def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int) -> float:
-    """Seconds from a fault until all outputs that propel are at rest for good.
+    """Return the time from a fault until all propelling outputs are at rest for good.
+
+    Args:
+        ledger: Transitions, ordered by time.
+        wiring: Wiring of the robot.
+        fault_ns: Time of the fault.
 
     Returns:
-        0 if they were at rest before and stayed so; infinite if one never comes to rest.
+        Seconds; 0 if they were at rest before and stayed so, infinite if one never comes to rest.
     """
     ends = [interval.end_ns for interval in propelled(ledger, wiring)]
     return max(0.0, max(ends, default=0.0) - fault_ns) / 1e9
@@ -116,7 +126,7 @@ def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int
 def _moments(
     ledger: Iterable[Transition], wiring: TwinWiring
 ) -> Iterator[tuple[int, dict[str, WiredOutput]]]:
-    """What the outputs do after each transition, and when the one-shot ends."""
+    """Yield the states of the outputs after each transition and at the end of the one-shot."""
     levels = Levels()
     for transition in ledger:
         ends_ns = wiring.power_ends_ns(levels)
@@ -130,7 +140,7 @@ def _moments(
 
 
 def _union(intervals: Iterable[tuple[float, float]]) -> Sequence[tuple[float, float]]:
-    """The same stretches of time without overlap, in order."""
+    """Return the union of intervals, in order and without overlap."""
     united: list[tuple[float, float]] = []
     for start, end in sorted(intervals):
         if united and start <= united[-1][1]:

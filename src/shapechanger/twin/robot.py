@@ -1,4 +1,4 @@
-"""An operator of the twin: puts the vehicle back, breaks and presses things, lets time go by."""
+"""A robot that is served on its twin, and the operator beside it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Final, Literal, NamedTuple, Self
+from typing import IO, Any, Final, Literal, Self
 
 from shapechanger.errors import RobotError
 from shapechanger.remote.client import RobotClient
@@ -21,167 +21,171 @@ from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.board_client import Link
+from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.chips import Magnet
-from shapechanger.twin.rig import ServoFault
-from shapechanger.twin.signals import Levels, Pulse, PwmChannel
+from shapechanger.twin.messages import (
+    BreakCamera,
+    BreakChip,
+    BreakMagnet,
+    BreakServo,
+    LayOutCourse,
+    PlaceVehicle,
+    PressButton,
+    PutVehicleBack,
+    ReadLevels,
+    ReadTensions,
+    ReadWhereabouts,
+    SetBattery,
+    SetDistance,
+    SleepOnBoard,
+    SleepResult,
+    Whereabouts,
+)
+from shapechanger.twin.servos.rig import ServoFault
+from shapechanger.twin.signals import Levels
 
 __all__ = ["Operator", "RunningRobot", "Whereabouts", "run_robot"]
 
 
-class Whereabouts(NamedTuple):
-    """Where the vehicle really is.
-
-    Attributes:
-        x: In metres.
-        y: In metres.
-        heading: Radians from the x axis, counter-clockwise seen from above.
-        speed: m/s along the heading.
-        travelled_m: Metres that the wheels rolled, backward counts down.
-        bumped: Whether something presses its bumper.
-        distance_m: Free distance ahead of its nose.
-        truth: What nobody on board knows, such as how far it came along the course, by name.
-        t: When, in nanoseconds.
-    """
-
-    x: float
-    y: float
-    heading: float
-    speed: float
-    travelled_m: float
-    bumped: bool
-    distance_m: float
-    truth: dict[str, float]
-    t: int
-
-
 class Operator:
-    """A person beside the robot. What it asks is answered after all that was said before.
+    """A person beside the robot, who moves the vehicle and breaks and presses things.
+
+    Each request takes effect after everything that the robot's processes sent before it.
 
     Args:
-        path: The socket at which the board listens.
+        path: Socket on which the board listens.
+
+    Raises:
+        RobotError: If no board listens there.
     """
 
     def __init__(self, path: str) -> None:
-        self._link = Link(path, "operator")
+        self._client = BoardClient(path, "operator")
 
-    def __enter__(self) -> Operator:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def place(self, seed: int) -> None:
-        """Put the vehicle at the start that follows from this seed."""
-        self._link.ask(op="place", seed=seed)
+        """Place the vehicle at the start that follows from a seed."""
+        self._client.ask(PlaceVehicle(seed=seed))
 
     def put_back(self) -> None:
-        """Put a vehicle that ran into something back on the lane, at rest, from where it goes on.
+        """Put a vehicle that has collided back on its lane, at rest, to continue from there.
 
-        In the plain room, which has no lane, it is put at its start. Its truth counts on.
+        In the plain room, which has no lane, it returns to its start. Its truth counts on.
         """
-        self._link.ask(op="put_back")
+        self._client.ask(PutVehicleBack())
 
     def lay_out(self, seed: int) -> None:
-        """Put other surroundings around the vehicle, and the vehicle at a start in them.
+        """Replace the surroundings, and place the vehicle at a start in them.
 
-        On a course in MuJoCo this takes some tenths of a second, for which the board stands still,
-        and so does the first `put_back` on it. On a busy machine a guard in real time may be taken
-        for dead meanwhile; a twin that is started with another seed has no such wait.
+        On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
+        for the first `put_back` on it. On a busy machine a guard in real time may then be taken for
+        dead; a twin that is started with another seed has no such wait.
         """
-        self._link.ask(op="course", seed=seed)
+        self._client.ask(LayOutCourse(seed=seed))
 
     def advance(self, seconds: float) -> int:
-        """Let time go by on the twin's clock, and say what time it is then, in nanoseconds.
+        """Advance the twin's clock and return its time in nanoseconds.
 
         Raises:
             RobotError: If the board runs in real time.
         """
-        return self._link.ask(op="sleep", ns=round(seconds * 1e9))["t"]
+        return self._client.ask(SleepOnBoard(ns=round(seconds * 1e9)), SleepResult).t
 
-    def break_camera(self, how: CameraFault) -> None:
-        """Let the camera fail; "" for a camera that works."""
-        self._link.ask(op="camera", how=how)
+    def break_camera(self, fault: CameraFault) -> None:
+        """Make the camera fail; "" repairs it."""
+        self._client.ask(BreakCamera(fault=fault))
 
     def press_bumper(self, down: bool = True) -> None:
-        """Press all bumpers, or let them go."""
-        self._link.ask(op="press", what="bumper", down=down)
+        """Press or release all bumpers."""
+        self._client.ask(PressButton(button="bumper", down=down))
 
     def press_stop(self, down: bool = True) -> None:
-        """Press the emergency stop button, or let it go."""
-        self._link.ask(op="press", what="stop", down=down)
+        """Press or release the emergency stop button."""
+        self._client.ask(PressButton(button="stop", down=down))
 
     def set_battery(self, volts: float | None) -> None:
-        """Let the battery have this voltage without load; None for a full one."""
-        self._link.ask(op="battery", volts=volts)
+        """Set the battery's voltage without load, V; None for a full one."""
+        self._client.ask(SetBattery(volts=volts))
 
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
-        """Let distance sensors see this; None for the truth, and `dead` for no echo at all."""
-        self._link.ask(op="distance", metres=metres, dead=dead)
+        """Override what distance sensors measure.
+
+        Args:
+            metres: Distance, m; None for the truth.
+            dead: Whether they do not answer at all.
+        """
+        self._client.ask(SetDistance(metres=metres, dead=dead))
 
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
-        """Let a chip stop answering, or answer again."""
-        self._link.ask(op="chip", bus=bus, address=address, dead=dead)
+        """Make an I2C chip stop answering, or answer again.
 
-    def break_servo(self, tendon: str, how: ServoFault) -> None:
-        """Let something happen to the servo of a tendon; "" takes back what can be taken back."""
-        self._link.ask(op="servo_fault", tendon=tendon, how=how)
+        Args:
+            bus: Number of the bus.
+            address: Address on the bus.
+            dead: Whether it stops answering.
+        """
+        self._client.ask(BreakChip(bus=bus, address=address, dead=dead))
 
-    def break_magnet(self, joint: str, how: Magnet = "gone") -> None:
-        """Let something happen to the magnet of a joint's encoder; "" for one that is well."""
-        self._link.ask(op="magnet", joint=joint, how=how)
+    def break_servo(self, tendon: str, fault: ServoFault) -> None:
+        """Make the servo of a tendon fail; "" repairs what can be repaired."""
+        self._client.ask(BreakServo(tendon=tendon, fault=fault))
+
+    def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
+        """Change the magnet of a joint's encoder; "" repairs it."""
+        self._client.ask(BreakMagnet(joint=joint, fault=state))
 
     def tensions(self) -> dict[str, float]:
-        """What each tendon on the servo bus is pulled with now, N, by name."""
-        return self._link.ask(op="tensions")["tensions"]
+        """Return the tension of each tendon on the servo bus, N, by name."""
+        return self._client.ask(ReadTensions(), dict[str, float])
 
     def levels(self) -> Levels:
-        """What all outputs do now."""
-        answer = self._link.ask(op="levels")
-        return Levels(
-            duties=dict(answer["duties"]),
-            pulses={pin: Pulse(us, hz) for pin, us, hz in answer["pulses"]},
-            channels={PwmChannel(b, a, n): Pulse(us, hz) for b, a, n, us, hz in answer["channels"]},
-            edges_ns=dict(answer["edges_ns"]),
-        )
+        """Return the state of all outputs."""
+        return self._client.ask(ReadLevels(), Levels)
 
     def where(self) -> Whereabouts:
-        """Where the vehicle is."""
-        answer = self._link.ask(op="where")
-        return Whereabouts(**{name: answer[name] for name in Whereabouts._fields})
+        """Return the true state of the vehicle."""
+        return self._client.ask(ReadWhereabouts(), Whereabouts)
 
     def close(self) -> None:
-        """Leave."""
-        self._link.close()
+        """Leave the board."""
+        self._client.close()
 
 
 _READY: Final = "ready.json"
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
-_LOOK_S: Final = 0.02
+_POLL_S: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class _Ready:
-    """What the daemon says once it can be reached."""
+    """Content of the file that the daemon writes when it can be reached."""
 
     port: int
     fingerprint: str
 
 
 class RunningRobot:
-    """A robot that is served on this machine; it ends with `close`.
+    """A robot that is served by processes on this machine, until `close`.
 
     Args:
-        folder: Where its files are.
-        supervisor: Its supervisor.
-        temporary: Whether the folder goes away with it.
+        folder: Folder of its files: the twin's ledger and socket, the key and the log.
+        supervisor: Process of its supervisor.
+        temporary: Whether `close` removes the folder.
 
     Attributes:
-        folder: Where its files are: the twin's ledger and socket, the key and what it said.
-        supervisor: Its supervisor.
+        folder: Folder of its files.
+        supervisor: Process of its supervisor.
+
+    Raises:
+        RobotError: If it does not start.
     """
 
     def __init__(
@@ -193,48 +197,48 @@ class RunningRobot:
         self._ready = self._await_ready()
 
     def __enter__(self) -> Self:
-        """The robot itself."""
+        """Return the robot."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """Close the robot."""
         self.close()
 
     @property
     def port(self) -> int:
-        """Where it listens, on 127.0.0.1; another port after its processes started afresh."""
+        """Port on 127.0.0.1; another one after a restart of the daemon."""
         if (self.folder / _READY).exists():
             self._ready = self._await_ready()
         return self._ready.port
 
     @property
     def ledger_path(self) -> Path:
-        """The twin's ledger."""
+        """Ledger of the twin."""
         return self.folder / "ledger.jsonl"
 
     @property
     def known(self) -> KnownRobot:
-        """What it takes to reach it."""
+        """Address and credentials."""
         return self.known_at(f"127.0.0.1:{self.port}")
 
     def known_at(self, address: str) -> KnownRobot:
-        """The same robot behind another address, such as that of a proxy."""
+        """Return the credentials with another address, such as that of a proxy."""
         key = (self.folder / "credentials" / "key").read_text().strip()
         return KnownRobot("robot", address, key, self._ready.fingerprint or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
-        """A connection to it; options as `RobotClient.connect` takes them."""
+        """Connect to it; the options are those of `RobotClient.connect`."""
         return RobotClient.connect(self.known, **options)
 
     def operator(self) -> Operator:
-        """Somebody who stands beside its twin."""
+        """Connect an operator to its twin."""
         return Operator(str(self.folder / "board.socket"))
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
-        """The process that runs a program of the robot.
+        """Return the process id of a program of the robot.
 
         Raises:
-            RobotError: If there is none at the moment.
+            RobotError: If it does not run at the moment.
         """
         parent = self.supervisor.pid
         children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
@@ -244,28 +248,28 @@ class RunningRobot:
                 return int(pid)
         raise RobotError(f"The robot's {program} does not run at the moment.")
 
-    def said(self) -> str:
-        """What its processes said so far, for people to read."""
+    def log_text(self) -> str:
+        """Return the log of its processes so far."""
         path = self.folder / "log.txt"
         return path.read_text(errors="replace") if path.exists() else ""
 
     def await_restart(self, timeout_s: float = _READY_S) -> None:
-        """Wait until its daemon can be reached again after a restart.
+        """Wait until the daemon can be reached again after a restart.
 
         Raises:
-            RobotError: If that does not happen.
+            RobotError: If it does not restart in time.
         """
         self._ready = self._await_ready(timeout_s)
 
     def forget_ready(self) -> None:
-        """Take away what the daemon said, before something that makes it start again."""
+        """Remove the daemon's ready file, before something that restarts the daemon."""
         (self.folder / _READY).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """End it; its outputs are at rest then."""
+        """End its processes, with its outputs at rest."""
         self._end()
         if self._temporary:
-            # Its board may still write the last lines of its ledger there.
+            # The board may still write the last lines of its ledger.
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def _end(self) -> None:
@@ -284,10 +288,10 @@ class RunningRobot:
         while not path.exists():
             if self.supervisor.poll() is not None or time.monotonic() > until_s:
                 self._end()
-                said = self.said().strip()
+                text = self.log_text().strip()
                 self.close()
-                raise RobotError(f"The robot did not start: {said}")
-            time.sleep(_LOOK_S)
+                raise RobotError(f"The robot did not start: {text}")
+            time.sleep(_POLL_S)
         return _Ready(**json.loads(path.read_text()))
 
 
@@ -304,14 +308,13 @@ def run_robot(
     """Serve a robot on a free port of 127.0.0.1, as `shapechanger robot serve` does.
 
     Args:
-        profile: The robot, or its file.
-        twin: Whether on its twin.
-        clock: Where a twin's time comes from.
+        profile: Profile of the robot, or its file.
+        twin: Whether to serve it on its twin.
+        clock: Clock of a twin: the machine's, or one that only clients advance.
         seed: Seed of a twin's world.
-        folder: Folder for its files; one that goes away with it if not given. A twin that runs
-            there is used.
-        log: Where its processes say what happens; a file in the folder if not given.
-        arguments: More arguments of `serve`.
+        folder: Folder for its files; None for a temporary one. A twin that runs there is used.
+        log: Log of its processes; None for a file in the folder.
+        arguments: Further arguments of `serve`.
 
     Raises:
         RobotError: If it does not start.
@@ -330,13 +333,13 @@ def run_robot(
         command += ["--twin", "--clock", clock, "--seed", str(seed)]
         command += ["--twin-folder", str(folder)]
     with contextlib.ExitStack() as stack:
-        said = log or stack.enter_context((folder / "log.txt").open("wb"))
+        output = log or stack.enter_context((folder / "log.txt").open("wb"))
         supervisor = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
-            # So that Ctrl-C reaches whoever drives first, who then ends the robot.
+            stdout=output,
+            stderr=output,
+            # So that Ctrl-C first reaches the driving program, which then ends the robot.
             process_group=0,
             preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
@@ -344,8 +347,8 @@ def run_robot(
 
 
 def _end_with_parent() -> None:
-    """Let the kernel end this process when whoever started it is gone, however that came.
+    """Let the kernel end this process when its parent ends, for whatever reason.
 
-    A robot must not run on because a terminal was closed. The request outlives `exec`.
+    A robot must not run on because a terminal was closed. The setting survives `exec`.
     """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

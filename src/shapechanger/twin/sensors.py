@@ -1,19 +1,20 @@
-"""What is attached to the board's inputs: encoders, bumpers, distance sensors, a stop button."""
+"""Around the board: sensors on input pins, speed controllers, and the world that moves them."""
 
 from __future__ import annotations
 
 import heapq
 import math
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 from shapechanger.robot.drivers.settings import number, text, whole, wholes
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
-from shapechanger.twin.rig import rig_of
+from shapechanger.twin.messages import Edge
+from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import Levels
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import Readings, World
 
-__all__ = ["Edge", "PinSensors", "SpeedController", "Surroundings"]
+__all__ = ["PinSensors", "SpeedController", "Surroundings"]
 
 # HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
 # as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
@@ -22,20 +23,6 @@ _NO_ECHO_NS: Final = 38_000_000
 _NEAREST_M: Final = 0.02
 _FARTHEST_M: Final = 4.0
 _SOUND_M_PER_S: Final = 343.2
-
-
-class Edge(NamedTuple):
-    """A change of an input.
-
-    Attributes:
-        t: When, in nanoseconds.
-        pin: BCM number.
-        level: What it is from then on.
-    """
-
-    t: int
-    pin: int
-    level: int
 
 
 class _Sensor(Protocol):
@@ -50,7 +37,7 @@ class _Encoder:
         self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
         count_m = number(plan.settings, "wheel_m") / number(plan.settings, "counts_per_turn")
         self._edge_m = count_m / len(self._states)
-        # What was rolled before somebody switched it on is no edge.
+        # The distance rolled before power-on makes no edges.
         self._travelled = travelled_m
         self._position = math.floor(travelled_m / self._edge_m)
 
@@ -77,7 +64,7 @@ class _Encoder:
 
 
 class _Bumper:
-    """Switches to ground (pull "up") or to 3.3 V, all pressed at once."""
+    """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once."""
 
     def __init__(self, plan: SensorPlan) -> None:
         self._pins = wholes(plan.settings, "pins")
@@ -104,7 +91,7 @@ class _Distance:
         self._echo = whole(plan.settings, "echo")
         self._world = world
         self._busy_until_ns = 0
-        self.said: float | None = None
+        self.override_m: float | None = None
         self.dead = False
 
     def levels(self) -> dict[int, int]:
@@ -113,7 +100,7 @@ class _Distance:
     def ping(self, t: int) -> list[Edge]:
         if self.dead or t < self._busy_until_ns:
             return []
-        distance = self._world.distance_m() if self.said is None else self.said
+        distance = self._world.distance_m() if self.override_m is None else self.override_m
         echo_ns = _NO_ECHO_NS
         if distance <= _FARTHEST_M:
             echo_ns = round(2e9 * max(distance, _NEAREST_M) / _SOUND_M_PER_S)
@@ -125,8 +112,8 @@ class PinSensors:
     """All sensors on pins.
 
     Args:
-        plan: What is wired.
-        world: What they sense.
+        plan: The robot as it is wired.
+        world: World of the robot.
 
     Attributes:
         levels: Level of each pin that a sensor drives.
@@ -149,16 +136,16 @@ class PinSensors:
 
     @property
     def next_ns(self) -> int | None:
-        """When the next edge comes that is known already."""
+        """Time of the next edge that is already known, ns; None without one."""
         return self._due[0].t if self._due else None
 
     def advance(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
-        """The edges between two times, in order.
+        """Return the edges between two times, in order.
 
         Args:
-            start_ns: When the last call ended.
-            end_ns: Now.
-            seen: What the world shows now.
+            start_ns: End of the last call.
+            end_ns: Current time.
+            seen: Current state of the world.
         """
         found: list[Edge] = []
         for sensor in self._sensors:
@@ -171,40 +158,45 @@ class PinSensors:
         return found
 
     def output_changed(self, t: int, pin: int, level: float) -> None:
-        """An output pin has changed; a distance sensor pings when its trigger falls."""
+        """Let a distance sensor ping when its trigger, an output, falls."""
         for sensor in self._distances:
             if sensor.trigger == pin and level == 0.0:
                 for edge in sensor.ping(t):
                     heapq.heappush(self._due, edge)
 
     def press_stop(self, down: bool, t: int) -> None:
-        """Press the stop button, or let it go."""
+        """Press or release the stop button."""
         if self._stop_pin is not None:
             heapq.heappush(self._due, Edge(t, self._stop_pin, int(not down)))
 
     def hold_bumpers(self, down: bool) -> None:
-        """Press all bumpers from outside the world, or let them go."""
+        """Press or release all bumpers from outside the world."""
         for bumper in self._bumpers:
             bumper.held = down
 
-    def say_distance(self, distance_m: float | None, dead: bool = False) -> None:
-        """Let distance sensors say this instead of the truth, or nothing at all."""
+    def override_distance(self, distance_m: float | None, *, dead: bool = False) -> None:
+        """Override what distance sensors measure.
+
+        Args:
+            distance_m: Distance to measure, m; None for the truth.
+            dead: Whether they do not answer at all.
+        """
         for sensor in self._distances:
-            sensor.said, sensor.dead = distance_m, dead
+            sensor.override_m, sensor.dead = distance_m, dead
 
 
-# It is content with a little less than what a driver waits.
+# A controller arms a little earlier than its driver expects.
 _ARM_SHARE: Final = 0.8
 
 
 class SpeedController:
-    """What a controller makes of the value of its pulses.
+    """Hobby speed controller: turns the value of its pulses into that of the motor.
 
-    With `reverse` "double" the first pulses backward after going forward brake; only those that
-    follow another neutral go backward.
+    With `reverse` "double" the first backward pulses after driving forward brake; only those after
+    another neutral drive backward.
 
     Args:
-        plan: The output.
+        plan: Its output.
     """
 
     def __init__(self, plan: OutputPlan) -> None:
@@ -216,12 +208,12 @@ class SpeedController:
         self._reverses = False
 
     def obey(self, value: float, pulses: bool, now_ns: int) -> float:
-        """What the motor gets.
+        """Return the value for the motor, -1 to 1.
 
         Args:
-            value: What the pulses say, -1 to 1.
-            pulses: Whether there are any; without, it stops and wants to see neutral again.
-            now_ns: The time.
+            value: Value of the pulses, -1 to 1.
+            pulses: Whether there are pulses; without, it stops and must see neutral again.
+            now_ns: Time, ns.
         """
         if not pulses:
             self._neutral_since_ns = None
@@ -245,30 +237,30 @@ class SpeedController:
         return 0.0
 
 
-# A board that a busy machine kept waiting for longer does not count that time for its servos: they
-# would take its silence for the guard's, and their watchdogs would let go.
-_MOST_STILL_NS: Final = 40_000_000
+# Servos do not count longer times for which a busy machine kept the board waiting: their watchdogs
+# would take its silence for the guard's and let go.
+_MAX_SERVO_STEP_NS: Final = 40_000_000
 
 
 class Surroundings:
-    """The world behind the board's pins.
+    """Everything around the board: sensors, speed controllers, servos and world.
 
     Args:
-        wiring: What is attached.
-        world: Where the vehicle is.
-        now_ns: The time.
+        wiring: What is attached to the pins.
+        world: World of the robot.
+        now_ns: Time, ns.
 
     Attributes:
-        sensors: What is on the input pins.
-        rig: The servos on a bus; None without any.
-        now_ns: How far the world has gone.
+        sensors: Sensors on input pins.
+        rig: Servos on a bus; None without any.
+        now_ns: Time to which the world has advanced.
     """
 
     def __init__(self, wiring: TwinWiring, world: World, now_ns: int) -> None:
         self._wiring = wiring
         self._world = world
         self.sensors = PinSensors(wiring.plan, world)
-        self.rig = rig_of(wiring.plan, world)
+        self.rig = Rig.of(wiring.plan, world)
         self.now_ns = now_ns
         self._controllers = {
             name: SpeedController(plan)
@@ -277,17 +269,17 @@ class Surroundings:
         }
 
     def advance(self, now_ns: int, levels: Levels) -> list[Edge]:
-        """Let the world go on until now; the edges of inputs on the way."""
+        """Advance the world to a time and return the edges of inputs on the way."""
         start_ns = self.now_ns
         if now_ns > start_ns:
             if self.rig is not None:
-                self.rig.line.advance(min(now_ns - start_ns, _MOST_STILL_NS))
+                self.rig.bus.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
             self._world.advance((now_ns - start_ns) / 1e9, self.parts(levels))
             self.now_ns = now_ns
         return self.sensors.advance(start_ns, self.now_ns, self._world.inputs())
 
     def parts(self, levels: Levels) -> dict[str, float | None]:
-        """What each part of the vehicle gets; the mean where several outputs move one part."""
+        """Return the value of each part of the vehicle; the mean of outputs that share a part."""
         values: dict[str, list[float]] = {}
         for name, (value, _) in self._wiring.read(levels, self.now_ns).items():
             part = self._wiring.outputs[name].part

@@ -1,22 +1,24 @@
-"""The ledger: each change of a pin, pulse or chip on a line of its own, written by the board.
+"""Signals of the board: the state of its outputs, and the ledger with all their changes.
 
-The kinds of lines, each with its time `t` in nanoseconds:
+The board writes each change of a pin, pulse or chip to one line of the ledger, as JSON.
+
+Lines have a time `t` in nanoseconds and a kind:
 
 ```
 pin     pin, duty, hz, pid       an output: its level (hz 0), or the duty of its software PWM
-        released: true           nobody drives the pin: its resistors give it its level
+        released: true           the pin is no longer driven: its resistors set its level
 pulse   pin, us, hz, pid         servo pulses; 0 us for none
 i2c     bus, address, register, data, pid      what was written to a chip
-        bus, address, channel, us, hz          what that makes of a PWM channel
-gone    pid                      a process died; lines with the levels that its pins keep follow
+        bus, address, channel, us, hz          the effect of that on a PWM channel
+gone    pid                      a process died; the levels that its pins keep follow
 input   pin, level               an edge of a sensor
-place   seed                     the operator put the vehicle at a start
+place   seed                     the operator placed the vehicle at a start
 put_back                         the operator put the vehicle back after a collision
-course  seed                     the operator put other surroundings around it
+course  seed                     the operator replaced the surroundings
 fault   what                     the operator broke or pressed something
 ```
 
-Each line is written in one go, so that a crash leaves whole lines and one broken one at most.
+Each line is written at once, so that a crash leaves at most one broken line, the last.
 """
 
 from __future__ import annotations
@@ -43,15 +45,15 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One line of the ledger; what a kind does not have is None.
+    """One line of the ledger; fields that its kind does not have are None.
 
     Attributes:
-        t: When, in nanoseconds of the run's clock.
-        kind: What it is, see the module.
-        pid: Process that did it.
+        t: Time, in nanoseconds of the run's clock.
+        kind: Kind of line; see the module.
+        pid: Process that made the change.
         pin: BCM number.
         duty: Share of the time at which the pin is high, 0 to 1.
-        hz: How many periods a second.
+        hz: Frequency of PWM or pulses, Hz.
         us: Width of the pulses in microseconds; 0 for none.
         bus: Number of the I2C bus.
         address: Address on that bus.
@@ -59,9 +61,9 @@ class Transition:
         register: First register of a write.
         data: Bytes of a write.
         level: Level of an input.
-        released: Whether nobody drives the pin.
-        seed: Of a start.
-        what: What the operator did.
+        released: Whether the pin is no longer driven.
+        seed: Seed of a start or of surroundings.
+        what: Action of the operator.
     """
 
     t: int
@@ -86,32 +88,32 @@ _FIELDS: Final = frozenset(Transition.__slots__)
 
 
 class Ledger(Protocol):
-    """Where changes are written down."""
+    """Record of changes."""
 
     def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Write down a change."""
+        """Record a change."""
         ...
 
     def close(self) -> None:
-        """Write nothing any more."""
+        """Close the record."""
         ...
 
 
 class NoLedger:
-    """Forgets everything, for a board whose pins nobody judges."""
+    """A ledger that keeps nothing."""
 
     def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Forget a change."""
+        """Do nothing."""
 
     def close(self) -> None:
         """Do nothing."""
 
 
 class LedgerWriter:
-    """Appends lines.
+    """A ledger in a file.
 
     Args:
-        path: The file; it is made, and must not be there yet.
+        path: The file, which must not exist yet.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -119,7 +121,7 @@ class LedgerWriter:
         self._encoder = json.JSONEncoder(allow_nan=False)
 
     def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Append a line; it is with the kernel when this returns."""
+        """Append a line, which the kernel has when this returns."""
         line = self._encoder.encode({"t": t, "kind": kind, **fields}) + "\n"
         os.write(self._fd, line.encode())
 
@@ -129,15 +131,15 @@ class LedgerWriter:
 
 
 def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
-    """All whole lines of a ledger, in the order of their times.
+    """Read all complete lines of a ledger, ordered by time.
 
-    Processes stamp what they do, so that lines of two of them can be in the file out of order.
+    Processes stamp their changes, so lines of two processes may be out of order in the file.
 
     Raises:
-        RobotError: If a line other than a broken last one is no transition.
+        RobotError: If a complete line is malformed.
     """
     text = Path(path).read_text(encoding="utf-8")
-    lines = text.split("\n")[:-1]  # What follows the last newline is broken, or nothing.
+    lines = text.split("\n")[:-1]  # After the last newline there is at most a broken line.
     transitions = [_read(line, number, path) for number, line in enumerate(lines, 1)]
     return sorted(transitions, key=lambda transition: transition.t)
 
@@ -149,15 +151,15 @@ def _read(line: str, number: int, path: str | os.PathLike[str]) -> Transition:
             fields["data"] = tuple(fields["data"])
         return Transition(**{key: fields[key] for key in fields if key in _FIELDS})
     except (ValueError, TypeError) as error:
-        raise RobotError(f"Line {number} of {path} is no transition: {error}.") from error
+        raise RobotError(f"Line {number} of {path} is malformed: {error}.") from error
 
 
 class Pulse(NamedTuple):
     """Servo pulses.
 
     Attributes:
-        us: Their width in microseconds; 0 for none.
-        hz: How many come a second.
+        us: Width in microseconds; 0 for none.
+        hz: Frequency, Hz.
     """
 
     us: float
@@ -165,7 +167,7 @@ class Pulse(NamedTuple):
 
 
 class PwmChannel(NamedTuple):
-    """One PWM channel of a chip."""
+    """A PWM channel of a chip: bus, address of the chip, number of the channel."""
 
     bus: int
     address: int
@@ -174,14 +176,13 @@ class PwmChannel(NamedTuple):
 
 @dataclass(slots=True)
 class Levels:
-    """The levels of the pins, and the pulses on pins and channels.
+    """State of all outputs.
 
     Attributes:
-        duties: Share of the time at which a driven pin is high; without the pins that nobody
-            drives.
+        duties: Share of the time at which a pin is high, for each driven pin.
         pulses: Servo pulses by pin.
         channels: Pulses by channel of a chip.
-        edges_ns: When a pin last changed between low and high, without PWM.
+        edges_ns: Time at which a pin last changed between low and high, PWM aside.
     """
 
     duties: dict[int, float] = field(default_factory=dict[int, float])
@@ -190,24 +191,24 @@ class Levels:
     edges_ns: dict[int, int] = field(default_factory=dict[int, int])
 
     def drive(self, pin: int, duty: float, t: int) -> None:
-        """A process drives a pin."""
+        """Drive a pin from a time `t` on."""
         if duty in (0.0, 1.0) and self.duties.get(pin, 0.0) == 1.0 - duty:
             self.edges_ns[pin] = t
         self.duties[pin] = duty
         self.pulses.pop(pin, None)
 
     def release(self, pin: int) -> None:
-        """Nobody drives a pin any more."""
+        """Stop driving a pin."""
         self.duties.pop(pin, None)
         self.pulses.pop(pin, None)
 
     def pulse(self, pin: int, pulse: Pulse) -> None:
-        """A process sends servo pulses on a pin."""
+        """Send servo pulses on a pin."""
         self.duties[pin] = pulse.us * pulse.hz / 1e6
         self.pulses[pin] = pulse
 
     def apply(self, transition: Transition) -> None:
-        """Follow one line of the ledger."""
+        """Apply one line of the ledger."""
         pin, us, hz = transition.pin, transition.us, transition.hz
         if transition.kind == "pin" and pin is not None:
             if transition.released or transition.duty is None:

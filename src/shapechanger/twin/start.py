@@ -1,4 +1,4 @@
-"""Starts a board for the command line and for tests."""
+"""Start a board in a process of its own, or find one that runs."""
 
 from __future__ import annotations
 
@@ -11,33 +11,66 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal
 
+import msgspec
+
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.twin.board_client import Link
+from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.twin.world.place import Place
 
-__all__ = ["HARDWARE", "BoardAt", "RunningBoard", "find_board", "start_board"]
+__all__ = ["HARDWARE", "BoardAt", "BoardSettings", "RunningBoard", "find_board", "start_board"]
 
 HARDWARE: Final = "shapechanger.twin.hardware:connect"
-"""Where a robot's processes get the twin's hardware; its argument is the board's socket."""
+"""Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 
 _SOCKET: Final = "board.socket"
 _LEDGER: Final = "ledger.jsonl"
 _FIFO: Final = "camera.mjpeg"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
-_LONGEST_SOCKET: Final = 100  # Bytes; Linux takes 107.
+_MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
+
+
+class BoardSettings(msgspec.Struct, frozen=True):
+    """Settings of a board's process.
+
+    Attributes:
+        plan: The robot as it is wired, as the JSON of a `GuardPlan`.
+        socket: Path of the socket to listen on.
+        ledger: Path of the ledger to write.
+        clock: Kind of clock.
+        seed: Seed of everything random.
+        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
+        place: Place of the robot.
+        camera: Front camera; None without one.
+        fifo: Path of the pipe for its pictures.
+    """
+
+    plan: str
+    socket: str
+    ledger: str
+    clock: Literal["real", "twin"]
+    seed: int
+    one_shot_ms: float | None
+    place: Place
+    camera: CameraPlan | None
+    fifo: str
 
 
 class BoardAt:
-    """Where a board can be reached.
+    """Paths of a board.
+
+    Args:
+        socket_path: Socket on which it listens; the argument of `HARDWARE`.
+        ledger_path: Its ledger.
+        fifo_path: Pipe of its pictures; None without a camera.
 
     Attributes:
-        socket_path: Where it listens; the argument of `HARDWARE`.
+        socket_path: Socket on which it listens.
         ledger_path: Its ledger.
-        fifo_path: Where its pictures come out; None without a camera.
+        fifo_path: Pipe of its pictures; None without a camera.
     """
 
     def __init__(self, socket_path: str, ledger_path: Path, fifo_path: Path | None) -> None:
@@ -47,21 +80,25 @@ class BoardAt:
 
     @property
     def hardware(self) -> tuple[str, str]:
-        """Where a robot's processes get their hardware, with its argument."""
+        """Source of a robot's hardware, with its argument."""
         return HARDWARE, self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """The camera of a profile, but reading the pictures of this board."""
+        """Return the camera of a profile, reading the pictures of this board.
+
+        Raises:
+            RobotError: If the board has no camera.
+        """
         if self.fifo_path is None:
             raise RobotError("This twin was started without a camera.")
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
 
 
 class RunningBoard(BoardAt):
-    """A board that was started here. It ends with `close`, or when this process does.
+    """A board that this process has started. It ends with `close`, or with this process.
 
     Attributes:
-        process: The process.
+        process: Process of the board.
     """
 
     def __init__(
@@ -83,7 +120,7 @@ class RunningBoard(BoardAt):
         self.close()
 
     def outlive_exec(self) -> None:
-        """Let the board run on when this process becomes another program by exec."""
+        """Keep the board running when this process executes another program."""
         self._owner.set_inheritable(True)
 
     def close(self) -> None:
@@ -97,17 +134,17 @@ class RunningBoard(BoardAt):
 
 
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
-    """The board that runs in a folder, and its clock; None if none does."""
+    """Return the board that runs in a folder, and its clock; None without one."""
     folder = Path(folder).absolute()
     socket_path = folder / _SOCKET
     if not socket_path.is_socket():
         return None
     try:
-        link = Link(str(socket_path), "operator")
+        client = BoardClient(str(socket_path), "operator")
     except RobotError:
         return None
-    clock = link.clock
-    link.close()
+    clock = client.clock
+    client.close()
     fifo_path = folder / _FIFO
     found = BoardAt(str(socket_path), folder / _LEDGER, fifo_path if fifo_path.is_fifo() else None)
     return found, clock
@@ -125,56 +162,53 @@ def start_board(
     """Start a board and wait until it listens.
 
     Args:
-        wiring: What is really attached to its pins.
-        clock: Whether time is the machine's, or moves only when it is asked to.
-        folder: Where its socket, its ledger and its pipe go; new, or without those.
-        camera: What the front camera is like; None for no camera.
-        seed: Of the room, the first start and everything random.
-        one_shot_ms: How long the one-shot of the enable line holds; None where none is fitted.
-        place: Where the vehicle is; None for the plain room.
+        wiring: The robot as it is really wired.
+        clock: The machine's clock ("real"), or one that only clients advance ("twin").
+        folder: Existing folder for its socket, ledger and pipe, without such files.
+        camera: Front camera; None without one.
+        seed: Seed of the room, the first start and everything random.
+        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
+        place: Place of the vehicle; None for the plain room.
 
     Raises:
-        RobotError: If it does not start, or the folder is not as it must be.
+        RobotError: If it does not start, or the folder cannot be used.
     """
-    TwinWiring(wiring, one_shot_ms)  # Says in words what it does not know.
+    TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
     folder = Path(folder).absolute()
-    socket_path, ledger_path = folder / _SOCKET, folder / _LEDGER
-    if len(os.fsencode(socket_path)) > _LONGEST_SOCKET:
+    socket_path, ledger_path, fifo_path = (folder / name for name in (_SOCKET, _LEDGER, _FIFO))
+    if len(os.fsencode(socket_path)) > _MAX_SOCKET_PATH:
         raise RobotError(f"The path {socket_path} is too long for a socket.")
     if not folder.is_dir():
         raise RobotError(f"There is no folder {folder} for the twin: make it first.")
-    for left in (socket_path, ledger_path, folder / _FIFO):
+    for left in (socket_path, ledger_path, fifo_path):
         if os.path.lexists(left):
             raise RobotError(f"A twin has left {left}: give a folder without it.")
+    if camera is not None:
+        os.mkfifo(fifo_path)
+    settings = BoardSettings(
+        plan=wiring.to_json(),
+        socket=str(socket_path),
+        ledger=str(ledger_path),
+        clock=clock,
+        seed=seed,
+        one_shot_ms=one_shot_ms,
+        place=place or Place(),
+        camera=camera,
+        fifo=str(fifo_path),
+    )
     ours, theirs = socket.socketpair()
     with theirs, tempfile.TemporaryFile() as file:
-        file.write(wiring.to_json().encode())
+        file.write(msgspec.json.encode(settings))
         file.seek(0)
-        command = [sys.executable, "-m", "shapechanger.twin.board"]
-        command += ["--plan-fd", str(file.fileno()), "--owner-fd", str(theirs.fileno())]
-        command += ["--socket", str(socket_path), "--ledger", str(ledger_path)]
-        command += ["--clock", clock, "--seed", str(seed)]
-        if one_shot_ms is not None:
-            command += ["--one-shot-ms", str(one_shot_ms)]
-        if place is not None and place.world:
-            command += ["--world", place.world, "--vehicle", place.vehicle]
-            command += [part for lens in place.lenses for part in ("--lens", lens)]
-        if place is not None and place.finger:
-            command += ["--finger", place.finger]
-        fifo_path = None
-        if camera is not None:
-            fifo_path = folder / _FIFO
-            os.mkfifo(fifo_path)
-            command += ["--fifo", str(fifo_path), "--fps", str(camera.fps)]
-            command += ["--size", "{}x{}".format(*camera.size)]
-            command += ["--quality", str(camera.jpeg_quality)]
+        fds = file.fileno(), theirs.fileno()
         process = subprocess.Popen(
-            command,
+            [sys.executable, "-m", "shapechanger.twin.board", *map(str, fds)],
             stdin=subprocess.DEVNULL,
-            pass_fds=(file.fileno(), theirs.fileno()),
-            start_new_session=True,  # So that Ctrl-C reaches the robot, and not the board.
+            pass_fds=fds,
+            start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
-    board = RunningBoard(process, ours, str(socket_path), ledger_path, fifo_path)
+    pipe = None if camera is None else fifo_path
+    board = RunningBoard(process, ours, str(socket_path), ledger_path, pipe)
     ours.settimeout(_READY_S)
     try:
         ready = ours.recv(1)
@@ -183,6 +217,6 @@ def start_board(
     if not ready:
         process.kill()
         board.close()
-        raise RobotError("The twin's board did not start; what it wrote says why.")
+        raise RobotError("The twin's board did not start; its output above gives the reason.")
     ours.settimeout(None)
     return board

@@ -1,8 +1,7 @@
-"""What is attached to the pins: from their levels to the value of each output.
+"""Wiring of a twin: from the levels of pins and pulses to the value of each output.
 
-This is the way back from what the drivers do. It is made from the plan of what is really wired,
-which by default is the plan that is served: with two pins swapped in the served profile only, the
-wrong motor turns.
+This inverts what the drivers do. It follows the plan of the real wiring, which by default is the
+served plan: with two pins swapped only in the served profile, the wrong motor turns.
 """
 
 from __future__ import annotations
@@ -21,22 +20,22 @@ from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 __all__ = ["ESC_DEAD_BAND_US", "ONE_SHOT_MS", "TwinWiring", "WiredOutput"]
 
 ONE_SHOT_MS: Final = 100.0
-"""How long the one-shot of the enable line holds the motors' power after an edge."""
+"""Time for which the one-shot of the enable line keeps the motors' power on after an edge."""
 
 ESC_DEAD_BAND_US: Final = 20.0
-"""Pulses nearer to neutral do not move a hobby speed controller; makers state 10 to 50."""
+"""Dead band of a speed controller on each side of neutral; makers state 10 to 50."""
 
 # Outputs whose power goes through the one-shot: motors, not steering servos or joints.
 _POWERED: Final = ("hbridge", "phase_enable", "esc")
 
 
 class WiredOutput(NamedTuple):
-    """What an output does.
+    """State of an output.
 
     Attributes:
-        value: From -1 to 1, as its driver was told; None for a servo without pulses, which has no
-            torque.
-        at_rest: Whether it is where a stop leads to. A motor with any duty above 0 is not.
+        value: Value from -1 to 1, as its driver takes it; None for a servo without pulses, which
+            has no torque.
+        at_rest: Whether it is in the state after a stop; a motor with any duty above 0 is not.
     """
 
     value: float | None
@@ -51,20 +50,20 @@ class _Output:
 
 
 class TwinWiring:
-    """What is attached.
+    """Wiring of a robot.
 
     Args:
-        plan: What is wired.
-        one_shot_ms: How long the enable line's one-shot holds after each edge of `plan.enable_pin`;
-            None where none is fitted.
+        plan: The robot as it is wired.
+        one_shot_ms: Hold time of the enable line's one-shot after each edge of `plan.enable_pin`,
+            ms; None without one.
 
     Attributes:
-        plan: What is wired.
-        outputs: The outputs by name.
-        propelling: Names of the outputs that make the robot go.
+        plan: The robot as it is wired.
+        outputs: Plans of the outputs, by name.
+        propelling: Names of the outputs that propel the robot.
 
     Raises:
-        RobotError: If the twin does not know what an output is wired to.
+        RobotError: If the twin does not support an output.
     """
 
     def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:
@@ -87,25 +86,25 @@ class TwinWiring:
             name: output.plan for name, output in self._outputs.items()
         }
         self.propelling = tuple(name for name, output in self._outputs.items() if output.propels)
-        self.read(Levels(), 0)  # Says in words what it does not know.
+        self.read(Levels(), 0)  # Raises for outputs that the twin does not support.
 
     def idle_level(self, pin: int) -> int:
-        """Level of a pin that nobody drives.
+        """Return the level of an undriven pin.
 
-        The hardware guide asks for pull-downs at all outputs, and a pull-up at the output enable of
-        a PCA9685, which is active low.
+        The hardware guide asks for pull-downs on all outputs, and for a pull-up on the output
+        enable of a PCA9685, which is active low.
         """
         return int(pin in self._high)
 
     def power_ends_ns(self, levels: Levels) -> int | None:
-        """When the one-shot takes the motors' power; None where none is fitted."""
+        """Return when the one-shot cuts the motors' power, ns; None without a one-shot."""
         if self._one_shot_ns is None or self.plan.enable_pin is None:
             return None
         edge_ns = levels.edges_ns.get(self.plan.enable_pin)
         return 0 if edge_ns is None else edge_ns + self._one_shot_ns
 
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
-        """What each output does."""
+        """Return the state of each output at a time."""
         ends_ns = self.power_ends_ns(levels)
         powered = ends_ns is None or now_ns < ends_ns
         read: dict[str, WiredOutput] = {}
@@ -117,7 +116,7 @@ class TwinWiring:
         return read
 
     def has_pulses(self, name: str, levels: Levels, now_ns: int) -> bool:
-        """Whether a servo or speed controller gets pulses, and has power."""
+        """Return whether a servo or speed controller has pulses and power."""
         ends_ns = self.power_ends_ns(levels)
         return (ends_ns is None or now_ns < ends_ns) and self._pulse(
             self._outputs[name], levels
@@ -135,17 +134,17 @@ class TwinWiring:
                 )
             case "phase_enable":
                 drive = self._duty(levels, whole(settings, "enable"))
-                # A phase that is high for a part of the time turns the motor back and forth.
+                # A phase that is high part of the time turns the motor back and forth.
                 direction = 1.0 - 2.0 * self._duty(levels, whole(settings, "phase"))
                 return self._motor(output, drive * direction)
             case "servo":
                 return self._servo(output, self._pulse(output, levels))
             case "esc":
                 return self._esc(output, self._pulse(output, levels))
-            case "dynamixel":  # It is on a bus, and no level of a pin says what it does.
+            case "dynamixel":  # On a bus: no level of a pin determines its state.
                 return WiredOutput(None, True)
             case driver:
-                raise RobotError(f"The twin does not know what a {driver!r} is wired to.")
+                raise RobotError(f"The twin does not support the output driver {driver!r}.")
 
     def _motor(self, output: _Output, drive: float) -> WiredOutput:
         duty = Duty(number(output.plan.settings, "start"), number(output.plan.settings, "full"))
@@ -201,7 +200,7 @@ def _points(plan: OutputPlan, *keys: str) -> tuple[float, ...]:
 
 
 def _between(us: float, low: float, middle: float, high: float) -> float:
-    """Value of a pulse: -1 at `low`, 0 at `middle`, 1 at `high`; the ends may be swapped."""
+    """Return the value of a pulse: -1 at `low`, 0 at `middle`, 1 at `high`; ends may be swapped."""
     end = high if (us - middle) * (high - middle) > 0 else low
     if end == middle:
         return 0.0

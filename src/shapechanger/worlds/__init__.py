@@ -1,4 +1,8 @@
-"""Places to drive in: courses laid out by a seed, how they look, and vehicles driving there."""
+"""Worlds: courses laid out from a seed, their look, and vehicles that drive on them.
+
+`course` and `layout` describe and lay out courses, `scene`, `paint` and `look` draw them, `lens`
+degrades pictures, `expert` drives, and `simulation` puts a vehicle on a course.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a camera on board, drawn without shadows, reflections and smoothed edges."""
+"""On-board camera: offscreen rendering without shadows, reflections and antialiasing."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLEC
 _MOST_GEOMS: Final = 2000
 
 
-# The process that draws, once one does: its forks would wait for ever for threads they have not.
+# Ids of the processes that have rendered. A fork of one would deadlock on threads that it lacks.
 _drawing: set[int] = set()
 
 
 class OnboardCamera:
-    """Draws what a camera of a model sees. Others may draw in the same process.
+    """Renders the view of a camera in a model.
 
-    Nothing is opened before the first picture, so that a process which only makes one, as that of
-    an `AsyncVectorEnv` does, can be forked.
+    The OpenGL context is opened for the first picture, so that a process that has only built a
+    camera, such as the parent of an `AsyncVectorEnv`, can be forked.
 
     Args:
         size: Width and height of the pictures in pixels.
 
     Raises:
-        RenderError: If there are no pictures of this size.
+        RenderError: If the width or the height is below 1.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -53,15 +53,20 @@ class OnboardCamera:
         self._option = mujoco.MjvOption()
 
     def look_through(self, model: mujoco.MjModel, camera: str) -> None:
-        """Draw this model from now on, by its camera of this name."""
+        """Select the model and the camera.
+
+        Args:
+            model: Compiled model; its offscreen buffer is resized.
+            camera: Name of the camera.
+        """
         self._wanted = model, camera
 
     def _open(self, model: mujoco.MjModel, camera: str) -> None:
-        """Get ready to draw a model."""
+        """Create the rendering context of a model."""
         if self._gl is None:
             if _drawing - {os.getpid()}:
                 raise RenderError(
-                    "This process was forked from one that draws, so it cannot: start it by "
+                    "A process that was forked after rendering cannot render: start it by "
                     "spawning, such as with gym.make_vec(..., vector_kwargs={'context': 'spawn'})."
                 )
             choose_gl()
@@ -82,16 +87,23 @@ class OnboardCamera:
         self._camera.fixedcamid = model.camera(camera).id
 
     def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """What it sees now, RGB, shape (height, width, 3), in an array of its own.
+        """Render a state.
+
+        Args:
+            model: The selected model.
+            data: Its state.
+
+        Returns:
+            RGB picture, shape (height, width, 3), in a new array.
 
         Raises:
-            RenderError: If no model was given to look at, or nothing can be drawn here.
+            RenderError: If no model was selected, or no OpenGL context can be opened.
         """
         if self._wanted is not None:
             self._open(*self._wanted)
             self._wanted = None
         if self._scene is None or self._context is None:
-            raise RenderError("The camera looks at nothing yet.")
+            raise RenderError("The camera has no model: call `look_through` first.")
         self._gl.make_current()
         mujoco.mjv_updateScene(
             model,
@@ -107,7 +119,7 @@ class OnboardCamera:
         return self._picture[::-1].copy()
 
     def close(self) -> None:
-        """Free the context. It looks at nothing then."""
+        """Free the OpenGL context and forget the model."""
         self._wanted = None
         if self._context is not None:
             self._gl.make_current()
@@ -122,25 +134,25 @@ def _free(gl: Any) -> None:
     gl.free()
 
 
-# What screws, a printed mount and a bump leave: estimates, no measurement.
+# Largest errors of a screwed, printed mount: estimates.
 _HEIGHT_M: Final = 0.015
 _SIDE_M: Final = 0.01
 _ANGLE_RAD: Final = math.radians(3.0)
 
-_LOWEST_M: Final = 0.01  # A lens is not in the floor.
-_FARTHEST_M: Final = 1.0  # A camera that is farther from its vehicle is not on it.
+_LOWEST_M: Final = 0.01  # Above the floor.
+_FARTHEST_M: Final = 1.0  # Still on the vehicle.
 
 
 @dataclass(frozen=True, slots=True)
 class CameraJitter:
-    """An error of a camera's pose.
+    """Error of a camera's pose.
 
     Attributes:
-        up_m: Above its place, m.
-        left_m: To the left of its place, m.
-        roll_rad: About the line of sight; to the right is positive.
-        pitch_rad: Down is positive.
-        yaw_rad: To the left is positive.
+        up_m: Offset upwards, m.
+        left_m: Offset to the left, m.
+        roll_rad: Rotation about the line of sight; positive to the right.
+        pitch_rad: Positive down.
+        yaw_rad: Positive to the left.
     """
 
     up_m: float = 0.0
@@ -151,27 +163,33 @@ class CameraJitter:
 
     @staticmethod
     def random(rng: np.random.Generator) -> CameraJitter:
-        """Each uniform: within 1.5 cm of its height, 1 cm of its side, 3 degrees of each angle."""
+        """Draw uniform errors of up to 1.5 cm in height, 1 cm to the side and 3 degrees."""
         up, left = rng.uniform(-1.0, 1.0, 2) * (_HEIGHT_M, _SIDE_M)
         roll, pitch, yaw = rng.uniform(-_ANGLE_RAD, _ANGLE_RAD, 3)
         return CameraJitter(float(up), float(left), float(roll), float(pitch), float(yaw))
 
 
 def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
-    """Move a camera of a model from where it is now.
+    """Add an error to the pose of a camera.
+
+    Args:
+        model: Compiled model to change.
+        camera: Name of the camera.
+        jitter: The error.
 
     Raises:
-        WorldError: If it is no longer on its vehicle, or in the floor, or a number is none.
+        WorldError: If the error is not finite, or moves the camera off its vehicle or into the
+            floor.
     """
     place = model.camera(camera)
     place.pos += (0.0, jitter.left_m, jitter.up_m)
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
     if not np.isfinite([*place.pos, *turns]).all():
-        raise WorldError(f"A camera is off its place by finite numbers, got {jitter}.")
+        raise WorldError(f"The error of a camera's pose must be finite, got {jitter}.")
     if place.pos[2] < _LOWEST_M or np.abs(place.pos).max() > _FARTHEST_M:
         where = ", ".join(f"{x:.3f}" for x in place.pos)
-        raise WorldError(f"The camera is outside the world: it would be at ({where}) m.")
-    # A camera of MuJoCo looks along -z of its own frame, with x to the right and y up.
+        raise WorldError(f"The camera would be off its vehicle or in the floor, at ({where}) m.")
+    # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
     turned = np.empty(4)
     for axis, angle in (
         ((0.0, 1.0, 0.0), jitter.yaw_rad),

@@ -1,4 +1,4 @@
-"""What a place to drive in consists of, as plain values: no simulator, no picture."""
+"""Courses as plain values, without simulator and pictures, and the vehicles' home worlds."""
 
 from __future__ import annotations
 
@@ -18,42 +18,46 @@ __all__ = [
     "TRAINING",
     "Course",
     "Lamp",
+    "Obstacle",
+    "ObstacleKind",
     "Surface",
-    "Thing",
-    "ThingKind",
     "Wall",
     "require_element",
 ]
 
 TRAINING: Final = range(0, 1_000_000)
-"""Seeds of the courses that vehicles learn on."""
+"""Seeds of the courses for training."""
 
 HELD_OUT: Final = range(1_000_000, 2_000_000)
-"""Seeds of the courses that they are judged on, and never learn on."""
+"""Seeds of the courses for evaluation; nothing is trained on them."""
+
+HOME: Final[Mapping[str, str]] = MappingProxyType(
+    {"boat": "harbour", "car": "corridor", "tank": "corridor", "truck": "yard"}
+)
+"""Default world of each vehicle."""
 
 Surface = Literal[
     "plaster", "door", "window", "brick", "board", "glass", "hedge", "fence", "quay", "shed", "rock"
 ]
-"""What the side of a wall that can be seen is made of."""
+"""Material of the visible side of a wall."""
 
-ThingKind = Literal[
+ObstacleKind = Literal[
     "box", "bin", "bench", "plant", "cone", "post", "cabinet", "crate", "tree", "buoy", "dinghy"
 ]
-"""What stands, or floats, in the way."""
+"""Kind of an obstacle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wall:
-    """An upright rectangle that nothing passes.
+    """An upright rectangle.
 
-    Who looks from `start` to `end` has the free space at the left hand; only that side is ever
-    seen.
+    Seen from `start` towards `end`, the lane is on the left; only that side is ever visible.
 
     Attributes:
-        start: x and y of its beginning, m.
+        start: x and y of its start, m.
         end: x and y of its end, m.
-        height: Above the ground, m.
-        surface: What it is made of.
+        height: Height above the ground, m.
+        surface: Material.
     """
 
     start: tuple[float, float]
@@ -63,20 +67,20 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class Thing:
-    """Something that stands in the way: an upright box, or a cylinder where it is round.
+class Obstacle:
+    """An upright box or cylinder in the lane.
 
     Attributes:
-        kind: What it is.
-        x: Of its middle, m.
-        y: Of its middle, m.
+        kind: Kind, which also decides whether it is a box or a cylinder.
+        x: Position of its middle, m.
+        y: Position of its middle, m.
         yaw: Angle of its length from the x axis, rad, counter-clockwise.
-        length: m; of a round thing the diameter.
-        width: m; of a round thing the diameter.
-        height: Above the ground, m.
+        length: Length, or diameter of a cylinder, m.
+        width: Width, or diameter of a cylinder, m.
+        height: Height above the ground, m.
     """
 
-    kind: ThingKind
+    kind: ObstacleKind
     x: float
     y: float
     yaw: float
@@ -92,14 +96,14 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """A light under the ceiling, or a patch of sun: bright itself, and a gloss on the ground below.
+    """A rectangular light under the ceiling, or a patch of sun on the ground.
 
     Attributes:
-        x: Of its middle, m.
-        y: Of its middle, m.
+        x: Position of its middle, m.
+        y: Position of its middle, m.
         yaw: Angle of its length from the x axis, rad.
-        length: m.
-        width: m.
+        length: Length, m.
+        width: Width, m.
     """
 
     x: float
@@ -111,19 +115,19 @@ class Lamp:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A closed course: a lane between walls, with things in it, that can be driven round for ever.
+    """A closed lane between walls, with obstacles in it.
 
     Attributes:
-        world: Kind of place: "corridor", "yard" or "harbour".
-        seed: What it follows from, with `world`.
-        route: (N, 2) middle of the lane, m: a closed line whose points are `spacing` apart, in the
-            direction of driving. The last point is one `spacing` before the first.
-        half_width: (N,) distance from the middle to the walls on either side, m, things aside.
-        walls: What bounds it.
-        things: What stands in it. Past each there is a gap of at least `gap_m`.
-        lamps: Where light comes from.
+        world: Kind of course: "corridor", "yard" or "harbour".
+        seed: Seed; world and seed determine the course.
+        route: Middle of the lane in driving direction, m, (N, 2): a closed line of points that are
+            `spacing` apart. The last point is one `spacing` before the first.
+        half_width: Distance from the route to the nearest wall, without obstacles, m, (N,).
+        walls: Walls on both sides.
+        obstacles: Obstacles in the lane; each leaves a gap of at least `gap_m`.
+        lamps: Lights.
         ceiling_m: Height of the ceiling; 0 under the open sky.
-        gap_m: Narrowest way through, m, between things and walls.
+        gap_m: Width of the narrowest passage between obstacles and walls, m.
         current_mps: Flow of the water, x and y, m/s; 0 on land.
     """
 
@@ -132,7 +136,7 @@ class Course:
     route: NDArray[np.float64]
     half_width: NDArray[np.float64]
     walls: tuple[Wall, ...]
-    things: tuple[Thing, ...]
+    obstacles: tuple[Obstacle, ...]
     lamps: tuple[Lamp, ...]
     ceiling_m: float
     gap_m: float
@@ -145,28 +149,22 @@ class Course:
 
     @property
     def length(self) -> float:
-        """Once round, m."""
+        """Length of the route, m."""
         steps = np.diff(self.route, axis=0, append=self.route[:1])
         return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-HOME: Final[Mapping[str, str]] = MappingProxyType(
-    {"boat": "harbour", "car": "corridor", "tank": "corridor", "truck": "yard"}
-)
-"""Kind of place by the name of the vehicle."""
-
-
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
-    """Refuse a place of the wrong element: who floats needs water, and nobody else drives on it.
+    """Check that a world has water if, and only if, the vehicle floats.
 
     Args:
         vehicle: Name of the vehicle.
         floats: Whether it floats.
-        world: Kind of place.
+        world: Kind of course.
 
     Raises:
         WorldError: If the vehicle cannot drive there.
     """
     if floats != (world == HOME["boat"]):
-        what = "floats" if floats else "does not float"
-        raise WorldError(f"A {vehicle} {what}: it cannot drive in a {world}.")
+        reason = "floats" if floats else "does not float"
+        raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")

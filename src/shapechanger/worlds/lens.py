@@ -1,7 +1,7 @@
-"""What a camera makes of a picture: other light and a worse lens, each as a pure function.
+"""Camera faults: pure functions on pictures, for bad light and a bad lens.
 
-They shift pictures only, never the world: a policy that drives well through all of them does not
-cling to how its training looked. All take and give pictures of shape (H, W, 3), uint8.
+They change pictures only, never the world, to test how well policies generalize to other pictures.
+All take and return pictures of shape (H, W, 3), uint8.
 """
 
 from __future__ import annotations
@@ -16,35 +16,35 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["LENSES", "Lens", "Picture", "blur", "dirt", "expose", "glare", "lens", "night"]
+__all__ = ["LENSES", "Lens", "Picture", "blur", "dirt", "find_lens", "glare", "night"]
 
 Picture = NDArray[np.uint8]
 
 Lens = Callable[[Picture, int], Picture]
-"""From a picture and a seed, an int >= 0 that stays the same for an episode, to a picture."""
+"""Function from a picture and a seed, >= 0 and constant within an episode, to a picture."""
 
-# Light that is left at night: a quarter, of which dark parts keep less (a gamma), and more blue.
+# Share of the light that is left at night in red, green and blue, and a gamma that darkens shadows.
 _NIGHT_SHARE: Final = (0.24, 0.25, 0.34)
 _NIGHT_GAMMA: Final = 1.25
-# Standard deviation of a small sensor's noise when it is turned up at night, of 255.
+# Standard deviation of a small sensor's noise at night, of 255 levels.
 _NIGHT_NOISE: Final = 5.0
-# Glare adds up to this, of 255, at its middle, and a veil over all.
+# Levels that glare adds, of 255, in its middle, and everywhere as a veil.
 _GLARE_PEAK: Final = 230.0
 _GLARE_VEIL: Final = 28.0
-# Standard deviation of the blur as a share of the width: 2 pixels of 160.
+# Standard deviation of the blur over the width: 2 pixels of 160.
 _BLUR: Final = 0.0125
-# Spots on a dirty lens, their radius as a share of the width, and how much light they take.
+# Number of spots on a dirty lens, their radius over the width, and the share of light they absorb.
 _SPOTS: Final = (8, 14)
 _SPOT_RADIUS: Final = (0.02, 0.085)
 _SPOT_DEPTH: Final = (0.45, 0.85)
 _DIRT: Final = np.array([52.0, 46.0, 34.0], np.float32)
-# Noise is cut from one long strip, because drawing it anew takes longer than all the rest.
+# Noise is cut from one long strip, because drawing it for each picture would dominate the time.
 _STRIP: Final = 1 << 19
 _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """A quarter of the light, bluish, with a noise of 5 levels that is another in each picture."""
+    """A quarter of the light, bluish, with sensor noise of 5 levels."""
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -53,16 +53,16 @@ def night(picture: Picture, seed: int) -> Picture:
 
 
 def glare(picture: Picture, seed: int) -> Picture:
-    """A light that shines into the lens from somewhere above the middle: up to 230 levels more."""
+    """Light shining into the lens from the upper half of the picture: up to 230 levels more."""
     added = _glare(seed, *picture.shape[:2])
     return _bytes(picture + added)
 
 
 def blur(picture: Picture, seed: int) -> Picture:
-    """Out of focus by 1.25 % of the width; the seed changes nothing."""
+    """Defocus by 1.25 % of the width; the seed has no effect."""
     del seed
     variance = (_BLUR * picture.shape[1]) ** 2
-    # Two averages over w pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
+    # Two box filters over w = 2 r + 1 pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
     reach = max(1, round(0.5 * (np.sqrt(6.0 * variance + 1.0) - 1.0)))
     result = picture.astype(np.float32)
     for axis in (0, 0, 1, 1):
@@ -72,38 +72,22 @@ def blur(picture: Picture, seed: int) -> Picture:
 
 
 def dirt(picture: Picture, seed: int) -> Picture:
-    """8 to 14 spots of mud that take 45 to 85 % of the light; a seed always has the same."""
+    """8 to 14 spots of mud that absorb 45 to 85 % of the light, at places given by the seed."""
     keeps, mud = _dirt(seed, *picture.shape[:2])
     return _bytes(picture * keeps + mud)
-
-
-def expose(picture: Picture, gain: float, noise: float, rng: np.random.Generator) -> Picture:
-    """The picture with its light multiplied and the sensor's noise added.
-
-    Args:
-        picture: What the lens lets through.
-        gain: Factor on all levels, > 0; 1 changes nothing.
-        noise: Standard deviation, of 255 levels, >= 0.
-        rng: What the noise follows from.
-    """
-    result = picture * np.float32(gain)
-    if noise > 0.0:
-        start = int(rng.integers(_STRIP - picture.size))
-        result += np.float32(noise) * _strip()[start : start + picture.size].reshape(picture.shape)
-    return _bytes(result)
 
 
 LENSES: Final[Mapping[str, Lens]] = MappingProxyType(
     {"night": night, "glare": glare, "blur": blur, "dirt": dirt}
 )
-"""The shifts of a picture by name."""
+"""Camera faults by name."""
 
 
-def lens(name: str) -> Lens:
-    """The shift of that name.
+def find_lens(name: str) -> Lens:
+    """Find a camera fault by name.
 
     Raises:
-        UnknownName: If there is none.
+        UnknownName: If no camera fault has this name.
     """
     try:
         return LENSES[name]
@@ -112,7 +96,7 @@ def lens(name: str) -> Lens:
 
 
 def _bytes(levels: NDArray[np.float32]) -> Picture:
-    """Levels of 0 to 255, rounded, with what is outside cut off; `levels` is used up."""
+    """Levels rounded and clipped to 0 to 255; `levels` is overwritten."""
     levels += 0.5
     return np.clip(levels, 0.0, 255.0, out=levels).astype(np.uint8)
 
@@ -129,15 +113,15 @@ def _strip() -> NDArray[np.float32]:
 
 
 def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
-    """Noise of the picture's shape that follows from the seed and the picture, deviation 1."""
-    # Any two pictures of a drive differ, so their sums nearly always do.
+    """Standard normal noise of the picture's shape, a function of the seed and the picture."""
+    # Different pictures nearly always have different sums.
     mixed = (int(picture.sum(dtype=np.int64)) * 2_654_435_761 + seed * 40_503) & 0xFFFF_FFFF
     start = mixed % (_STRIP - picture.size)
     return _strip()[start : start + picture.size].reshape(picture.shape)
 
 
 def _summed(picture: NDArray[np.float32], reach: int, axis: int) -> NDArray[np.float32]:
-    """Each pixel as the sum of those up to `reach` away along an axis; the edge goes on outside."""
+    """Sum over the pixels up to `reach` away along an axis, with edge pixels repeated outside."""
     pads = [(0, 0)] * picture.ndim
     pads[axis] = (reach, reach)
     padded = np.pad(picture, pads, mode="edge")
@@ -150,14 +134,14 @@ def _summed(picture: NDArray[np.float32], reach: int, axis: int) -> NDArray[np.f
 
 @functools.lru_cache(_KEPT)
 def _glare(seed: int, height: int, width: int) -> NDArray[np.float32]:
-    """What the glare of a seed adds, (H, W, 3)."""
+    """Levels that the glare of a seed adds, (H, W, 3)."""
     rng = np.random.default_rng([seed, 1])
     x, y = rng.uniform(0.15, 0.85) * width, rng.uniform(0.05, 0.4) * height
     rows, columns = np.mgrid[:height, :width].astype(np.float32)
     away = np.hypot(columns - x, rows - y) / width
     spot = np.exp(-((away / rng.uniform(0.09, 0.16)) ** 2))
     halo = np.exp(-away / 0.3)
-    # A streak along the rows, as a smeared window or a cheap lens draws it.
+    # A horizontal streak, as from a smeared or cheap lens.
     streak = np.exp(-(((rows - y) / (0.015 * width)) ** 2)) * halo
     light = _GLARE_PEAK * np.minimum(1.0, spot + 0.45 * halo + 0.3 * streak) + _GLARE_VEIL
     return (light[..., None] * np.array([1.0, 0.97, 0.86])).astype(np.float32)
@@ -165,7 +149,7 @@ def _glare(seed: int, height: int, width: int) -> NDArray[np.float32]:
 
 @functools.lru_cache(_KEPT)
 def _dirt(seed: int, height: int, width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What the dirt of a seed lets through (H, W, 1), and what it shows instead (H, W, 3)."""
+    """Transmittance of a seed's dirt, (H, W, 1), and the light it adds, (H, W, 3)."""
     rng = np.random.default_rng([seed, 2])
     rows, columns = np.mgrid[:height, :width].astype(np.float32)
     keeps = np.ones((height, width), np.float32)
@@ -173,7 +157,7 @@ def _dirt(seed: int, height: int, width: int) -> tuple[NDArray[np.float32], NDAr
         x, y = rng.uniform(0.0, width), rng.uniform(0.0, height)
         radius, depth = rng.uniform(*_SPOT_RADIUS) * width, rng.uniform(*_SPOT_DEPTH)
         across, down = (columns - x) / rng.uniform(0.8, 1.3), rows - y
-        # What sits on the lens is out of focus: it has no edge.
+        # Dirt on the lens is out of focus, so it has soft edges.
         soft = np.clip(1.5 - np.hypot(across, down) / radius, 0.0, 1.0)
         keeps *= 1.0 - np.float32(depth) * soft
     keeps = keeps[..., None]

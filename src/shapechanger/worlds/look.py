@@ -1,4 +1,4 @@
-"""How a course looks to a camera: its light and its colours, as plain values."""
+"""Light and colours of a course, as plain values."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ Colour = tuple[float, float, float]
 """Red, green and blue, each a share from 0 to 1."""
 
 VARIANTS: Final = 12
-"""Sets of textures to draw from: few enough that a process keeps them all once painted."""
+"""Number of texture sets that looks are drawn from; few enough to cache them all."""
 
-# What a full `warmth` leaves of red, green and blue: hardly any blue. The mean colour of frames
-# that a car's camera took in a lit corridor at night was 76, 67, 14.
+# Red, green and blue at a `warmth` of 1. The mean colour of a car's camera in a lit corridor at
+# night was 76, 67, 14.
 _WARM: Final = np.array([1.0, 0.92, 0.2])
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """The light and the colours of a course.
+    """Light and colours of a course.
 
     Attributes:
-        light: How bright it is, from 0 (black) to 1 (broad day, or all lamps on).
-        warmth: From 0 (white light) to 1 (the yellow-green of old lamps).
+        light: Brightness, from 0 (black) to 1 (daylight, or all lamps on).
+        warmth: Colour of the light, from 0 (white) to 1 (the yellow-green of old lamps).
         contrast: From 0 (the same light everywhere) to 1 (dark between the lamps).
-        gloss: Share of what the ground, or the water, mirrors: from 0 to 0.9.
-        wall: What the walls' own colours are multiplied by.
-        ground: What the ground's own colours are multiplied by.
-        texture_seed: Which textures: stains, grain, the hue of each door; >= 0.
+        gloss: Reflectance of the ground or the water, 0 to 0.9.
+        wall: Factors on the colours of the walls.
+        ground: Factors on the colours of the ground.
+        texture_seed: Seed of the textures, >= 0.
     """
 
     light: float = 0.8
@@ -48,10 +48,10 @@ class Look:
 
     @staticmethod
     def of(world: str) -> Look:
-        """The usual look of a world.
+        """Usual look of a world.
 
         Raises:
-            UnknownName: If there is no such world.
+            UnknownName: If the world is unknown.
         """
         try:
             return LOOKS[world]
@@ -60,14 +60,18 @@ class Look:
 
     @staticmethod
     def random(world: str, rng: np.random.Generator) -> Look:
-        """A look drawn around the usual one: this is the domain randomization of pictures.
+        """Domain randomization of the look, around that of a world.
 
-        Each is uniform: `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3,
+        All are uniform: `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3,
         `gloss` x 0.4 to 1.6, each channel of `wall` and `ground` x 0.75 to 1.0, and one of
-        `VARIANTS` sets of textures.
+        `VARIANTS` texture sets.
+
+        Args:
+            world: Kind of course.
+            rng: Random generator.
 
         Raises:
-            UnknownName: If there is no such world.
+            UnknownName: If the world is unknown.
         """
         usual = Look.of(world)
 
@@ -86,7 +90,7 @@ class Look:
         )
 
     def tone(self, own: Colour = (1.0, 1.0, 1.0)) -> Colour:
-        """What is left of a colour in this light; each channel is from 0 to 1."""
+        """A colour in this light, each channel from 0 to 1."""
         tinted = 1.0 - self.warmth * (1.0 - _WARM)
         red, green, blue = (float(x) for x in np.clip(self.light * tinted * own, 0.0, 1.0))
         return red, green, blue
@@ -99,4 +103,4 @@ LOOKS: Final[Mapping[str, Look]] = MappingProxyType(
         "harbour": Look(light=0.9, warmth=0.05, contrast=0.3, gloss=0.5),
     }
 )
-"""The usual look of each world."""
+"""Usual look of each world."""

@@ -1,4 +1,4 @@
-"""Textures made of numbers: no picture is stored or copied from anywhere."""
+"""Procedural textures: pictures of shape (H, W, 3), 0 to 1, upright, drawn from a seed."""
 
 from __future__ import annotations
 
@@ -13,47 +13,24 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
 
-__all__ = [
-    "CELLS",
-    "PAINTERS",
-    "ROWS",
-    "Field",
-    "asphalt",
-    "blend",
-    "board",
-    "brick",
-    "ceiling",
-    "clouds",
-    "door",
-    "fence",
-    "floor",
-    "glass",
-    "grain",
-    "grass",
-    "hedge",
-    "panel",
-    "plaster",
-    "quay",
-    "rock",
-    "shed",
-    "sky",
-    "stuffs",
-    "texture",
-    "water",
-    "window",
-]
+__all__ = ["CELLS", "PAINTERS", "ROWS", "clouds", "texture"]
 
 Field = NDArray[np.floating[Any]]
-"""A picture (H, W, 3) or one of its channels (H, W); single precision where it is large."""
+"""Picture, (H, W, 3), or one channel, (H, W); large ones have single precision."""
 
 
 def clouds(
     rng: np.random.Generator, height: int, width: int, rows: int, columns: int, octaves: int = 3
 ) -> Field:
-    """Soft random patches, shape (height, width), mean 0, standard deviation 1.
+    """Soft random patches with mean 0 and standard deviation 1, which tile seamlessly.
 
-    It repeats without a seam in both directions. `rows` and `columns` are how many patches fit
-    into it; each further octave has twice as many, half as strong.
+    Args:
+        rng: Random generator.
+        height: Height, pixels.
+        width: Width, pixels.
+        rows: Number of patches from top to bottom.
+        columns: Number of patches from left to right.
+        octaves: Number of layers; each has twice as many patches as the last, half as strong.
     """
     total = np.zeros((height, width), np.float32)
     for octave in range(octaves):
@@ -64,18 +41,18 @@ def clouds(
 
 
 def grain(rng: np.random.Generator, height: int, width: int) -> Field:
-    """Each pixel on its own, shape (height, width), mean 0, standard deviation 1."""
+    """White noise, (height, width), with mean 0 and standard deviation 1."""
     return rng.standard_normal((height, width), np.float32)
 
 
 def blend(ground: Field, colour: tuple[float, float, float], share: Field | float) -> Field:
-    """`ground` (H, W, 3) with `share` (H, W), from 0 to 1, of a colour painted over it."""
+    """Paint a colour over `ground`, (H, W, 3), with the opacity `share`, (H, W), 0 to 1."""
     over = np.asarray(share, np.float32)[..., None]
     return ground + over * (np.asarray(colour, np.float32) - ground)
 
 
 def _stretch(knots: Field, size: int) -> Field:
-    """Columns of `knots` (k, n) drawn out to (size, n), smoothly and round the edge."""
+    """Columns of `knots`, (k, n), interpolated smoothly and periodically to (size, n)."""
     count = len(knots)
     place = np.arange(size, dtype=np.float32) * np.float32(count / size)
     below = place.astype(np.intp)
@@ -86,7 +63,7 @@ def _stretch(knots: Field, size: int) -> Field:
 
 _SIZE: Final = 256
 _TALL: Final = 512
-# Height of what is painted on a wall's texture from the floor up, as a share of the wall's 2.4 m.
+# Height of a skirting board over the height of a wall, 2.4 m.
 _SKIRTING: Final = 0.05
 _DARK: Final = (0.24, 0.22, 0.16)
 _FRAME: Final = (0.24, 0.22, 0.19)
@@ -98,13 +75,13 @@ def _plain(colour: tuple[float, float, float], height: int, width: int) -> Field
 
 
 def plaster(rng: np.random.Generator) -> Field:
-    """A painted wall, 2.4 m high, with a dark skirting board; sockets and a notice on some."""
+    """Painted wall, 2.4 m high, with a dark skirting board, and sometimes a socket or a notice."""
     height, width = _SIZE, _SIZE
     hue = np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3)
     image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
     image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
     up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
-    image *= 0.86 + 0.14 * up  # Brighter towards the lamps.
+    image *= 0.86 + 0.14 * up  # Brighter near the lamps.
     if rng.random() < 0.7:
         x = int(rng.integers(10, width - 20))
         image[int(height * 0.84) : int(height * 0.88), x : x + 5] *= 0.62
@@ -122,7 +99,7 @@ def plaster(rng: np.random.Generator) -> Field:
 
 
 def panel(rng: np.random.Generator) -> Field:
-    """A wall clad in orange wood, with the skirting board of the others."""
+    """Wall with orange wooden panels and a skirting board."""
     image = plaster(rng) * np.asarray((0.92, 0.62, 0.40), np.float32)
     image *= 1.0 + 0.04 * clouds(rng, _SIZE, _SIZE, 2, 40, 2)[..., None]
     image[:, ::64] *= 0.8
@@ -130,7 +107,7 @@ def panel(rng: np.random.Generator) -> Field:
 
 
 def door(rng: np.random.Generator) -> Field:
-    """A wooden door in its frame, 2.1 m high, with a handle and a kick plate or a small window."""
+    """Wooden door in its frame, 2.1 m high, with a handle, a kick plate or a small window."""
     height, width = _TALL, _SIZE
     hue = np.array([0.46, 0.26, 0.12]) * rng.uniform(0.75, 1.25) + rng.uniform(-0.04, 0.04, 3)
     image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
@@ -157,7 +134,7 @@ def door(rng: np.random.Generator) -> Field:
 
 
 def window(rng: np.random.Generator) -> Field:
-    """Tall panes with the night behind them, and what little they mirror."""
+    """Tall panes at night with faint reflections."""
     height, width = _SIZE, _SIZE
     image = _plain((0.035, 0.04, 0.04), height, width)
     glint = np.clip(clouds(rng, height, width, 6, 4), 0.0, 3.0)
@@ -175,7 +152,7 @@ def window(rng: np.random.Generator) -> Field:
 
 
 def brick(rng: np.random.Generator) -> Field:
-    """Courses of red brick, 12 of them, each half a brick further on than the one below."""
+    """Courses of red brick, each offset by half a brick."""
     height, width, rows, columns = _SIZE, _SIZE, 24, 5
     y = np.arange(height)[:, None] * rows / height
     x = np.arange(width)[None, :] * columns / width + 0.5 * (y.astype(int) % 2)
@@ -188,7 +165,7 @@ def brick(rng: np.random.Generator) -> Field:
 
 
 def board(rng: np.random.Generator) -> Field:
-    """A whiteboard on a painted wall, with something left on it."""
+    """Whiteboard with writing on a painted wall."""
     image, height, width = plaster(rng), _SIZE, _SIZE
     top, bottom = int(0.14 * height), int(0.62 * height)
     image[top - 3 : bottom + 3, 12:-12] = np.asarray(_STEEL, np.float32) * 0.7
@@ -201,7 +178,7 @@ def board(rng: np.random.Generator) -> Field:
 
 
 def glass(rng: np.random.Generator) -> Field:
-    """A partition of glass in steel: dim, a little green, brighter above."""
+    """Glass partition in a steel frame: dim, slightly green, brighter above."""
     height, width = _SIZE, _SIZE
     image = _plain((0.30, 0.36, 0.32), height, width)
     up = np.linspace(1.3, 0.6, height, dtype=np.float32)[:, None, None]
@@ -211,7 +188,7 @@ def glass(rng: np.random.Generator) -> Field:
 
 
 def floor(rng: np.random.Generator) -> Field:
-    """Polished concrete, 3 m wide: blotches, specks and a few scratches."""
+    """Polished concrete, 3 m wide, with blotches and specks."""
     height, width = _TALL, _TALL
     hue = np.array([0.56, 0.54, 0.42]) + rng.uniform(-0.04, 0.04, 3)
     image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
@@ -222,7 +199,7 @@ def floor(rng: np.random.Generator) -> Field:
 
 
 def ceiling(rng: np.random.Generator) -> Field:
-    """Pale tiles in a grid, 0.6 m each."""
+    """Pale ceiling tiles, 0.6 m wide."""
     height, width = _SIZE, _SIZE
     image = _plain((0.60, 0.58, 0.46), height, width)
     image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
@@ -235,7 +212,7 @@ _GROUND: Final = 512
 
 
 def hedge(rng: np.random.Generator) -> Field:
-    """Leaves, darker below and between the twigs."""
+    """Hedge, darker below and between the twigs."""
     leaves = clouds(rng, _SIZE, _SIZE, 24, 24, 3)
     image = np.asarray((0.20, 0.34, 0.10), np.float32) * (1.0 + 0.32 * leaves[..., None])
     image *= 1.0 + 0.18 * clouds(rng, _SIZE, _SIZE, 3, 4, 2)[..., None]
@@ -245,7 +222,7 @@ def hedge(rng: np.random.Generator) -> Field:
 
 
 def fence(rng: np.random.Generator) -> Field:
-    """Upright planks with gaps, eight of them, and a rail behind."""
+    """Eight upright planks with gaps, and rails behind them."""
     planks = 8
     wide = _SIZE // planks
     shade = np.repeat(rng.uniform(0.75, 1.15, planks).astype(np.float32), wide)
@@ -259,7 +236,7 @@ def fence(rng: np.random.Generator) -> Field:
 
 
 def shed(rng: np.random.Generator) -> Field:
-    """Boards that lie flat, painted, with a plinth."""
+    """Painted horizontal boards above a plinth."""
     hue = np.array([(0.50, 0.16, 0.11), (0.25, 0.34, 0.42), (0.42, 0.40, 0.33)][rng.integers(3)])
     image = np.tile(hue.astype(np.float32), (_SIZE, _SIZE, 1))
     image *= 1.0 + 0.07 * clouds(rng, _SIZE, _SIZE, 40, 3, 2)[..., None]
@@ -269,7 +246,7 @@ def shed(rng: np.random.Generator) -> Field:
 
 
 def quay(rng: np.random.Generator) -> Field:
-    """Blocks of stone, pale above and green and wet below."""
+    """Stone blocks, pale above, green and wet below."""
     rows, columns = 4, 3
     y = np.arange(_SIZE)[:, None] * rows / _SIZE
     x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
@@ -293,7 +270,7 @@ def rock(rng: np.random.Generator) -> Field:
 
 
 def asphalt(rng: np.random.Generator) -> Field:
-    """A worn lane, 3 m wide: stones, patches, leaves blown over it."""
+    """Worn asphalt, 3 m wide, with stones, cracks and leaves."""
     image = np.tile(np.asarray((0.40, 0.39, 0.37), np.float32), (_GROUND, _GROUND, 1))
     image *= 1.0 + 0.11 * clouds(rng, _GROUND, _GROUND, 4, 4, 4)[..., None]
     image *= 1.0 + 0.13 * grain(rng, _GROUND, _GROUND)[..., None]
@@ -312,7 +289,7 @@ def grass(rng: np.random.Generator) -> Field:
 
 
 def water(rng: np.random.Generator) -> Field:
-    """Green water, 4 m wide, with ripples that lie across."""
+    """Green water, 4 m wide, with ripples."""
     ripples = clouds(rng, _GROUND, _GROUND, 24, 10, 3)
     image = np.asarray((0.20, 0.32, 0.33), np.float32) * (1.0 + 0.20 * ripples[..., None])
     image *= 1.0 + 0.10 * clouds(rng, _GROUND, _GROUND, 3, 3, 2)[..., None]
@@ -322,9 +299,8 @@ def water(rng: np.random.Generator) -> Field:
 _SKY_SIZE: Final = 64
 _ZENITH: Final = np.array([0.36, 0.55, 0.82], np.float32)
 _HORIZON: Final = np.array([0.80, 0.86, 0.90], np.float32)
-# Where the middle of each face is, in the order in which MuJoCo takes them, and where its columns
-# and its rows, from the last to the first, run to. Found by drawing: as seen from within, columns
-# run to the left.
+# Faces of the skybox in MuJoCo's order: direction of the middle, of the columns, and of the rows
+# from the last to the first. Determined by rendering: seen from within, columns run to the left.
 _FACES: Final = (
     ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
@@ -336,7 +312,7 @@ _FACES: Final = (
 
 
 def sky(rng: np.random.Generator) -> Field:
-    """Shape (6 * size, size, 3), 0 to 1: blue above, pale at the horizon, mirrored below it."""
+    """Sky as six faces, (6 * size, size, 3): blue above, pale at the horizon, mirrored below it."""
     across = (np.arange(_SKY_SIZE, dtype=np.float32) + 0.5) * (2.0 / _SKY_SIZE) - 1.0
     field = clouds(rng, 256, 256, 4, 4, 5)
     cover = rng.uniform(-0.3, 0.9)
@@ -344,9 +320,9 @@ def sky(rng: np.random.Generator) -> Field:
     for ahead, right, up in np.asarray(_FACES, np.float32):
         rays = ahead + across[None, :, None] * right - across[:, None, None] * up
         rays /= np.linalg.norm(rays, axis=2, keepdims=True)
-        height = np.abs(rays[..., 2])  # What is below the horizon is the image in the water.
+        height = np.abs(rays[..., 2])  # The mirror image in water is below the horizon.
         image = _HORIZON + (_ZENITH - _HORIZON) * np.sqrt(height)[..., None]
-        # A layer of clouds, seen from below; 40 pixels of the field are its height.
+        # A layer of clouds seen from below; its height is 40 pixels of the field.
         place = rays[..., :2] / np.maximum(height, 0.08)[..., None] * 40.0
         column, row = (np.mod(place[..., i], 256).astype(np.intp) for i in (0, 1))
         share = np.clip(field[row, column] * 0.5 + cover, 0.0, 1.0)
@@ -356,10 +332,10 @@ def sky(rng: np.random.Generator) -> Field:
 
 
 ROWS: Final = 4
-"""Cells in a row of the picture, and rows."""
+"""Number of cells in a row of the obstacles' texture, and of rows."""
 
 _CELL: Final = 64
-# The colour of each stuff.
+# Colour of each cell.
 _COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
     {
         "wood": (0.52, 0.34, 0.18),
@@ -382,11 +358,11 @@ _COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
 )
 
 CELLS: Final[Mapping[str, int]] = MappingProxyType({name: i for i, name in enumerate(_COLOURS)})
-"""Where each stuff is: row by row from the top left."""
+"""Index of each cell in the obstacles' texture, row by row from the top left."""
 
 
 def stuffs(rng: np.random.Generator) -> Field:
-    """All stuffs in one picture, shape (256, 256, 3), 0 to 1."""
+    """Texture of all obstacles, with one cell for each material, (256, 256, 3)."""
     image = np.zeros((ROWS * _CELL, ROWS * _CELL, 3), np.float32)
     for name, colour in _COLOURS.items():
         row, column = divmod(CELLS[name], ROWS)
@@ -396,7 +372,7 @@ def stuffs(rng: np.random.Generator) -> Field:
 
 
 def _cell(name: str, colour: Field, rng: np.random.Generator) -> Field:
-    """One stuff, shape (64, 64, 3)."""
+    """One cell, (64, 64, 3)."""
     cell = np.tile(colour, (_CELL, _CELL, 1))
     if name == "lamp":
         return cell
@@ -455,18 +431,25 @@ PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingP
         "things": stuffs,
     }
 )
-"""What paints each texture."""
+"""Painters of the textures by name."""
 
-# A set of textures has at most ten of these, and there are a dozen sets per world to draw from.
+# Size of the cache: a texture set has at most ten textures, and each world a dozen sets.
 _KEPT: Final = 400
 
 
 @functools.lru_cache(_KEPT)
 def texture(name: str, seed: int) -> NDArray[np.uint8]:
-    """A texture, shape (H, W, 3), upright: the first row is the top. It cannot be written to.
+    """Paint a texture, or take it from the cache.
+
+    Args:
+        name: One of `PAINTERS`.
+        seed: Seed, >= 0.
+
+    Returns:
+        Texture, uint8, (H, W, 3), with the top row first; it is read-only.
 
     Raises:
-        UnknownName: If nothing paints `name`.
+        UnknownName: If the texture is unknown.
     """
     if name not in PAINTERS:
         raise UnknownName("texture", name, PAINTERS)

@@ -1,4 +1,4 @@
-"""A vehicle on a course, in MuJoCo."""
+"""A vehicle on a course, simulated in MuJoCo."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles import SIM_DT, add_vehicle, vehicle_model
+from shapechanger.bodies.vehicles import SIM_DT, PlanarPose, add_vehicle, vehicle_model
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, OnboardCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
@@ -18,84 +18,25 @@ from shapechanger.worlds.expert.line import CourseProgress
 from shapechanger.worlds.expert.path import CoursePath, plan_path_for
 from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.layout import lay_out, start_pose
-from shapechanger.worlds.lens import lens
+from shapechanger.worlds.lens import find_lens
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene import add_course
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
-__all__ = ["MujocoWorld", "Touch"]
+__all__ = ["APART_S", "BUMPER_SPREAD", "ContactTracker", "MujocoWorld"]
 
 BUMPER_SPREAD: Final = math.radians(60.0)
-"""How far to each side the bumper at the front reaches, seen from the middle of the vehicle."""
+"""Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
 
 APART_S: Final = 0.5
-"""A touch within so many seconds after the last one belongs to the same collision."""
-
-
-class Touch:
-    """Follows what a vehicle touches.
-
-    Args:
-        model: The model; the vehicle's geoms are named "vehicle/...", walls and things
-            "world/wall/..." and "world/thing/...".
-
-    Attributes:
-        collisions: How many times it ran into something since `reset`.
-        bumped: Whether something presses its front now.
-        touches: Whether it touches anything now.
-    """
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        names = [model.geom(i).name for i in range(model.ngeom)]
-        self._hull = np.array([name.startswith("vehicle/") for name in names])
-        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what was touched."""
-        self.collisions = 0
-        self.let_go()
-
-    def let_go(self) -> None:
-        """The vehicle was lifted off whatever it touched: what comes next is another collision."""
-        self.bumped = self.touches = False
-        self._since_s = math.inf
-
-    def follow(self, data: mujoco.MjData, pose: Pose, dt_s: float) -> None:
-        """Take in the contacts after a step of the simulation.
-
-        Args:
-            data: With the contacts.
-            pose: Of the vehicle.
-            dt_s: How long the step was, s.
-        """
-        self._since_s += dt_s
-        self.bumped = self.touches = False
-        if data.ncon == 0:
-            return
-        pairs = data.contact.geom
-        if not self._solid[pairs].any():
-            return  # As nearly always: wheels are on the ground, and nothing else is touched.
-        first, second = pairs[:, 0], pairs[:, 1]
-        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
-        hits &= data.contact.dist <= 0.0
-        if not hits.any():
-            return
-        self.touches = True
-        if self._since_s > APART_S:
-            self.collisions += 1
-        self._since_s = 0.0
-        for x, y, _ in data.contact.pos[hits]:
-            bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
-            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD
-
+"""Contacts that follow one another within this time, s, belong to the same collision."""
 
 _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
 _INNER_OHM: Final = 0.12  # Of the battery and its leads.
-_IDLE_A: Final = 0.6  # What the computer takes.
+_IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = (-math.radians(7.0), 0.0, math.radians(7.0))  # An HC-SR04 hears 15 degrees.
-_SOLID_GROUP: Final = 3  # Of the geoms that stop a vehicle; see `shapechanger.worlds.scene`.
+_SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.worlds.scene`.
 _ROUNDING_S: Final = 1e-9
 
 
@@ -104,23 +45,24 @@ class MujocoWorld:
 
     Args:
         vehicle: Name of the vehicle, such as "car".
-        world: Kind of place, such as "corridor"; None for where the vehicle is at home.
-        seed: Of the course and of the first start.
-        size: Width and height of the pictures in pixels; None for no pictures.
-        look: How it looks; None for how such a place usually does.
-        lenses: What is wrong with the camera, see `shapechanger.worlds.lens`.
+        world: Kind of course, such as "corridor"; None for the vehicle's own (`HOME`).
+        seed: Seed of the course and of the first start.
+        size: Width and height of the camera's pictures in pixels; None for no camera.
+        look: Light and colours; None for the usual look of the world.
+        lenses: Names of camera faults; see `shapechanger.worlds.lens`.
 
     Attributes:
+        vehicle: Model of the vehicle.
         course: The course.
-        look: How it looks.
-        lenses: Names of what is wrong with the camera.
-        model: The compiled model.
-        data: Its state.
+        look: Light and colours.
+        lenses: Names of camera faults.
+        model: Compiled MuJoCo model.
+        data: State of the simulation.
         resting_v: Voltage of the battery without load.
 
     Raises:
-        UnknownName: If there is no such vehicle, place or lens.
-        WorldError: If the vehicle does not fit the place.
+        UnknownName: If the vehicle, the world or a lens is unknown.
+        WorldError: If the vehicle does not fit the world.
     """
 
     def __init__(
@@ -138,48 +80,49 @@ class MujocoWorld:
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
         self.lenses = tuple(lenses)
-        self._distortions = [lens(name) for name in lenses]
+        self._distortions = [find_lens(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
         self.lay_out(seed)
 
     @property
     def seed(self) -> int:
-        """What the course follows from."""
+        """Seed of the course."""
         return self.course.seed
 
     @property
     def collisions(self) -> int:
-        """How many times the vehicle ran into something since it was placed."""
-        return self._touch.collisions
+        """Number of collisions since the vehicle was placed."""
+        return self._contacts.collisions
 
     @property
     def touches(self) -> bool:
-        """Whether the vehicle touches anything now."""
-        return self._touch.touches
+        """Whether the vehicle is in contact with a wall or an obstacle."""
+        return self._contacts.touches
 
     @property
     def progress_m(self) -> float:
-        """How far it came along the course since it was placed, m; backwards counts down."""
+        """Distance along the course since the vehicle was placed, m; backwards counts down."""
         return self._progress.metres
 
     @property
     def pose(self) -> Pose:
-        """Where the vehicle is."""
-        return self._bound.pose()
+        """Pose of the vehicle."""
+        return Pose(*self._bound.pose())
 
     def lay_out(
         self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
     ) -> None:
-        """Another course, with the vehicle at a start; see `World.lay_out`.
+        """Change the course and put the vehicle at a start; see `World.lay_out`.
 
         Args:
-            seed: What the course follows from.
-            look: How it looks from now on; None for as before.
-            camera: How far its camera is off its place.
+            seed: Seed of the course and the start.
+            look: New light and colours; None to keep them.
+            camera: Error of the camera's pose; None for none.
 
         Raises:
-            WorldError: If no course belongs to the seed, or the camera is off its vehicle.
+            WorldError: If the seed has no course, or the camera would be off its vehicle. The world
+                is unchanged then.
         """
         look = self.look if look is None else look
         course = lay_out(self._world, seed)
@@ -190,13 +133,13 @@ class MujocoWorld:
         model = spec.compile()
         if camera is not None:
             move_camera(model, _CAMERA, camera)
-        # Whatever is refused is refused above, and leaves the world as it was.
+        # All checks are above, so that an error leaves the world unchanged.
         self.look, self.model = look, model
         self.course: Course = course
         self.data = mujoco.MjData(self.model)
         self._bound = self.vehicle.bind(self.model, self.data)
         self._bound.set_current(*self.course.current_mps)
-        self._touch = Touch(self.model)
+        self._contacts = ContactTracker(self.model)
         self._progress = CourseProgress(self.course)
         self._path: CoursePath | None = None
         self._chassis = self.model.body(_CHASSIS).id
@@ -211,38 +154,38 @@ class MujocoWorld:
         self.put(start_pose(self.course, seed))
 
     def put(self, pose: Pose) -> None:
-        """Put the vehicle somewhere, at rest, and count its progress and collisions from there."""
+        """Put the vehicle at a pose, at rest, and reset its progress and collisions."""
         self._rest_at(pose)
-        self._touch.reset()
+        self._contacts.reset()
         self._progress.reset(pose.x, pose.y)
 
     def path(self) -> CoursePath:
-        """A way round the course for this vehicle; planned when it is first asked for.
+        """A path around the course for this vehicle, planned on the first call.
 
         Raises:
-            WorldError: If there is none.
+            WorldError: If there is no such path.
         """
         if self._path is None:
             self._path = plan_path_for(self.course, traits_of(self.vehicle.name))
         return self._path
 
     def put_back(self) -> None:
-        """Put the vehicle back on a free line where it is, as a person would who walks beside it.
+        """Put the vehicle on the nearest point of its path, at rest.
 
-        Progress and collisions go on counting.
+        Progress and collisions keep counting.
 
         Raises:
-            WorldError: If there is no way round the course for this vehicle.
+            WorldError: If there is no path around the course for this vehicle.
         """
         path, here = self.path(), self._bound.pose()
         i = path.index(path.nearest(here.x, here.y).station)
         x, y = path.points[i]
         self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
-        self._touch.let_go()
+        self._contacts.release()
         self._progress.update(float(x), float(y))
 
     def zero_odometer(self) -> None:
-        """Count what the wheels roll from 0, for a robot that is switched on anew."""
+        """Reset the travelled distance, as restarting the robot does."""
         self._travelled_m = 0.0
 
     def truth(self) -> dict[str, float]:
@@ -250,7 +193,7 @@ class MujocoWorld:
         return {"progress_m": self.progress_m, "collisions": float(self.collisions)}
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Let time go by, in whole steps of the simulation; see `World.advance`."""
+        """Simulate for a time, in whole steps; see `World.advance`."""
         self._rest_s += dt_s
         while self._rest_s >= SIM_DT - _ROUNDING_S:
             self._rest_s -= SIM_DT
@@ -259,22 +202,22 @@ class MujocoWorld:
         self._progress.update(pose.x, pose.y)
 
     def inputs(self) -> Readings:
-        """What sensors could measure now; see `World.inputs`."""
+        """Quantities that sensors measure; see `World.inputs`."""
         bound = self._bound
         return Readings(
-            pose=bound.pose(),
+            pose=self.pose,
             speed=bound.speed(),
             travelled_m=self._travelled_m,
             acceleration_x=self._acceleration[0],
             acceleration_y=self._acceleration[1],
             yaw_rate=bound.yaw_rate(),
-            bumped=self._touch.bumped,
+            bumped=self._contacts.bumped,
             battery_v=self._battery_v,
             current_a=self._current_a,
         )
 
     def distance_m(self) -> float:
-        """The shortest of three rays from the nose; see `World.distance_m`."""
+        """Distance by the shortest of three rays; see `World.distance_m`."""
         pose = self._bound.pose()
         height = 0.5 * self.vehicle.camera.z
         start = np.array((pose.x, pose.y, height))
@@ -290,20 +233,20 @@ class MujocoWorld:
         return max(0.0, found - self.vehicle.nose_m)
 
     def picture(self) -> NDArray[np.uint8]:
-        """What the front camera sees; see `World.picture`.
+        """Picture of the front camera; see `World.picture`.
 
         Raises:
-            WorldError: If it was made without a camera.
+            WorldError: If the world was made without a camera.
         """
         if self._camera is None:
-            raise WorldError("This world was made without a camera: give it a `size`.")
+            raise WorldError("This world has no camera: pass a `size`.")
         picture = self._camera.picture(self.model, self.data)
         for distort in self._distortions:
             picture = distort(picture, self.course.seed)
         return picture
 
     def close(self) -> None:
-        """Free what draws."""
+        """Free the camera's OpenGL context."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None
@@ -326,8 +269,7 @@ class MujocoWorld:
         bound = self._bound
         bound.drive(outputs, self._battery_v)
         mujoco.mj_step(self.model, self.data)
-        pose = bound.pose()
-        self._touch.follow(self.data, pose, SIM_DT)
+        self._contacts.follow(self.data, bound.pose(), SIM_DT)
         speed = bound.speed()
         self._acceleration = ((speed - self._speed) / SIM_DT, speed * bound.yaw_rate())
         self._speed = speed
@@ -335,3 +277,61 @@ class MujocoWorld:
         self._travelled_m += rolled_m - self._rolled_m
         self._rolled_m = rolled_m
         self._current_a = _IDLE_A + bound.current_a()
+
+
+class ContactTracker:
+    """Tracks contacts of a vehicle with walls and obstacles.
+
+    Args:
+        model: Model whose vehicle geoms are named "vehicle/...", and its walls and obstacles
+            "world/wall/..." and "world/thing/...".
+
+    Attributes:
+        collisions: Number of collisions since `reset`.
+        bumped: Whether a contact presses the front bumper.
+        touches: Whether there is any contact.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        self._hull = np.array([name.startswith("vehicle/") for name in names])
+        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all contacts and collisions."""
+        self.collisions = 0
+        self.release()
+
+    def release(self) -> None:
+        """Forget the current contacts, so that the next one is a new collision."""
+        self.bumped = self.touches = False
+        self._since_s = math.inf
+
+    def follow(self, data: mujoco.MjData, pose: PlanarPose, dt_s: float) -> None:
+        """Update from the contacts of a simulation step.
+
+        Args:
+            data: State after the step.
+            pose: Pose of the vehicle.
+            dt_s: Length of the step, s.
+        """
+        self._since_s += dt_s
+        self.bumped = self.touches = False
+        if data.ncon == 0:
+            return
+        pairs = data.contact.geom
+        if not self._solid[pairs].any():
+            return  # Usual case: only the wheels touch the ground.
+        first, second = pairs[:, 0], pairs[:, 1]
+        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
+        hits &= data.contact.dist <= 0.0
+        if not hits.any():
+            return
+        self.touches = True
+        if self._since_s > APART_S:
+            self.collisions += 1
+        self._since_s = 0.0
+        for x, y, _ in data.contact.pos[hits]:
+            bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
+            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

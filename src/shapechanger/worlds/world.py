@@ -1,4 +1,4 @@
-"""What every world does, and what it shows to the sensors in it."""
+"""Interface of every world, and the quantities that sensors in it measure."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 __all__ = ["RESTING_V", "Pose", "Readings", "World"]
 
 RESTING_V: Final = 8.0
-"""Voltage without load of two lithium cells that are nearly full."""
+"""Voltage without load of two nearly full lithium cells."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a vehicle is, seen from above.
+    """Pose of a vehicle seen from above.
 
     Attributes:
-        x: In metres.
-        y: In metres.
-        heading: Angle from the x axis in radians, counter-clockwise.
+        x: Position, m.
+        y: Position, m.
+        heading: Angle from the x axis, rad, counter-clockwise.
     """
 
     x: float
@@ -32,16 +32,16 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What sensors on the vehicle could measure.
+    """True values of the quantities that sensors on the vehicle measure.
 
     Attributes:
-        pose: Where the vehicle is.
-        speed: Along its heading, m/s; backward is negative.
-        travelled_m: Sum of all distances that the wheels rolled; backward counts down.
-        acceleration_x: Along its heading, m/s2.
-        acceleration_y: To its left, m/s2.
-        yaw_rate: Counter-clockwise seen from above, rad/s.
-        bumped: Whether something presses the bumper at its front.
+        pose: Pose of the vehicle.
+        speed: Speed along its heading, m/s; backward is negative.
+        travelled_m: Distance that the wheels rolled; backward counts down.
+        acceleration_x: Acceleration along its heading, m/s2.
+        acceleration_y: Acceleration to its left, m/s2.
+        yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
+        bumped: Whether the front bumper is pressed.
         battery_v: Voltage of the battery under load.
         current_a: Current from the battery.
     """
@@ -58,7 +58,7 @@ class Readings:
 
 
 class World(Protocol):
-    """A vehicle and what is around it.
+    """A vehicle and its surroundings.
 
     Attributes:
         resting_v: Voltage of the battery without load.
@@ -67,11 +67,11 @@ class World(Protocol):
     resting_v: float
 
     def lay_out(self, seed: int) -> None:
-        """Put other surroundings around the vehicle, and the vehicle at a start in them."""
+        """Change the surroundings, and put the vehicle at a start in them."""
         ...
 
     def truth(self) -> dict[str, float]:
-        """What no sensor on board tells, by name, for whoever judges; empty where nobody counts."""
+        """Ground truth for evaluation, by name, which no sensor measures; may be empty."""
         ...
 
     def place(self, seed: int) -> None:
@@ -79,27 +79,27 @@ class World(Protocol):
         ...
 
     def put_back(self) -> None:
-        """Put a vehicle that ran into something where it can go on, at rest."""
+        """Put the vehicle, after a collision, at a free place nearby, at rest."""
         ...
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Let time go by.
+        """Simulate for a time.
 
         Args:
-            dt_s: How much, in seconds.
-            outputs: Value of each part, such as "wheels", from -1 to 1; None for one without
+            dt_s: Duration, s.
+            outputs: Output of each part, such as "wheels", from -1 to 1; None for a part without
                 torque.
         """
         ...
 
     def inputs(self) -> Readings:
-        """What sensors could measure now."""
+        """Quantities that sensors measure."""
         ...
 
     def distance_m(self) -> float:
-        """Distance from the vehicle's nose to whatever is ahead."""
+        """Distance from the vehicle's nose to the nearest object ahead."""
         ...
 
     def picture(self) -> NDArray[np.uint8]:
-        """What the front camera sees, RGB, shape (height, width, 3)."""
+        """Picture of the front camera, RGB, shape (height, width, 3)."""
         ...

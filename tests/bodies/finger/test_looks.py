@@ -14,7 +14,7 @@ from shapechanger.bodies.finger.looks import (
     TENDON_COLOURS,
     THICKEST_M,
     THINNEST_M,
-    courses_of,
+    route_names,
 )
 from shapechanger.bodies.finger.model import TARGET, FingerFigure
 from tests.bodies.finger.commands import STRETCHED, at_rest, made, modes
@@ -83,7 +83,7 @@ def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
     """And begins in the hand, and passes the bones in their order."""
     model = made(anatomy=True)
     order = ["hand", "proximal", "middle", "distal"]
-    for course in courses_of(tendon):
+    for course in route_names(tendon):
         bodies = [body for body, _ in _stops(model, course)]
         assert bodies[0] == "hand"
         assert bodies[-1] == ends_at
@@ -98,7 +98,7 @@ def _places(tendon: str, body: str) -> np.ndarray:
     return np.array(
         [
             _site(model, data, body, site)
-            for course in courses_of(tendon)
+            for course in route_names(tendon)
             for at, site in _stops(model, course)
             if at == body
         ]
@@ -150,7 +150,7 @@ def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    courses = [model.tendon(c).id for t in TENDONS for c in courses_of(t)]
+    courses = [model.tendon(c).id for t in TENDONS for c in route_names(t)]
     straight = data.ten_length[courses].copy()
     for corner in itertools.product(*JOINT_RANGE):
         data.qpos[:] = corner

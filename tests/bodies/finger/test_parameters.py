@@ -51,8 +51,8 @@ def test_arms_are_a_copy() -> None:
         ({"tendon_friction": -1.0}, "tendon_friction: the numbers must not be below zero, got -1"),
         ({"motor_lag": 0.0}, "motor_lag must be above zero, got 0.0."),
         ({"motor_kg": 0.0}, "motor_kg must be above zero, got 0.0."),
-        ({"motor_kg": "x"}, "motor_kg: these are no numbers: 'x'."),
-        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms: these are no numbers"),
+        ({"motor_kg": "x"}, "motor_kg must hold numbers, got 'x'."),
+        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms must hold numbers"),
         ({"tendon_stiffness": 0.0}, "tendon_stiffness above zero."),
         ({"most_tension": (0.5,) * 7}, "most_tension must be above least_tension, 0.5 N"),
         ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
@@ -67,12 +67,12 @@ def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentenc
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("{", r"no parameters of a finger: Input data was truncated\.$"),
-        ("[]", "no parameters of a finger: Expected `object`, got `array`"),
+        ("{", r"Invalid finger parameters: Input data was truncated\.$"),
+        ("[]", "Invalid finger parameters: Expected `object`, got `array`"),
         ('{"tendon_fricton": 1.0}', "unknown field `tendon_fricton`"),
         ('{"motor_lag": "slow"}', "Expected `float`, got `str`"),
         ('{"motor_lag": 0.0}', r"motor_lag must be above zero, got 0\.0\.$"),
-        (b"\xff", "no parameters of a finger"),
+        (b"\xff", "Invalid finger parameters"),
     ],
 )
 def test_json_that_is_no_finger_is_refused(text: str | bytes, sentence: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.cli.demos.train import Evaluate, Train
+from shapechanger.cli.demos.train import Evaluate, TrainClone
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
@@ -43,7 +43,7 @@ def test_a_recording_becomes_a_policy_with_a_report(
     """The last line of the other command is its accuracy; all files are there, and no others."""
     data = _record(tmp_path / "drive", 150, 0)
     out = tmp_path / "made" / "policy.zip"
-    Train(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
+    TrainClone(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
     made = sorted(path.name for path in out.parent.iterdir())
     assert made == ["policy.html", "policy.json", "policy.zip", "ppo.zip"]
     page = out.with_suffix(".html").read_text()
@@ -71,7 +71,7 @@ def test_numbers_end_with_the_accuracy_too(
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
     out = tmp_path / "policy.zip"
-    Train(data, out, split="episode", sac=tmp_path / "sac.zip").run()
+    TrainClone(data, out, split="episode", sac=tmp_path / "sac.zip").run()
     assert CameraPolicy.load(out).card.data["learned"] == 90
     text = capsys.readouterr().out
     assert "steering: mean absolute error" in text
@@ -84,13 +84,13 @@ def test_what_cannot_be_done_is_said_before_the_work(tmp_path: Path) -> None:
     data = _record(tmp_path / "drive", 20, 0)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="it is a folder"):
-        Train(data, tmp_path / "taken").run()
+        TrainClone(data, tmp_path / "taken").run()
     with pytest.raises(OutputError, match="two files"):
-        Train(data, tmp_path / "p.zip", sac=tmp_path / "p.zip").run()
+        TrainClone(data, tmp_path / "p.zip", sac=tmp_path / "p.zip").run()
     with pytest.raises(CloningError, match="one episode only"):
-        Train(data, tmp_path / "p.zip", split="episode").run()
+        TrainClone(data, tmp_path / "p.zip", split="episode").run()
     with pytest.raises(DemosError):
-        Train(tmp_path / "nowhere", tmp_path / "p.zip").run()
+        TrainClone(tmp_path / "nowhere", tmp_path / "p.zip").run()
     with pytest.raises(PolicyError, match="no policy file"):
         Evaluate(tmp_path / "p.zip", data).run()
     assert not (tmp_path / "p.zip").exists()

@@ -15,6 +15,8 @@ from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningRobot]:

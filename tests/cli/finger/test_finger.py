@@ -79,4 +79,4 @@ def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert any(line.startswith("backlash cannot be told: ") for line in lines)
     assert lines[-1].startswith("arms: 25 intervals, ")
     assert FingerParameters.from_json(out.read_text()).gives
-    assert "What this log cannot tell" in (tmp_path / "log.html").read_text()
+    assert "Parameters that this log cannot determine" in (tmp_path / "log.html").read_text()

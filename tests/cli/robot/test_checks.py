@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shapechanger.cli.robot.selftest import Check, check_robot
+import pytest
+
+from shapechanger.cli.robot.selftest import SelftestResult, check_robot
 from shapechanger.twin.robot import run_robot
 from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
-def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Check]:
+
+def _checked(folder: Path, text: str, wired: str = "") -> dict[str, SelftestResult]:
     profile = write_profile(folder, text)
     files = folder / "robot"
     files.mkdir()

@@ -17,6 +17,8 @@ from shapechanger.remote.known_robots import KnownRobot, remember
 from shapechanger.twin.robot import run_robot
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
+pytestmark = pytest.mark.realtime
+
 # Stands in for a browser: keeps what it was given, and who may read it.
 _BROWSER = """\
 import os, pathlib, sys, urllib.parse

@@ -18,6 +18,8 @@ from shapechanger.twin.robot import Operator
 from shapechanger.twin.world.place import Place
 from tests.robots import CAR, changed, write_profile
 
+pytestmark = pytest.mark.realtime
+
 
 def _shipped(name: str) -> Profile:
     return load_profile(find_profile(name))

@@ -24,6 +24,8 @@ from shapechanger.remote.known_robots import KnownRobot, remember
 from tests.remote.test_real_daemon import Served
 from tests.robot.daemon.plans import ACTIONS, picture
 
+pytestmark = pytest.mark.realtime
+
 HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), driver="Ada")
 
 

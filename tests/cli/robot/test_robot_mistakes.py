@@ -25,6 +25,8 @@ from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 from tests.twin.robots import until
 
+pytestmark = pytest.mark.realtime
+
 Run = Callable[..., tuple[int, str, str]]
 KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
 

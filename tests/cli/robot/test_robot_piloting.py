@@ -16,6 +16,8 @@ from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 
 @pytest.mark.gl
 def test_a_person_lets_a_policy_drive_and_corrects_it(

@@ -15,6 +15,8 @@ from tests.cli.robot.typing import Person
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.served import driving
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 
 def test_a_second_person_stops_a_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -16,6 +16,8 @@ from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 SERVO = """\
 # A car with a servo that somebody must calibrate.
 

@@ -1,4 +1,4 @@
-"""Episodes for tests: small ones, with pictures of a few bytes."""
+"""Small episodes for tests, with pictures of a few bytes."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ STATES = Layout((Feature("effort", "N·m"), Feature("distance", "m", 0.0)))
 
 
 def header(**changes: Any) -> EpisodeHeader:
-    """The header of a car's episode."""
+    """Return the header of a car's episode."""
     fields: dict[str, Any] = {
         "action_layout": ACTIONS.to_json(),
         "state_layout": STATES.to_json(),
@@ -22,7 +22,7 @@ def header(**changes: Any) -> EpisodeHeader:
 
 
 def step(number: int = 0, **changes: Any) -> Step:
-    """A step at 20 Hz."""
+    """Return a step at 20 Hz."""
     fields: dict[str, Any] = {
         "action": (0.1, 0.2),
         "driver": "person",
@@ -34,12 +34,12 @@ def step(number: int = 0, **changes: Any) -> Step:
 
 
 def picture(number: int = 0) -> bytes:
-    """Bytes that begin as a JPEG does, another for each number."""
+    """Return bytes that start like a JPEG, different for each number."""
     return b"\xff\xd8" + number.to_bytes(4, "big") * 50
 
 
 def recorded(recording: Path, steps: int = 5, *, close: bool = True) -> Path:
-    """The folder of an episode of so many steps, each with a picture; closed, or as it was."""
+    """Record an episode with one picture per step; leave it unclosed on request."""
     with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
         begun = (writer.path / "episode.json").read_bytes()
         for number in range(steps):

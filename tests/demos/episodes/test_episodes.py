@@ -1,4 +1,4 @@
-"""Episodes on disk: what goes in comes out, and what cannot be recorded is refused in words."""
+"""Episode writer and reader: round trips, and refusals."""
 
 import dataclasses
 import math
@@ -41,7 +41,7 @@ _STEPS = st.builds(
 
 
 def _content(one: Step) -> str:
-    """Everything that was given, as text: NaN equals nothing, but it is always written alike."""
+    """Return all given values of a step as text, so that NaN equals NaN."""
     return repr(dataclasses.replace(one, index=0, frame="", frame_bytes=0, frame_crc=0))
 
 
@@ -50,7 +50,7 @@ def _content(one: Step) -> str:
 def test_what_is_recorded_is_read_back(
     steps: list[Step], new: list[bool], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Every number, NaN and infinity, every word and every byte of a picture comes back."""
+    """Every number, NaN, infinity, text and byte of a picture survives the round trip."""
     recording = tmp_path_factory.mktemp("recording")
     pictures: list[bytes | None] = []
     with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
@@ -71,7 +71,7 @@ def _as_utf8(text: str) -> str:
 
 
 def test_the_header_comes_back(tmp_path: Path) -> None:
-    """What an episode is of is kept, with the time at which it began."""
+    """The metadata is kept, and the writer adds the start time."""
     given_header = header(env="shapechanger/Car-v1", env_kwargs={"put_back": True}, seed=3)
     now = datetime(2026, 11, 21, 10, 30, 5, tzinfo=UTC)
     with EpisodeWriter.create(tmp_path, given_header, spare_bytes=0, now=lambda: now) as writer:
@@ -83,7 +83,7 @@ def test_the_header_comes_back(tmp_path: Path) -> None:
 
 
 def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> None:
-    """Short episodes that follow each other closely do not overwrite each other."""
+    """Short episodes in quick succession do not overwrite each other."""
     now = datetime(2026, 11, 21, tzinfo=UTC)
     for _ in range(2):
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0, now=lambda: now).close()
@@ -92,7 +92,7 @@ def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> Non
 
 
 def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
-    """Whoever looks at a recording while it grows sees every step up to now."""
+    """A reader of a growing recording sees every step written so far."""
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.add(step(0), picture())
     read = read_episode(writer.path)
@@ -117,15 +117,15 @@ def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
 
 
 def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
-    """The button may be pressed before there is anything."""
+    """The button may be pressed before the first step."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         assert writer.undo() == 0
-        with pytest.raises(DemosError, match="cannot be undone"):
+        with pytest.raises(DemosError, match="must be positive, got nan"):
             writer.undo(math.nan)
 
 
 def test_dropped_steps_can_be_taken_back(tmp_path: Path) -> None:
-    """The last word counts, and nothing that was recorded is ever rewritten."""
+    """Later edits override earlier ones, and recorded lines are never rewritten."""
     path = recorded(tmp_path)
     before = (path / "steps.jsonl").read_bytes()
     drop(path, 1, 3, "bad")
@@ -138,7 +138,7 @@ def test_dropped_steps_can_be_taken_back(tmp_path: Path) -> None:
 
 
 def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
-    """The sentence says which steps there are."""
+    """The error names the steps that exist."""
     path = recorded(tmp_path)
     with pytest.raises(DemosError, match="has the steps 0 to 4, and not 3 to 5"):
         drop(path, 3, 5, "bad")
@@ -147,10 +147,10 @@ def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"action": (1.0,)}, "its action has 1 numbers, and the layout has 2"),
+        ({"action": (1.0,)}, "its action has 1 values, but the layout has 2"),
         ({"action": (math.nan, 0.0)}, "its action is"),
-        ({"wanted": (1.0, 2.0, 3.0)}, "its wanted has 3 numbers"),
-        ({"state": ()}, "its state has 0 numbers, and the layout has 2"),
+        ({"wanted": (1.0, 2.0, 3.0)}, "its wanted has 3 values"),
+        ({"state": ()}, "its state has 0 values, but the layout has 2"),
         ({"driver": "robot"}, "not one of person, policy, expert, program"),
         ({"captured_ns": -1}, "time runs backwards"),
     ],
@@ -158,7 +158,7 @@ def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
 def test_a_step_that_does_not_fit_is_refused(
     tmp_path: Path, change: dict[str, object], reason: str
 ) -> None:
-    """It is refused with its number and why, and the episode goes on without it."""
+    """The error names the step and the reason, and the episode goes on without it."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step(0))
         with pytest.raises(DemosError, match=f"Step 1 of .* cannot be recorded: .*{reason}"):
@@ -168,19 +168,19 @@ def test_a_step_that_does_not_fit_is_refused(
 
 
 def test_a_picture_that_is_none_is_refused(tmp_path: Path) -> None:
-    """What is no JPEG, and what is far too large, is not written."""
+    """Data that is not a JPEG, or is far too large, is not written."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        with pytest.raises(DemosError, match="its picture is no JPEG"):
+        with pytest.raises(DemosError, match="its picture is not a JPEG"):
             writer.add(step(0), b"GIF89a")
-        with pytest.raises(DemosError, match="at most 16777216 are allowed"):
+        with pytest.raises(DemosError, match="more than the limit of 16777216"):
             writer.add(step(0), b"\xff\xd8" + bytes(1 << 24))
     assert not list((writer.path / "frames").iterdir())
 
 
 def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
-    """The second is refused, and the first goes on; afterwards the folder is free."""
+    """The second recorder is refused, the first goes on, and the folder is free afterwards."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        with pytest.raises(DemosError, match="Somebody records in"):
+        with pytest.raises(DemosError, match="is in use by another recorder"):
             EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
         writer.add(step())
         with pytest.raises(DemosError, match="is being recorded at this moment"):
@@ -189,14 +189,14 @@ def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_is_nearly_full_is_not_filled(tmp_path: Path) -> None:
-    """The sentence says how much is free; nothing is left behind."""
+    """The error says how much is free; nothing is left behind."""
     with pytest.raises(OutputError, match="MB of the disk are free"):
         EpisodeWriter.create(tmp_path, header(), spare_bytes=1 << 60)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_closed_episode_takes_no_more(tmp_path: Path) -> None:
-    """Closing twice is no mistake; adding after it is."""
+    """Closing twice is allowed; adding a step after closing is not."""
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.close()
     writer.close()
@@ -205,7 +205,7 @@ def test_a_closed_episode_takes_no_more(tmp_path: Path) -> None:
 
 
 def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
-    """A missing folder, a file and an empty folder each have their own sentence."""
+    """A missing folder, a file and an empty folder have different errors."""
     (tmp_path / "file").touch()
     (tmp_path / "empty").mkdir()
     for name, reason in [
@@ -215,22 +215,22 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
     ]:
         with pytest.raises(DemosError, match=reason):
             episodes_of(tmp_path / name)
-    with pytest.raises(DemosError, match="is no episode"):
+    with pytest.raises(DemosError, match="is not an episode"):
         read_episode(tmp_path / "empty")
 
 
 def test_a_later_format_is_refused(tmp_path: Path) -> None:
-    """Nobody reads half of what they do not know."""
+    """A reader refuses a newer version instead of reading half of it."""
     path = recorded(tmp_path)
     file = path / "episode.json"
     file.write_text(file.read_text().replace('"format": 1', '"format": 2'))
-    with pytest.raises(DemosError, match=r"has format 2, and this version .* reads format 1"):
+    with pytest.raises(DemosError, match=r"has format 2, but this version .* reads format 1"):
         read_episode(path)
 
 
 @pytest.mark.parametrize("harm", ["missing", "short", "changed"])
 def test_a_damaged_picture_is_found(tmp_path: Path, harm: str) -> None:
-    """Before anybody learns from it, with the command that repairs the episode."""
+    """Damage is found on reading, and the error names the repair command."""
     path = recorded(tmp_path)
     file = path / "frames" / "000002.jpg"
     if harm == "missing":

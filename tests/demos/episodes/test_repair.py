@@ -1,4 +1,4 @@
-"""A crash at any moment costs at most the step of that moment."""
+"""A crash at any time costs at most the step being written."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from tests.demos.episodes.making import header, picture, recorded, step
 @settings(max_examples=40)
 @given(share=st.floats(0.0, 1.0))
 def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Every step whose line is whole is there afterwards, and what is torn lies in `lost`."""
+    """All complete steps survive, and the torn line is moved to `lost`."""
     path = recorded(tmp_path_factory.mktemp("recording"), close=False)
     file = path / "steps.jsonl"
     content = file.read_bytes()
@@ -39,20 +39,20 @@ def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFact
 def test_one_flipped_bit_costs_one_step(
     place: int, bit: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """A memory card that forgets a bit takes the line it is in, or two where lines run together."""
+    """A flipped bit on a memory card costs its line, or two where the line break is hit."""
     path = recorded(tmp_path_factory.mktemp("recording"))
     file = path / "steps.jsonl"
     content = bytearray(file.read_bytes())
     content[place % len(content)] ^= 1 << bit
     file.write_bytes(content)
-    with pytest.raises(BrokenEpisode, match="does not count, because"):
+    with pytest.raises(BrokenEpisode, match="is invalid, because"):
         read_episode(path)
     assert repair(path).kept >= 3
     assert len(read_episode(path).steps) >= 3
 
 
 def test_what_is_whole_stays_as_it_is(tmp_path: Path) -> None:
-    """Repairing twice, or what needs none, changes no byte."""
+    """Repairing an intact episode changes no byte."""
     path = recorded(tmp_path)
     before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
     assert not repair(path).changed
@@ -68,7 +68,7 @@ def test_a_picture_without_a_step_is_set_aside(tmp_path: Path) -> None:
 
 
 def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
-    """The other steps do, and marks and drops stay with the numbers that they name."""
+    """The other steps survive, and marks and drops keep their step numbers."""
     path = recorded(tmp_path)
     (path / "frames" / "000002.jpg").unlink()
     done = repair(path)
@@ -78,7 +78,7 @@ def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
 
 
 def test_a_running_recording_is_left_alone(tmp_path: Path) -> None:
-    """Whoever repairs while somebody records is told so."""
+    """Repairing an episode while it is being recorded is refused."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step())
         with pytest.raises(DemosError, match="is being recorded at this moment"):

@@ -1,4 +1,4 @@
-"""Small recordings and folders of others, made here."""
+"""Small recordings and folders in other formats."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STATES = Layout((Feature("speed", "m/s"), Feature("temperature", "°C", -40.0)))
 
 
 def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False) -> bytes:
-    """A noisy JPEG."""
+    """Return a JPEG of noise."""
     pixels = np.random.default_rng(seed).integers(0, 256, (height, width, 1 if grey else 3))
     return simplejpeg.encode_jpeg(
         pixels.astype(np.uint8),
@@ -35,7 +35,7 @@ def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False)
 
 
 def huge(width: int = 60_000, height: int = 60_000) -> bytes:
-    """A small JPEG whose header claims to be huge."""
+    """Return a small JPEG whose header claims to be huge."""
     jpeg = bytearray(picture(0))
     at = jpeg.find(b"\xff\xc0") + 5
     jpeg[at : at + 4] = height.to_bytes(2, "big") + width.to_bytes(2, "big")
@@ -43,7 +43,7 @@ def huge(width: int = 60_000, height: int = 60_000) -> bytes:
 
 
 def header(**changes: Any) -> EpisodeHeader:
-    """A header of a car with a camera and a state."""
+    """Return the header of a car with a camera and a state."""
     fields: dict[str, Any] = {
         "action_layout": ACTIONS.to_json(),
         "state_layout": STATES.to_json(),
@@ -66,7 +66,7 @@ def record(
 
 
 def drive(data: Path, count: int = 5, **changes: Any) -> Path:
-    """Record an episode of a person with pictures and a state."""
+    """Record an episode of a person, with pictures and a state."""
     steps = [
         (
             Step(
@@ -89,7 +89,7 @@ def keys_folder(
     pictures: dict[str, bytes] | None = None,
     newline: str = "\r\n",
 ) -> Path:
-    """A folder in the layout of 2017, of three pictures."""
+    """Create a folder in the format of 2017, of three pictures."""
     folder.mkdir(parents=True)
     names = [f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3)]
     if lines is None:
@@ -110,7 +110,7 @@ def tub_folder(
     inputs: dict[str, str] | None = None,
     per_catalog: int = 2,
 ) -> Path:
-    """A tub of version 2; each record without a picture gets one, unless it has None."""
+    """Create a tub of version 2; each record without a picture gets one, unless it has None."""
     (folder / "images").mkdir(parents=True)
     kinds = {"cam/image_array": "image_array", "user/angle": "float"} | (inputs or {})
     lines: list[dict[str, Any]] = []
@@ -132,12 +132,12 @@ def tub_folder(
 
 
 def all_of(data: Path) -> list[Episode]:
-    """The episodes of a recording."""
+    """Return the episodes of a recording."""
     return [read_episode(path) for path in episodes_of(data)]
 
 
 def told(episode: Episode) -> dict[str, Any]:
-    """All that an episode says, but for its name and when it began; equal also where it is NaN."""
+    """Return the content of an episode, except its name and start time, so that NaN equals NaN."""
     head = episode.header.to_json()
     del head["created"]
     kept = {step.index for step in episode.kept}
@@ -153,7 +153,7 @@ def told(episode: Episode) -> dict[str, Any]:
 
 
 def snapshot(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder, with its bytes."""
+    """Return the bytes of every file below a folder."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))

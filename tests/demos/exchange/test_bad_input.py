@@ -1,4 +1,4 @@
-"""What is not whole is refused in one sentence, and nothing is written then."""
+"""Damaged or unsuitable input is refused in one sentence, and nothing is written."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FIRST, SECOND, THIRD = (f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3))
 
 
 def refused(folder: Path, out: Path, format: str = "auto") -> str:
-    """Why an import is refused; nothing is written, and what was there is as it was."""
+    """Return the error of a refused import; check that no file was created or changed."""
     before = snapshot(folder) if folder.is_dir() else {}
     beside = sorted(out.parent.iterdir())
     with pytest.raises(ShapechangerError) as caught:
@@ -79,23 +79,23 @@ def _pipe(folder: Path) -> None:
         (lambda f: (f / SECOND).unlink(), f"line 2 names '{SECOND}', which is not in"),
         (_edit(SECOND, lambda jpeg: jpeg[:-300]), "is damaged"),
         (_edit(THIRD, lambda jpeg: b""), "is empty"),
-        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "is no JPEG"),
+        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "is not a JPEG"),
         (_edit(SECOND, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
         (_edit(FIRST, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
-        (_edit(SECOND, lambda jpeg: jpeg + bytes(17 << 20)), "bytes, and at most"),
+        (_edit(SECOND, lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
         (_edit(SECOND, lambda jpeg: picture(1, 48, 32)), "48 x 32 pixels, and not 40 x 32"),
         (lambda f: (f / "extra.jpg").write_bytes(picture(5)), "have no line in labels.csv (extra"),
         (_labels(b"0.0,0.0,0.0,1.0", b"1.0,0.0,0.0,1.0"), "holds forward and left at once"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "line 2: left is '0.5'"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "line 2: left is 'nan'"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "line 2: left must be 0 or 1, got '0.5'"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "line 2: left must be 0 or 1, got 'nan'"),
         (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 2 has 4 cells"),
         (_labels(SECOND.encode(), b"1499144070.2_/../" + SECOND.encode()), "leaves the folder"),
         (_labels(SECOND.encode(), b"passwd"), "does not begin with the Unix time"),
-        (_labels(SECOND.encode(), FIRST.encode()), "which line 1 has labelled already"),
+        (_labels(SECOND.encode(), FIRST.encode()), "which line 1 labels already"),
         (_labels(b"0", b"\xff"), "is not text in UTF-8"),
         (_edit("labels.csv", lambda t: t.decode().encode("utf-16")), "is not text in UTF-8"),
-        (_edit("labels.csv", lambda t: b""), "labels nothing"),
-        (_edit("labels.csv", lambda t: t + b'"open'), "is no line of a CSV file"),
+        (_edit("labels.csv", lambda t: b""), "has no labels"),
+        (_edit("labels.csv", lambda t: t + b'"open'), "is not valid CSV"),
         (_edit("labels.csv", lambda t: b"".join(t.splitlines(True)[::-1])), "Time runs backwards"),
         (_link_away, "is a link that leaves the folder"),
         (_pipe, "which is not in"),
@@ -104,14 +104,14 @@ def _pipe(folder: Path) -> None:
 def test_a_folder_of_2017_that_is_not_whole(
     tmp_path: Path, spoil: Callable[[Path], object], says: str
 ) -> None:
-    """The sentence names the file or the line, and what to do."""
+    """The error names the file or the line, and the remedy."""
     folder = keys_folder(tmp_path / "keys")
     spoil(folder)
     assert says in refused(folder, tmp_path / "data")
 
 
 def test_a_byte_order_mark_is_no_label(tmp_path: Path) -> None:
-    """Spreadsheets write one."""
+    """Spreadsheets write a byte order mark."""
     folder = keys_folder(tmp_path / "keys")
     _edit("labels.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
     assert import_recording(folder, tmp_path / "data").steps == 3
@@ -133,7 +133,7 @@ _GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for 
     ],
 )
 def test_a_tub_that_is_not_whole(tmp_path: Path, change: dict[str, object], says: str) -> None:
-    """The sentence names the catalog and the line."""
+    """The error names the catalog and the line."""
     records = [*_GOOD[:1], _GOOD[1] | change, *_GOOD[2:]]
     text = refused(tub_folder(tmp_path / "tub", records), tmp_path / "data")
     assert says in text
@@ -141,11 +141,11 @@ def test_a_tub_that_is_not_whole(tmp_path: Path, change: dict[str, object], says
 
 
 def test_a_tub_whose_files_are_not_whole(tmp_path: Path) -> None:
-    """A torn line, a manifest that is cut off or names files elsewhere, no record that counts."""
+    """A torn line, a truncated manifest, a path out of the folder, and no records left."""
     out = tmp_path / "data"
     folder = tub_folder(tmp_path / "torn", _GOOD)
     _edit("catalog_1.catalog", lambda text: text[:20])(folder)
-    assert "catalog_1.catalog, line 1 is not whole" in refused(folder, out)
+    assert "catalog_1.catalog, line 1 is not valid JSON" in refused(folder, out)
     folder = tub_folder(tmp_path / "short", _GOOD)
     _edit("manifest.json", lambda text: text.splitlines()[0])(folder)
     assert "has 1 lines" in refused(folder, out)
@@ -157,7 +157,7 @@ def test_a_tub_whose_files_are_not_whole(tmp_path: Path) -> None:
 
 
 def test_sessions_at_different_rates(tmp_path: Path) -> None:
-    """A policy that learns from both would not know how long its step is."""
+    """A policy cannot learn from steps of different lengths."""
     records = [
         {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": ms * n, "_session_id": str(ms)}
         for ms in (50, 100)
@@ -166,28 +166,34 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
     folder = tub_folder(tmp_path / "tub", records)
     text = refused(folder, tmp_path / "data")
     assert "catalog_6.catalog, line 1 has 10 steps a second" in text
-    assert "catalog_0.catalog, line 1 20, and one data set has one rate" in text
+    assert "catalog_0.catalog, line 1 20, and a data set has one rate" in text
 
 
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
         (lambda f: (f / "header.json").unlink(), "There is no header.json"),
-        (_edit("header.json", lambda t: t[:40]), "is no JSON"),
+        (_edit("header.json", lambda t: t[:40]), "is not valid JSON"),
         (_edit("header.json", lambda t: t.replace(b'"format": 1', b'"format": 9')), "format 9"),
         (_edit("header.json", lambda t: t.replace(b'"unit"', b'"u"')), "header.json: This is not"),
         (_edit("steps.csv", lambda t: t.replace(b"action/steering", b"steer")), "lacks action/"),
         (_edit("steps.csv", lambda t: t.replace(b"person", b"persona")), "Did you mean 'person'"),
         (_edit("steps.csv", lambda t: t.replace(b"000001.jpg", b"../1.jpg")), "leaves the folder"),
-        (_edit("steps.csv", lambda t: t.replace(b",0.3333333333333333,", b",x,")), "is no number"),
-        (_edit("steps.csv", lambda t: t.replace(b"false,false", b"maybe,false")), "neither true"),
+        (
+            _edit("steps.csv", lambda t: t.replace(b",0.3333333333333333,", b",x,")),
+            "must be a number, got 'x'",
+        ),
+        (
+            _edit("steps.csv", lambda t: t.replace(b"false,false", b"maybe,false")),
+            "expected true or false",
+        ),
         (_edit("steps.csv", lambda t: t + t.splitlines(True)[1]), "step 0 comes after step 4"),
         (lambda f: (f / "frames/000002.jpg").unlink(), "which is not in"),
         (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
     ],
 )
 def test_csv_that_is_not_whole(tmp_path: Path, spoil: Callable[[Path], object], says: str) -> None:
-    """Somebody opened it in a spreadsheet, or lost a part."""
+    """Damage by a spreadsheet or an incomplete copy is named."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
     spoil(tmp_path / "csv")
@@ -219,20 +225,20 @@ def _spoilt(file: h5py.File) -> None:
     ("spoil", "says"),
     [
         (lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
-        (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is no whole HDF5 file"),
-        (_edit("data/metadata.json", lambda b: b[:3000]), "is no JSON"),
+        (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
+        (_edit("data/metadata.json", lambda b: b[:3000]), "is not valid JSON"),
         (_edit("data/metadata.json", lambda b: b.replace(b'"hdf5"', b'"arrow"')), "'arrow'"),
         (_in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'episode_0/rewards'"),
         (_in_file(_leads_away), "in another file"),
         (_edit("data/main_data.hdf5", lambda b: b.replace(b"SNOD", b"XXXX")), "is damaged"),
-        (_in_file(_short), "has 2 entries, and 5 are needed"),
+        (_in_file(_short), "has 2 entries, but 5 are needed"),
         (_in_file(_spoilt), "is damaged"),
     ],
 )
 def test_a_minari_dataset_that_is_not_whole(
     tmp_path: Path, spoil: Callable[[Path], object], says: str
 ) -> None:
-    """The sentence names what is missing, and no other file is opened."""
+    """The error names what is missing, and no other file is opened."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "set-v0", "minari")
     spoil(tmp_path / "set-v0")
@@ -240,7 +246,7 @@ def test_a_minari_dataset_that_is_not_whole(
 
 
 def test_folders_that_are_none_of_these(tmp_path: Path) -> None:
-    """Empty, a file, not there, a recording, two formats at once, one folder too high."""
+    """An empty folder, a file, a missing folder, a recording, two formats, and a parent folder."""
     out = tmp_path / "data"
     (tmp_path / "empty").mkdir()
     assert "is empty" in refused(tmp_path / "empty", out)
@@ -257,7 +263,7 @@ def test_folders_that_are_none_of_these(tmp_path: Path) -> None:
 
 
 def test_formats_that_there_are_not(tmp_path: Path) -> None:
-    """The nearest spelling is told, in both directions."""
+    """An unknown format is answered with the nearest one, on import and on export."""
     keys_folder(tmp_path / "keys")
     assert "Did you mean 'minari'" in refused(tmp_path / "keys", tmp_path / "data", "minary")
     assert "is not tub" in refused(tmp_path / "keys", tmp_path / "data", "tub")
@@ -268,7 +274,7 @@ def test_formats_that_there_are_not(tmp_path: Path) -> None:
 
 
 def test_outputs_that_cannot_be(tmp_path: Path) -> None:
-    """What exists stays; nothing is put into what is read; a name that Minari could not load."""
+    """Existing paths, paths inside the source, and names that Minari could not load are refused."""
     folder = keys_folder(tmp_path / "keys")
     (tmp_path / "there").mkdir()
     assert "exists already" in refused(folder, tmp_path / "there")
@@ -287,7 +293,7 @@ def test_outputs_that_cannot_be(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "changes", "says"),
     [
-        ("2017", {}, "steering, throttle, and those of the layout of 2017"),
+        ("2017", {}, "steering, throttle, and those of the format of 2017"),
         ("minari", {"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
         ("minari", {"image_size": (80, 60)}, "40 x 32, and .* 80 x 60"),
     ],
@@ -295,7 +301,7 @@ def test_outputs_that_cannot_be(tmp_path: Path) -> None:
 def test_recordings_that_do_not_fit_a_format(
     tmp_path: Path, name: str, changes: dict[str, object], says: str
 ) -> None:
-    """Other actions, mixed rates, mixed sizes."""
+    """Other actions, mixed rates and mixed picture sizes are refused."""
     drive(tmp_path / "data")
     drive(tmp_path / "data", **changes)
     with pytest.raises(DemosError, match=says):
@@ -313,7 +319,7 @@ def test_recordings_that_do_not_fit_a_format(
     ],
 )
 def test_pictures_that_minari_could_not_read(tmp_path: Path, jpeg: bytes, says: str) -> None:
-    """Minari decodes all pictures of an episode at once, so that one of them would spoil it."""
+    """Minari decodes all pictures of an episode at once, so one bad picture would spoil it."""
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0)), data)
         for data in (picture(0), jpeg)
@@ -325,7 +331,7 @@ def test_pictures_that_minari_could_not_read(tmp_path: Path, jpeg: bytes, says: 
 
 
 def test_nothing_to_export(tmp_path: Path) -> None:
-    """A recording without steps, and one with neither pictures nor a state."""
+    """A recording without steps, and one with neither pictures nor states, are refused."""
     record(tmp_path / "data", header(), [])
     with pytest.raises(DemosError, match="nothing to export"):
         export_recording(tmp_path / "data", tmp_path / "csv", "csv")
@@ -333,12 +339,12 @@ def test_nothing_to_export(tmp_path: Path) -> None:
     record(tmp_path / "bare", bare, [(Step(action=(0.0, 0.0), driver="person"), None)])
     with pytest.raises(DemosError, match="neither pictures nor a state"):
         export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")
-    with pytest.raises(DemosError, match="cannot say that a step does not count"):
+    with pytest.raises(DemosError, match="cannot mark excluded steps"):
         export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)
 
 
 def test_no_text_is_a_formula(tmp_path: Path) -> None:
-    """A spreadsheet runs what begins with =, +, - or @ in a cell."""
+    """A spreadsheet runs a cell that begins with =, +, - or @."""
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0), stop_reason=text), picture(0))
         for text in ("=1+1", "+1", "-1", "@x", "\t=1", "\r=1")
@@ -352,7 +358,7 @@ def test_no_text_is_a_formula(tmp_path: Path) -> None:
 
 
 def test_a_file_that_vanishes_is_told(tmp_path: Path) -> None:
-    """An import that reads step by step fails in words where its source goes away meanwhile."""
+    """A lazy import raises a clear error when its source disappears meanwhile."""
     folder = keys_folder(tmp_path / "keys")
     ((_, steps),) = list(import_episodes(folder))
     next(steps)

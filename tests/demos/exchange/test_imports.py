@@ -1,4 +1,4 @@
-"""What others recorded becomes episodes."""
+"""Imports of all formats."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.demos.exchange.small import (
 
 
 def test_the_layout_of_2017(tmp_path: Path) -> None:
-    """Four numbers, the time of each name, the bytes of each picture; the source stays as it is."""
+    """Keys, times and picture bytes are imported; the source is unchanged."""
     folder = keys_folder(tmp_path / "keys")
     before = snapshot(folder)
     assert find_format(folder) == "2017"
@@ -57,7 +57,7 @@ def test_the_layout_of_2017(tmp_path: Path) -> None:
 
 
 def test_a_long_pause_ends_an_episode_of_2017(tmp_path: Path) -> None:
-    """More than thirty periods; and the parts are one folder again when they go out."""
+    """More than thirty periods split a drive; the export joins the parts again."""
     times = [100.0, 100.1, 100.2, 103.2, 103.3, 106.5]
     names = [f"{at}_.jpg" for at in times]
     folder = keys_folder(
@@ -90,7 +90,7 @@ _RECORDS: list[dict[str, Any]] = [
 
 
 def test_a_tub(tmp_path: Path) -> None:
-    """Sessions are episodes, deleted records are left out, and the pilot is a policy."""
+    """Sessions become episodes, deleted records are left out, and the pilot is a policy."""
     folder = tub_folder(tmp_path / "tub", _RECORDS, [1], {"imu/gyr_z": "float", "lap": "str"})
     before = snapshot(folder)
     assert find_format(folder) == "tub"
@@ -109,7 +109,7 @@ def test_a_tub(tmp_path: Path) -> None:
 
 
 def test_an_old_tub(tmp_path: Path) -> None:
-    """Records are counted, not sorted as words; a start of the car begins a drive."""
+    """Records are ordered by number, not as text; a restart of the car begins a drive."""
     folder = tmp_path / "tub"
     folder.mkdir()
     for n, ms in enumerate([0, 50, 100, 150, 200, 250, 300, 350, 400, 450, 0, 50]):
@@ -128,7 +128,7 @@ def test_an_old_tub(tmp_path: Path) -> None:
 
 
 def test_minari_reads_what_was_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Minari itself gives every pixel and every number, by the name of the dataset."""
+    """Minari itself loads every pixel and every number, by the name of the dataset."""
     drive(tmp_path / "data", 5)
     drive(tmp_path / "data", 3)
     export_recording(tmp_path / "data", tmp_path / "sets/corridor-v0", "minari")
@@ -165,7 +165,7 @@ def _foreign(
     *,
     jpeg: bool = False,
 ) -> Path:
-    """A dataset that Minari itself has made, of one episode."""
+    """Create a dataset of one episode with Minari itself."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder))
     steps = len(actions)
     buffer = EpisodeBuffer(
@@ -188,7 +188,7 @@ def _foreign(
 
 
 def test_numbers_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A dictionary of boxes and a discrete action become a state and one number."""
+    """A Dict of Boxes and a Discrete action become a state and a scalar action."""
     path = _foreign(
         tmp_path,
         monkeypatch,
@@ -212,7 +212,7 @@ def test_numbers_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mo
 def test_pictures_of_other_minari_datasets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
 ) -> None:
-    """What is stored as JPEG stays so; pixels become a JPEG that is close to them."""
+    """Stored JPEGs are kept; pixels become a JPEG that is close to them."""
     pixels = np.zeros((3, 40, 48, 3), np.uint8)
     pixels[:, :, :, 0] = np.arange(48) * 5
     pixels[:, :, :, 2] = 120
@@ -238,7 +238,7 @@ def test_pictures_of_other_minari_datasets(
 
 
 def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
-    """Each step comes with the picture that it saw, and nothing appears anywhere."""
+    """Each step comes with its picture, and no file is created."""
     keys_folder(tmp_path / "keys")
     before = snapshot(tmp_path)
     ((head, steps),) = list(import_episodes(tmp_path / "keys"))

@@ -1,4 +1,4 @@
-"""A round trip changes nothing, whatever was recorded."""
+"""Export followed by import changes nothing."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _TIMES = st.none() | st.integers(0, 2**62)
 
 @st.composite
 def _steps(draw: st.DrawFn) -> list[tuple[Step, bytes | None, list[str]]]:
-    """Steps with pictures that repeat, and their marks."""
+    """Steps with repeated pictures, and their marks."""
     steps = []
     clock = 0
     for number in range(draw(st.integers(1, 4))):
@@ -84,7 +84,7 @@ def test_whatever_was_recorded_comes_back(
     outcome: str,
     data: st.DataObject,
 ) -> None:
-    """Numbers to the last bit, texts, pictures to the last byte, marks and drops."""
+    """Numbers, texts, pictures, marks and drops survive exactly."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         with EpisodeWriter.create(place / "data", header(**head)) as writer:
@@ -105,7 +105,7 @@ def test_whatever_was_recorded_comes_back(
 
 @pytest.mark.parametrize("name", ["csv", "minari"])
 def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
-    """They come back as many as they were, the first one first."""
+    """All episodes come back in order, even those of more than one chunk."""
     for count in (3, 1, 300):  # More than fit into one chunk.
         drive(tmp_path / "data", count)
     export_recording(tmp_path / "data", tmp_path / "x-v0", name)
@@ -144,7 +144,7 @@ def test_every_kind_of_observation_comes_back(
 def test_the_layout_of_2017_comes_back_byte_for_byte(
     tmp_path: Path, newline: str, style: str
 ) -> None:
-    """Labels, names and pictures, however the labels were written."""
+    """Labels, names and pictures are the same, however the labels were written."""
     keys_folder(tmp_path / "keys", newline=newline)
     labels = tmp_path / "keys/labels.csv"
     text = labels.read_bytes()
@@ -162,7 +162,7 @@ def test_the_layout_of_2017_comes_back_byte_for_byte(
 def test_folders_may_be_relative(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """As they are when somebody types them."""
+    """Relative paths work."""
     monkeypatch.chdir(tmp_path)
     drive(Path("data"))
     export_recording(Path("data"), Path("x-v0"), name)
@@ -171,7 +171,7 @@ def test_folders_may_be_relative(
 
 
 def test_a_tub_comes_back(tmp_path: Path) -> None:
-    """What a tub can hold is there again: actions, drivers, wishes, states, pictures, times."""
+    """Actions, drivers, policy outputs, states, pictures and times survive."""
     steps = [
         (Step(action=(-0.5, 1.0), driver="person", state=(0.1, math.nan), wanted=(0.25, 0.5)), 0),
         (Step(action=(0.75, 0.0), driver="policy", state=(1 / 3, 20.0)), 1),
@@ -191,7 +191,7 @@ def test_a_tub_comes_back(tmp_path: Path) -> None:
 
 
 def test_steps_that_were_dropped_stay_at_home(tmp_path: Path) -> None:
-    """Unless they are asked for; and who shared a picture with one of them keeps it."""
+    """Dropped steps are not exported by default; later steps keep a picture shared with them."""
     steps = [
         (Step(action=(float(n), 0.0), driver="person", state=(0.0, 0.0)), jpeg)
         for n, jpeg in enumerate((picture(0), None, None, picture(3)))

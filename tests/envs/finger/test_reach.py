@@ -191,7 +191,7 @@ def test_options_say_where_to_start_and_where_to_go() -> None:
         ({"path": "circle"}, UnknownName, "There are: posture, target"),
         ({"posture": [0.0, 0.0]}, FingerError, "four angles in rad, MCP_flexion, .*; got"),
         ({"posture": [2.0, 0.0, 0.0, 0.0]}, FingerError, r"within \[-0.349.* and \[1.571"),
-        ({"posture": [np.nan] * 4}, FingerError, "A posture is four angles"),
+        ({"posture": [np.nan] * 4}, FingerError, "A posture must be four angles"),
         ({"target": [0.1, 0.2]}, FingerError, "three finite numbers, m, or four angles"),
         ({"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
     ],
@@ -209,9 +209,9 @@ def test_options_that_are_none_are_refused(
     [
         ({"actions": "tensions"}, UnknownName, "'tensions'. Did you mean 'tension'"),
         ({"gap": "reel-like"}, UnknownName, "'reel-like'. Did you mean 'real-like'"),
-        ({"gap": "wide", "parameters": NOMINAL}, FingerError, "or is drawn from a gap: give one"),
+        ({"gap": "wide", "parameters": NOMINAL}, FingerError, "Give either parameters or a gap"),
         ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
-        ({"parameters": "{}x"}, FingerError, "These are no parameters of a finger"),
+        ({"parameters": "{}x"}, FingerError, "Invalid finger parameters"),
         ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),
         ({"render_mode": "rgb"}, UnknownName, "No render mode matches 'rgb'"),
     ],
@@ -251,7 +251,7 @@ def test_a_gap_survives_in_a_spec() -> None:
         spec = EnvSpec.from_json(env.spec.to_json())
     with gym.make(spec) as again:
         assert again.unwrapped.parameters == parameters
-    with pytest.raises(FingerError, match="give a gap, too"):
+    with pytest.raises(FingerError, match="so it needs a gap"):
         FingerReachEnv(finger_seed=2)
 
 

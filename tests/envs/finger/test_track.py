@@ -88,7 +88,7 @@ def test_a_path_that_leaves_the_workspace_is_refused(
 ) -> None:
     """Where, when and by how much; a millimetre is one in the message."""
     path = circle(0.012, place, hz=1.5)
-    with pytest.raises(PathError, match="The path leaves what the finger reaches: at ") as caught:
+    with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
     words = str(caught.value).split()
     said = float(words[words.index("beyond.") - 2])
@@ -131,7 +131,7 @@ def test_a_file_can_be_followed(tmp_path: File) -> None:
     ("change", "sentence"),
     [
         (("0.7,", "0.5,"), "line 9: time runs backwards, from 0.6 s to 0.5 s"),
-        (("1.5,", "9.5,"), "line 17: 8.1 s have passed since the row before, a gap"),
+        (("1.5,", "9.5,"), "line 17: the time step of 8.1 s is a gap"),
         (("0.0500", "nan"), "x is 'nan', which is not finite"),
         (("t,x,y,z", "t,x,y"), "lacks z"),
     ],
@@ -178,7 +178,7 @@ def test_another_path_can_be_given_at_a_reset() -> None:
     env = FingerTrackEnv()
     env.reset(seed=0)
     first = env.path
-    with pytest.raises(PathError, match="leaves what the finger reaches"):
+    with pytest.raises(PathError, match="leaves the finger's reach"):
         env.reset(options={"path": circle(0.012, (0.09, 0.0, 0.0))})
     with pytest.raises(UnknownName, match=r"'circel'. Did you mean 'circle'"):
         env.reset(options={"path": "circel"})

@@ -35,7 +35,7 @@ def _ants(body: Body | str, **arguments: Any) -> tuple[AntEnv, _GymnasiumsAnt]:
     return AntEnv(body, **arguments), _GymnasiumsAnt(body, fast_model=False, **arguments)
 
 
-def _has_twin(env: Any) -> bool:
+def _steps_fast(env: Any) -> bool:
     return env._bound.has_fast_model is True and env._bound.stepping is not env.model
 
 
@@ -44,7 +44,7 @@ def test_named_ants(name: str) -> None:
     """All four, falling over and starting again."""
     ours, theirs = _ants(name)
     ends, touches = step_together(ours, theirs, 250, seed=1)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
     assert not hasattr(theirs, "_bound") or theirs._bound is None
     assert touches > 20 or ends
 
@@ -54,7 +54,7 @@ def test_named_pendulums(name: str) -> None:
     """All three, falling over and starting again."""
     ours, theirs = InvertedPendulumEnv(name), _GymnasiumsPendulum(name)
     ends, _ = step_together(ours, theirs, 400, seed=1)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
     assert ends > 3
 
 
@@ -95,7 +95,7 @@ def test_a_few_random_ants(seed: int) -> None:
     """Bodies that no id names."""
     ours, theirs = _ants(random_ant(seed))
     step_together(ours, theirs, 120, seed=seed)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_many_random_ants(seed: int) -> None:
     """1,000 steps each, with falls, resets and contacts."""
     ours, theirs = _ants(random_ant(seed), healthy_z_range=(0.1, 3.0) if seed % 2 else None)
     ends, touches = step_together(ours, theirs, 1000, seed=seed)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
     assert ends
     assert touches > 100
 
@@ -115,7 +115,7 @@ def test_a_few_random_pendulums(seed: int) -> None:
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 200, seed=seed)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_many_random_pendulums(seed: int) -> None:
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 1000, seed=seed, reach=1.0 if seed % 2 else 0.1)
-    assert _has_twin(ours)
+    assert _steps_fast(ours)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_new_body_is_stepped_by_its_own_twin() -> None:
         for _ in range(20):
             action = np.full(8, 0.5, np.float32)
             assert same(ours.step(action), theirs.step(action))
-        assert _has_twin(ours)
+        assert _steps_fast(ours)
 
 
 def test_a_state_that_is_set_is_stepped_from() -> None:

@@ -273,3 +273,35 @@ def _restore(model: Any, saved: bytes) -> None:
                     getattr(getattr(model, part), name)[:] = value
                 else:
                     setattr(getattr(model, part), name, value)
+
+
+def test_an_edit_before_the_first_step_can_be_undone() -> None:
+    """The fast model's step then uses the timestep of the compiled model, not the edited one."""
+    ours, theirs = AntEnv(), AntEnv(fast_model=False)
+    AntEnv().reset(seed=0)
+    for env in (ours, theirs):
+        env.reset(seed=0)
+        timestep = env.model.opt.timestep
+        env.model.opt.timestep = 0.005
+        env.step(np.zeros(8))
+        env.model.opt.timestep = timestep
+    for _ in range(3):
+        same(ours.step(np.full(8, 0.2)), theirs.step(np.full(8, 0.2)))
+    assert ours._bound.has_fast_model
+
+
+@pytest.mark.parametrize("undone", [False, True])
+def test_a_start_keeps_within_edited_limits(undone: bool) -> None:
+    """Start rules are read again from a model whose joint ranges a user has edited."""
+    env = AntEnv(reset_noise_scale=1.0)
+    env.reset(seed=0)
+    before = env.model.jnt_range.copy()
+    joint = env.model.joint("hip_1").id
+    place = env.model.jnt_qposadr[joint]
+    env.model.jnt_range[joint] = (0.11, 0.12)
+    if undone:
+        env.model.jnt_range[:] = before
+    starts = [env.reset(seed=seed) and float(env.data.qpos[place]) for seed in range(20)]
+    inside = [0.11 <= start <= 0.12 for start in starts]
+    assert all(inside) is not undone
+    assert all(before[joint, 0] <= start <= before[joint, 1] for start in starts)

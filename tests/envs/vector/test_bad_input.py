@@ -105,7 +105,7 @@ def _with(place: tuple[int, ...], value: float) -> Any:
         ([np.zeros(8), np.zeros(8), np.zeros(9)], r"action of env 2 has shape \(9,\), not \(8,\)"),
         (np.zeros(24), "3 envs and 24 actions"),
         (0.0, r"one row per env, shape \(3, 8\)"),
-        (np.full((3, 8), "left"), "Actions are numbers"),
+        (np.full((3, 8), "left"), "Actions must be numbers"),
     ],
     ids=["nan", "inf", "narrow", "few", "ragged", "flat", "number", "words"],
 )

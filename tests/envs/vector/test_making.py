@@ -39,6 +39,32 @@ def test_gymnasium_makes_ours(env_id: str) -> None:
         one.close()
 
 
+def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
+    """As the docs show it; Gymnasium refuses `vector_kwargs` for any vector entry point."""
+    envs: Any = gym.make_vec("shapechanger/Ant-v1", num_envs=3, threads=2)
+    assert envs.threads == 2
+    envs.close()
+    with pytest.raises(gym.error.Error, match="only through kwargs"):
+        gym.make_vec("shapechanger/Ant-v1", num_envs=3, vector_kwargs={"threads": 2})
+
+
+def test_a_vector_env_of_one_env() -> None:
+    """It has the results of the env alone, and two dimensions."""
+    envs, alone = shapechanger.make_vec("Ant"), gym.make("shapechanger/Ant-v1")
+    assert envs.num_envs == envs.threads == 1
+    observations, _ = envs.reset(seed=3)
+    assert observations.tolist() == [alone.reset(seed=3)[0].tolist()]
+    action = np.full(8, 0.3, np.float32)
+    for _ in range(3):
+        observations, rewards, terminated, truncated, _ = envs.step(action[None])
+        expected = alone.step(action)
+        assert observations.tolist() == [expected[0].tolist()]
+        assert rewards.tolist() == [expected[1]]
+        assert (terminated.tolist(), truncated.tolist()) == ([expected[2]], [expected[3]])
+    envs.close()
+    alone.close()
+
+
 def test_gymnasiums_own_are_still_there() -> None:
     """Who asks for them gets them."""
     envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2, vectorization_mode="sync")

@@ -19,7 +19,7 @@ import pytest
 
 import shapechanger
 from shapechanger.envs.vector import ThreadVectorEnv
-from shapechanger.envs.vector.threads import Pool
+from shapechanger.envs.vector.threads import ThreadPool
 
 
 class _Plain(gym.Env[Any, Any]):
@@ -166,7 +166,7 @@ def test_who_forgets_to_close_leaves_no_threads() -> None:
 
 def test_a_second_interruption_does_not_wait() -> None:
     """A thread that never ends is left behind, and nothing touches its envs."""
-    pool, hold, working = Pool(2), threading.Event(), threading.Event()
+    pool, hold, working = ThreadPool(2), threading.Event(), threading.Event()
     presses = 0
 
     def work() -> None:

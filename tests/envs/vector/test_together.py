@@ -34,9 +34,9 @@ def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     counts: list[int] = []
     original = AntEnv.conclude
 
-    def counting(env: AntEnv, before: Any, after: Any, actions: Any) -> Any:
-        counts.append(len(after))
-        return original(env, before, after, actions)
+    def counting(env: AntEnv, bounds: Any, *rest: Any) -> Any:
+        counts.append(len(bounds))
+        return original(env, bounds, *rest)
 
     monkeypatch.setattr(AntEnv, "conclude", counting)
     return counts

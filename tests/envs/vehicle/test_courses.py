@@ -68,7 +68,7 @@ def test_what_is_no_course_is_refused() -> None:
     with pytest.raises(WorldError, match="no courses to draw from: give at least one seed"):
         CourseSampler((), randomise=False)
     for seed in (-1, 1.5, "a", None):
-        with pytest.raises(WorldError, match="The seed of a course is a whole number from 0"):
+        with pytest.raises(WorldError, match="The seed of a course must be a whole number from 0"):
             CourseSampler((seed,), randomise=False)  # pyright: ignore[reportArgumentType]
 
 
@@ -76,10 +76,10 @@ def test_what_is_no_course_is_refused() -> None:
     ("options", "sentence"),
     [
         ({"curse": 1}, "No option of reset matches 'curse'. Did you mean 'course'"),
-        ({"course": "a"}, "The seed of a course is a whole number from 0, got 'a'"),
-        ({"course": -1}, "The seed of a course is a whole number from 0, got -1"),
-        ({"start": -1}, "The seed of a start is a whole number from 0, got -1"),
-        ({"start": 0.5}, "The seed of a start is a whole number from 0, got 0.5"),
+        ({"course": "a"}, "The seed of a course must be a whole number from 0, got 'a'"),
+        ({"course": -1}, "The seed of a course must be a whole number from 0, got -1"),
+        ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
+        ({"start": 0.5}, "The seed of a start must be a whole number from 0, got 0.5"),
     ],
 )
 def test_options_that_are_none_are_refused(options: dict[str, Any], sentence: str) -> None:

@@ -25,6 +25,8 @@ from shapechanger.robot.cameras.pattern import read_barcode
 from shapechanger.robot.cameras.v4l2 import V4l2
 from tests.robot.guard.waiting import until
 
+pytestmark = pytest.mark.realtime
+
 
 def _jpeg(value: int = 0, size: tuple[int, int] = (32, 24)) -> bytes:
     image = np.full((size[1], size[0], 3), value, np.uint8)

@@ -11,6 +11,8 @@ from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import PHONE, Console, Pins
 from tests.twin.robots import until
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Visit = Callable[..., Console]
 
 # ms that the guard may be late: one of its ticks, and what the one-shot of the enable line adds.

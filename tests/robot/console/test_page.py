@@ -16,6 +16,8 @@ from shapechanger.link.authentication import new_key
 from shapechanger.twin.robot import RunningRobot
 from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Visit = Callable[..., Console]
 
 
@@ -57,7 +59,7 @@ def test_a_wrong_key_says_what_is_wrong_and_loses_nothing(car: RunningRobot, vis
     """Neither what is no key at all, nor the key of another robot; then the right one is taken."""
     console = visit(car, key="ABCD-EFGH")
     trouble = "#key-trouble"
-    console.await_words(trouble, "A key has 26 letters and numbers, this one has 8.")
+    console.await_words(trouble, "A key has 26 letters and digits, got 8.")
     assert console.page.input_value("#key") == "ABCD-EFGH"
     other = new_key()
     console.page.fill("#key", other.lower())
@@ -68,7 +70,7 @@ def test_a_wrong_key_says_what_is_wrong_and_loses_nothing(car: RunningRobot, vis
     assert console.page.input_value("#name") == "Ada"
     console.page.fill("#key", "!" * 26)
     console.page.keyboard.press("Enter")
-    console.await_words(trouble, "only the letters A to Z and the numbers 2 to 7")
+    console.await_words(trouble, "only the letters A to Z and the digits 2 to 7")
     console.page.fill("#key", car.known.key.replace("-", " ").lower())
     console.page.click("#enter")
     console.await_state(link="open", view="cockpit")

@@ -22,6 +22,8 @@ from tests.robot.console.browser import Console, Pins
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 from tests.twin.robots import until
 
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
 Visit = Callable[..., Console]
 
 _DEADLINE_MS = 250.0
@@ -211,7 +213,7 @@ def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
 
     console.page.click("#browse")
     console.page.locator("#episode-list button").first.click()
-    console.await_words("#episodes-state", "All of it is here.")
+    console.await_words("#episodes-state", "Loaded.")
     console.page.fill("#scrub", str(len(episode.steps) - 1))
     console.await_words("#step-state", "person:")
     console.page.click("#range-from")

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from shapechanger.link.address import SERVICE
 from shapechanger.robot.daemon import discovery
-from shapechanger.robot.daemon.discovery import SERVICE, Announcement
+from shapechanger.robot.daemon.discovery import Announcement
 from tests.robot.daemon.plans import car_plan
 
 
@@ -58,10 +59,10 @@ def test_it_says_who_where_and_which_certificate(monkeypatch: pytest.MonkeyPatch
     asyncio.run(play())
 
 
-def test_a_network_that_does_not_let_it_is_no_reason_to_stop(
+def test_a_failed_announcement_is_only_a_warning(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """It is said in words."""
+    """The robot serves anyway."""
 
     def broken() -> None:
         raise OSError("Network is unreachable")
@@ -69,5 +70,5 @@ def test_a_network_that_does_not_let_it_is_no_reason_to_stop(
     monkeypatch.setattr(discovery, "AsyncZeroconf", broken)
     with caplog.at_level(logging.WARNING):
         assert not asyncio.run(Announcement(car_plan(), 5001, b"").start())
-    assert "not announced" in caplog.text
+    assert "cannot be announced" in caplog.text
     assert "Network is unreachable" in caplog.text

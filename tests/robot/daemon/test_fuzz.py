@@ -13,6 +13,8 @@ from benchmarks.fuzz_link import fuzz, mutated
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import running
 
+pytestmark = pytest.mark.realtime
+
 
 def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
     """Strangers stay outside, and who does not command gives no command."""

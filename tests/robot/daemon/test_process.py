@@ -22,6 +22,8 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from tests.robot.daemon.plans import car_plan, guard_state
 
+pytestmark = pytest.mark.realtime
+
 
 @dataclass
 class Started:

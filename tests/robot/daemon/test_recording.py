@@ -36,6 +36,8 @@ from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robot.daemon.plans import ACTIONS, car_plan, picture
 from tests.robot.daemon.running import Client, Running, running, until
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def play(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
@@ -66,7 +68,7 @@ async def drive(robot: Running, client: Client, first: int, count: int) -> list[
     seen: list[Observation] = []
     for seq in range(first, first + count):
         robot.show()
-        await until(lambda: robot.daemon._cockpit.newest is not None, "there is a picture")
+        await until(lambda: robot.daemon._hub.newest is not None, "there is a picture")
         answered = await client.observe()
         seen.append(answered)
         await client.say(Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5))
@@ -91,7 +93,7 @@ def test_a_step_is_what_was_seen_and_what_was_decided_on_seeing_it(
             await person.obtain()
             await robot.arm(person)
             await until(lambda: robot.guard.state.armed, "it is armed")
-            await until(lambda: robot.daemon._cockpit.state.armed, "that is known")
+            await until(lambda: robot.daemon._hub.state.armed, "that is known")
             began = await recording(person)
             assert (began.steps, began.dropped, began.text) == (0, 0, "")
             seen.extend(await drive(robot, person, 1, 12))
@@ -144,7 +146,7 @@ def test_an_episode_goes_on_when_another_one_drives(play: Any, tmp_path: Path) -
         async with robot.client(role="person") as person, robot.client(name="net") as program:
             await program.obtain()
             await robot.arm(program)
-            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, program, 1, 3)
             await person.obtain()
@@ -169,7 +171,7 @@ def test_undo_drops_what_was_recorded_last(play: Any, tmp_path: Path) -> None:
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
             await robot.armed(person)
-            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 5)
             await person.say(Undo(seconds=3_600.0))
@@ -243,13 +245,13 @@ def test_recording_ends_by_itself_with_a_sentence_and_the_robot_drives_on(
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
             await robot.armed(person)
-            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 2)
             frames = only(tmp_path / "kept") / "frames"
             frames.rename(frames.with_name("elsewhere"))
             seq = 3
-            while robot.daemon._cockpit.recorder.on:
+            while robot.daemon._hub.recorder.on:
                 await drive(robot, person, seq, 1)
                 seq += 1
             told = [m for m in person.heard if isinstance(m, RecorderState)]
@@ -305,7 +307,7 @@ def test_everybody_is_told_each_second(play: Any) -> None:
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client() as program:
             await robot.armed(person)
-            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 3)
             await program.say(Acknowledge())
@@ -326,7 +328,7 @@ def test_the_episode_is_closed_when_the_daemon_ends(
             robot.client(role="person") as person,
         ):
             await robot.armed(person)
-            await until(lambda: robot.daemon._cockpit.state.armed, "it is armed")
+            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 4)
             robot.daemon.end()
@@ -412,7 +414,7 @@ def test_who_is_only_told_things_stays_for_all_of_them(play: Any, tmp_path: Path
     async def script(robot: Running) -> None:
         async with robot.client() as program:
             for number in range(6):
-                robot.daemon._cockpit.event("news", str(number))
+                robot.daemon._hub.event("news", str(number))
                 while (heard := await program.expect(Event)).name != "news":
                     pass
                 assert heard.text == str(number)

@@ -42,6 +42,8 @@ from shapechanger.robot.daemon.pre_auth import PreAuthConnections
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Client, Running, running, until
 
+pytestmark = pytest.mark.realtime
+
 Script = Callable[[Running], Awaitable[None]]
 
 
@@ -89,7 +91,7 @@ def test_who_holds_the_key_is_let_in(play: Any, secured: tuple[DaemonPlan, bytes
 def test_a_wrong_key_is_refused_in_words_and_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """However often; the right one is let in at once, from the same address too."""
+    """Each time; the right key is accepted at once, from the same address too."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
 
@@ -116,7 +118,7 @@ def test_a_wrong_key_is_refused_in_words_and_slowly(
 def test_a_proof_made_elsewhere_does_not_fit(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, spoiled: str
 ) -> None:
-    """One that was heard before, one for a certificate in the middle, one of another role."""
+    """A replayed proof, one for another certificate, one for another role."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.0)
 
@@ -134,14 +136,14 @@ def test_a_proof_made_elsewhere_does_not_fit(
 
 
 def test_another_version_is_refused_with_both_numbers(play: Any) -> None:
-    """And with what to do."""
+    """The message says what to do."""
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
             await client.say(Hello(version=VERSION + 1, proof=b""))
             reason = await client.closed_with()
             assert f"version {VERSION} " in reason
-            assert f"speak {VERSION + 1}" in reason
+            assert f"client {VERSION + 1}" in reason
 
     play(script)
 
@@ -185,20 +187,20 @@ async def _pong_flood(client: Client) -> None:
     ("misbehave", "words"),
     [
         (_text, "binary messages"),
-        (_garbage, "no message"),
-        (_cut, "no message"),
+        (_garbage, "Not a valid message"),
+        (_cut, "Not a valid message"),
         (_large, "larger than the 65536 allowed"),
-        (_hello_again, "hello already"),
-        (_flood, "500 messages a second"),
-        (_ping_flood, "500 messages a second"),
-        (_pong_flood, "500 messages a second"),
+        (_hello_again, "sent already"),
+        (_flood, "500 per second"),
+        (_ping_flood, "500 per second"),
+        (_pong_flood, "500 per second"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
-def test_who_misbehaves_is_told_why_and_stops_the_robot(
+def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
     play: Any, misbehave: Callable[[Client], Awaitable[None]], words: str
 ) -> None:
-    """Once known, too: the connection ends, and with it what it commanded."""
+    """After authentication too; the client is sent the reason."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -213,7 +215,7 @@ def test_who_misbehaves_is_told_why_and_stops_the_robot(
 
 
 def test_a_huge_message_ends_the_connection_before_it_is_whole(play: Any) -> None:
-    """One of 100 MB is not collected first."""
+    """100 MB are not buffered first."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -226,19 +228,21 @@ def test_a_huge_message_ends_the_connection_before_it_is_whole(play: Any) -> Non
     play(script)
 
 
-def test_who_says_nothing_is_sent_away(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A place at the door is not for ever."""
+def test_a_client_without_a_hello_is_disconnected(
+    play: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a limited time."""
     monkeypatch.setattr(connection, "HELLO_TIMEOUT_S", 0.05)
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
-            assert "did not say hello" in await client.closed_with()
+            assert "No hello was received" in await client.closed_with()
 
     play(script)
 
 
-def test_the_door_and_the_robot_have_so_many_places(play: Any) -> None:
-    """Sixteen of one address may be at the door; six programs and eight clients may be in."""
+def test_connections_are_limited_before_and_after_authentication(play: Any) -> None:
+    """Sixteen of one address before; six programs and eight clients in total after."""
 
     async def script(robot: Running) -> None:
         strangers = [robot.connect() for _ in range(17)]
@@ -248,11 +252,11 @@ def test_the_door_and_the_robot_have_so_many_places(play: Any) -> None:
         for client in clients[:6]:
             await client.greet(role="program")
         await clients[6].say(Hello(version=VERSION, proof=b"", role="program"))
-        assert "places are for persons" in await clients[6].closed_with()
+        assert "only a person can still connect" in await clients[6].closed_with()
         await clients[7].greet(role="person")
         async with robot.client(role="person"), robot.connect() as ninth:
             await ninth.say(Hello(version=VERSION, proof=b"", role="person"))
-            assert "no place" in await ninth.closed_with()
+            assert "8 clients are connected" in await ninth.closed_with()
         for stranger in strangers:
             await stranger.__aexit__(None, None, None)
 
@@ -260,7 +264,7 @@ def test_the_door_and_the_robot_have_so_many_places(play: Any) -> None:
 
 
 def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
-    """Everybody is told who commands; the old one's commands no longer count."""
+    """All clients learn who has control; commands of the previous holder no longer count."""
 
     async def script(robot: Running) -> None:
         async with (
@@ -268,16 +272,16 @@ def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
             robot.client(name="ppo") as ppo,
             robot.client(name="Ann", role="person") as ann,
         ):
-            assert await sac.take() == Lease(mine=True, holder="sac", reason="sac commands.")
+            assert await sac.take() == Lease(mine=True, holder="sac", reason="sac has control.")
             lease = await ppo.take()
             assert (lease.mine, lease.holder) == (False, "sac")
             await robot.armed(ann)
             lost = await sac.expect(Lease)
             assert (lost.mine, lost.holder) == (False, "Ann")
-            assert "took the command from sac" in lost.reason
-            assert "halt" in robot.guard.kinds()  # What sac said last acts no more.
+            assert "took control from sac" in lost.reason
+            assert "halt" in robot.guard.kinds()  # The last command of sac is no longer in force.
             await sac.say(Command(seq=1, answers=0, values=(0.0, 1.0)))
-            assert "do not command" in (await sac.expect(Refused)).reason
+            assert "do not have control" in (await sac.expect(Refused)).reason
             assert (await ann.drive(1, 0.0, 0.5)).action_applied == (0.0, 0.5)
         commands = [order for order in robot.guard.orders if order.kind == "command"]
         assert [(order.session, order.values) for order in commands] == [(2, (0.0, 0.5))]
@@ -286,7 +290,7 @@ def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
 
 
 def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
-    """Repeated, out of order, in answer to what was never sent, of a wrong length, no numbers."""
+    """Repeated, out of order, answering nothing that was sent, of the wrong length, not finite."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -297,8 +301,8 @@ def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
                 (5, seen.seq, (0.0, 1.0), "not newer than 5"),
                 (4, seen.seq, (0.0, 1.0), "not newer than 5"),
                 (6, seen.seq + 100, (0.0, 1.0), "not sent to this client"),
-                (7, seen.seq, (1.0,), "has 2 values, this one has 1"),
-                (8, seen.seq, (0.0, nan), "no finite number"),
+                (7, seen.seq, (1.0,), "has 2 values, got 1"),
+                (8, seen.seq, (0.0, nan), "must be finite"),
             ):
                 await client.say(Command(seq=seq, answers=answers, values=values))
                 refused = await client.expect(Refused)
@@ -309,8 +313,8 @@ def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
     play(script)
 
 
-def test_nonsense_ends_what_was_commanded_before(play: Any) -> None:
-    """At once, and not at the deadline; and the robot stays armed for who comes to their senses."""
+def test_an_invalid_command_ends_the_command_before_it(play: Any) -> None:
+    """At once, and not at the deadline; the robot stays armed for valid commands."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -325,8 +329,8 @@ def test_nonsense_ends_what_was_commanded_before(play: Any) -> None:
     play(script)
 
 
-def test_nonsense_that_is_old_or_of_somebody_else_ends_nothing(play: Any) -> None:
-    """What is newer goes on."""
+def test_an_invalid_command_that_is_old_or_of_another_client_ends_nothing(play: Any) -> None:
+    """The newer command stays in force."""
     nan = float("nan")
 
     async def script(robot: Running) -> None:
@@ -341,8 +345,8 @@ def test_nonsense_that_is_old_or_of_somebody_else_ends_nothing(play: Any) -> Non
     play(script)
 
 
-def test_who_arms_late_does_not_arm(play: Any) -> None:
-    """Nobody may be looking any more; what was never sent arms nothing either."""
+def test_a_late_request_to_arm_is_refused(play: Any) -> None:
+    """The operator may have looked away; an observation that was never sent arms nothing either."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -409,7 +413,7 @@ def test_who_does_not_ask_for_the_link_is_dropped(
 ) -> None:
     """In its handshake or behind it; a client that is known stays."""
     plan, key = secured if secure else (car_plan(), b"")
-    monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(patience_s=0.2))
+    monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(timeout_s=0.2))
 
     async def script(robot: Running) -> None:
         async with robot.client(key) as client:
@@ -532,7 +536,7 @@ def test_who_may_arm(play: Any, arming: str) -> None:
     async def script(robot: Running) -> None:
         async with robot.client() as one, robot.client() as two:
             await robot.arm(one)
-            assert "Nobody commands" in (await one.expect(Refused)).reason
+            assert "No client has control" in (await one.expect(Refused)).reason
             await one.take()
             await robot.arm(two)
             await two.expect(Refused)
@@ -550,7 +554,7 @@ def test_who_may_arm(play: Any, arming: str) -> None:
             while not (await one.observe()).emergency:
                 pass
             await robot.arm(one, emergency=1)
-            assert "Only a person ends" in (await one.expect(Refused)).reason
+            assert "Only a person can end" in (await one.expect(Refused)).reason
 
     play(script, car_plan(arming=arming))
 
@@ -662,7 +666,7 @@ def test_a_port_that_is_taken_is_said(play: Any, monkeypatch: pytest.MonkeyPatch
     """And what that usually means."""
 
     async def script(robot: Running) -> None:
-        with pytest.raises(RobotError, match="run already"):
+        with pytest.raises(RobotError, match="served already"):
             async with running(car_plan(port=robot.port), monkeypatch):
                 pass
 

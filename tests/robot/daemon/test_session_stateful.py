@@ -58,7 +58,7 @@ class Robot(RuleBasedStateMachine):
         self.now_ns = 1_000_000_000
         self.orders: list[Order] = []
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
-        self.cockpit = SessionHub(car_plan(), lambda: self.now_ns, self.orders.append)
+        self.hub = SessionHub(car_plan(), lambda: self.now_ns, self.orders.append)
         self.sessions: dict[int, Session] = {}
         self.told: dict[int, Told] = {}
         self.holder: int | None = None
@@ -79,7 +79,7 @@ class Robot(RuleBasedStateMachine):
         if place in self.sessions:
             return
         self.numbers += 1
-        session = Session(self.numbers, self.cockpit, Authenticator())
+        session = Session(self.numbers, self.hub, Authenticator())
         session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
         self.sessions[place], self.told[place] = session, Told(role)
 
@@ -212,7 +212,7 @@ class Robot(RuleBasedStateMachine):
         before = len(self.orders)
         if self.say(place, wish):
             assert len(self.orders) == before
-            assert not self.cockpit.recorder.on
+            assert not self.hub.recorder.on
 
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
@@ -234,8 +234,8 @@ class Robot(RuleBasedStateMachine):
     @rule()
     def news(self) -> None:
         """The guard and the camera say something."""
-        self.cockpit.on_state(guard_state(at_ns=self.now_ns, armed=True))
-        self.cockpit.on_frame(Frame(b"jpeg", self.now_ns))
+        self.hub.on_state(guard_state(at_ns=self.now_ns, armed=True))
+        self.hub.on_frame(Frame(b"jpeg", self.now_ns))
 
     @invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
@@ -260,28 +260,28 @@ class Robot(RuleBasedStateMachine):
     @invariant()
     def there_is_one_who_commands(self) -> None:
         """The same as in the reference."""
-        held = self.cockpit.lease.holder
-        place = next((p for p, s in self.sessions.items() if s.who == held), None)
+        held = self.hub.lease.holder
+        place = next((p for p, s in self.sessions.items() if s.client == held), None)
         assert place == self.holder
 
     @invariant()
     def the_newest_suggestion_is_shown_as_long_as_it_counts(self) -> None:
         """The same as in the reference, with its sender."""
-        shown, expected = self.cockpit.suggested(), self.suggestion
+        shown, expected = self.hub.suggested(), self.suggestion
         if expected is None or self.now_ns > expected[2]:
             assert shown is None
         else:
             assert shown is not None
             assert shown.values == expected[1]
-            assert shown.who == self.sessions[expected[0]].who
+            assert shown.client == self.sessions[expected[0]].client
 
     @invariant()
     def no_command_is_in_force_unless_somebody_commands(self) -> None:
         """And not for longer than the deadline."""
         if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
-            assert self.cockpit.commanded() == ()
-        elif self.cockpit.commanded():
-            assert self.cockpit.commanded() == self.allowed[-1][1]
+            assert self.hub.commanded() == ()
+        elif self.hub.commanded():
+            assert self.hub.commanded() == self.allowed[-1][1]
 
     def forget_suggestion(self, place: int) -> None:
         """What was suggested there does not count any more."""

@@ -22,6 +22,8 @@ from shapechanger.robot.guard.supervisor import Restarts
 from tests.robot.guard.plans import car
 from tests.robot.guard.recording import Record, connect
 
+pytestmark = pytest.mark.realtime
+
 _PLAN = ServePlan(car(), {"port": 5000, "nested": {"a": [1, 2]}}, ("module:function", "argument"))
 
 

@@ -24,7 +24,10 @@ from tests.robot.guard.plans import MS, quick_car
 from tests.robot.guard.running import running
 from tests.robot.guard.waiting import until
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Robots run Linux.")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="Robots run Linux."),
+    pytest.mark.realtime,
+]
 
 _MOST_GUARD_KB = 25 * 1024
 

@@ -61,7 +61,7 @@ def test_a_motor_that_went_backward_is_turned_round_by_its_mix() -> None:
 @pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
 def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
     """Otherwise there is nothing left to drive with."""
-    with pytest.raises(RobotError, match="cannot start"):
+    with pytest.raises(RobotError, match="must start at a duty"):
         motor_changes(_MOTOR, "forward", duty)
 
 
@@ -73,7 +73,7 @@ def test_a_wheel_is_scaled_by_the_way_that_was_pushed() -> None:
 @pytest.mark.parametrize("measured_m", [0.0, -0.8])
 def test_a_wheel_that_counts_nothing_or_backward_is_a_matter_of_wires(measured_m: float) -> None:
     """A scale would hide it."""
-    with pytest.raises(RobotError, match="look at its wires"):
+    with pytest.raises(RobotError, match="check its wires"):
         wheel_changes("wheel", 0.21, 1.0, measured_m)
 
 

@@ -137,7 +137,7 @@ def test_a_camera_that_hangs_does_not_hang_the_doctor(
 ) -> None:
     """Cameras that stop feeding are common (picamera2#1004)."""
     monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", 0.01)
-    assert "no picture" in _found(tmp_path, camera=_CAMERA)["camera"].sentence
+    assert "no frame" in _found(tmp_path, camera=_CAMERA)["camera"].sentence
 
 
 def test_a_port_in_use_is_named(tmp_path: Path) -> None:

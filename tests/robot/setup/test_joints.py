@@ -85,7 +85,7 @@ def root(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("how", "says"),
     [
-        ("", "good: That of PIP_flexion sees its magnet."),
+        ("", "good: The encoder of PIP_flexion detects its magnet."),
         ("gone", "missing: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
         ("weak", "missing: The magnet of PIP_flexion is too far from its encoder."),
         ("strong", "missing: The magnet of PIP_flexion is too near to its encoder."),
@@ -115,7 +115,7 @@ def test_the_doctor_asks_no_encoder_of_a_robot_that_is_served(root: Path) -> Non
         taken.bind(("", 0))
         taken.listen()
         said = _found(root, _PLAN, _board(), port=taken.getsockname()[1])["encoders"]
-    assert said == ["unknown: The robot may be served now, so nobody else asks its encoders."]
+    assert said == ["unknown: The robot may be served now, and its encoders were left alone."]
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_zeros_are_where_nothing_moves_any_more() -> None:
     assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
     assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
     assert board.rig is not None
-    assert not any(servo.has_torque for servo in board.rig.line.servos.values())
+    assert not any(servo.has_torque for servo in board.rig.bus.servos.values())
 
 
 def test_a_tendon_that_came_off_has_no_zero() -> None:
@@ -44,7 +44,7 @@ def test_a_tendon_that_came_off_has_no_zero() -> None:
     board.rig.break_servo("EIP", "snapped")
     with pytest.raises(RobotError, match="EIP"):
         find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
-    assert not any(servo.has_torque for servo in board.rig.line.servos.values())
+    assert not any(servo.has_torque for servo in board.rig.bus.servos.values())
 
 
 def test_a_car_has_no_tendons() -> None:

@@ -88,7 +88,7 @@ def test_a_point_is_three_numbers(given: object) -> None:
     with pytest.raises(PathError) as caught:
         from_callable(function)
     assert str(caught.value) == (
-        "The function of a path must give three finite numbers (x, y, z) in m, and at 0 s it gave "
+        "The function of a path must return three finite numbers (x, y, z) in m, and at 0 s it returned "
         f"{given!r}."
     )
 
@@ -96,10 +96,14 @@ def test_a_point_is_three_numbers(given: object) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_numbers_are_finite_from_end_to_end(bad: float) -> None:
     """A pole in the middle is found when the path is made, one after the trial when it is met."""
-    with pytest.raises(PathError, match=r"three finite numbers .* at 3 s it gave \(0\.0, 0\.0, "):
+    with pytest.raises(
+        PathError, match=r"three finite numbers .* at 3 s it returned \(0\.0, 0\.0, "
+    ):
         from_callable(lambda t: (0.0, 0.0, bad if t == 3.0 else 0.0), duration_s=4.0)
     path = from_callable(lambda t: (0.0, 0.0, bad if t > 60.0 else 0.0))
-    with pytest.raises(PathError, match=r"three finite numbers .* at 61 s it gave \(0\.0, 0\.0, "):
+    with pytest.raises(
+        PathError, match=r"three finite numbers .* at 61 s it returned \(0\.0, 0\.0, "
+    ):
         path.at([59.0, 61.0])
 
 
@@ -146,10 +150,10 @@ def test_a_period_brings_it_back() -> None:
     with pytest.raises(PathError) as caught:
         from_callable(lambda t: (0.001 * t, 0.0, 0.0), period_s=3.0)
     assert str(caught.value) == (
-        "After its period of 3 s the path is 3 mm from where it began, and 0.1 mm are allowed: "
-        "give another period_s, or its end as duration_s."
+        "After its period of 3 s the path is 3 mm from its beginning, and 0.1 mm are allowed: "
+        "give another period_s, or duration_s for an open path."
     )
-    with pytest.raises(PathError, match=r"is 0\.12 mm from where it began"):
+    with pytest.raises(PathError, match=r"is 0\.12 mm from its beginning"):
         from_callable(lambda t: (0.00004 * t, 0.0, 0.0), period_s=3.0)
     path = from_callable(lambda t: (0.00003 * t, 0.0, 0.0), period_s=3.0)
     np.testing.assert_allclose(path.velocity([0.0, 2.9999, 3.0]), [[3e-5, 0, 0]] * 3, atol=1e-9)
@@ -163,7 +167,7 @@ def test_a_period_brings_it_back() -> None:
         ({"period_s": math.inf}, "period_s must be a finite number above 0, got inf."),
         (
             {"duration_s": 1.0, "period_s": 1.0},
-            "A path ends after duration_s or repeats after period_s, got both: leave one out.",
+            "A path ends after duration_s or repeats after period_s; give only one of them.",
         ),
     ],
 )

@@ -102,17 +102,17 @@ def test_unknown_names_come_with_the_nearest(given: Any, said: str) -> None:
     [
         (
             {"radius": 0.01},
-            'A path with settings has the key "kind", one of circle, figure-eight, line, curve, '
+            'A path with settings needs the key "kind", one of circle, figure-eight, line, curve, '
             "got {'radius': 0.01}.",
         ),
         (
             {"kind": "circle", "radius": "wide"},
             "The radius of a circle must be a finite number above 0, got 'wide'.",
         ),
-        (File("path.txt"), "A path is read from a file that ends in .csv, got 'path.txt'."),
+        (File("path.txt"), "A path file must end in .csv, got 'path.txt'."),
         (
             3,
-            "A path is one of circle, figure-eight, line, curve, such a name with settings, a .csv "
+            "A path must be one of circle, figure-eight, line, curve, such a name with settings, a .csv "
             "file or a function of time, got 3.",
         ),
     ],

@@ -190,7 +190,7 @@ def test_answers_share_no_memory_with_the_path(path: FingertipPath) -> None:
 @pytest.mark.parametrize("t", [math.nan, math.inf, [0.0, -math.inf]])
 def test_times_are_finite(t: float | list[float]) -> None:
     """A NaN in is an error, not a NaN in the reward."""
-    with pytest.raises(PathError, match=r"^A path is asked for finite times in s, got NaN"):
+    with pytest.raises(PathError, match=r"^Times of a path must be finite, got NaN"):
         circle().at(t)
 
 

@@ -40,9 +40,7 @@ def test_the_length_can_be_chosen() -> None:
     assert sample(endless, hz=10.0, duration_s=20.0)[1].shape == (201, 3)
     with pytest.raises(PathError) as caught:
         sample(endless, hz=10.0)
-    assert str(caught.value) == (
-        "This path neither ends nor repeats: say for how long, with duration_s."
-    )
+    assert str(caught.value) == ("This path neither ends nor repeats, so it needs duration_s.")
 
 
 @pytest.mark.parametrize("hz", [0.0, -1.0, math.nan, math.inf])

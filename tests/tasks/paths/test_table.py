@@ -83,12 +83,12 @@ def lines(*rows: str) -> str:
         ("t,x,y\n0,0,0\n", "{file}, line 1 lacks z: the columns are t, x, y and z."),
         (
             "0,0,0,0\n1,0,0,0\n",
-            "{file}, line 1 lacks t, x, y, z and has '0', '0', '0', '0' too much: the columns are "
+            "{file}, line 1 lacks t, x, y, z and has the unknown columns '0', '0', '0', '0': the columns are "
             "t, x, y and z.",
         ),
         (
             "t,x,y,z,grip\n",
-            "{file}, line 1 has 'grip' too much: the columns are t, x, y and z.",
+            "{file}, line 1 has the unknown columns 'grip': the columns are t, x, y and z.",
         ),
         ("t,x,x,y,z\n", "{file}, line 1 has x twice: the columns are t, x, y and z."),
         ("t,x,y,z\n", "{file} has too few rows: 0, and a path needs 3."),
@@ -97,8 +97,8 @@ def lines(*rows: str) -> str:
             lines("0,0,0,0", "", "1,0,0"),
             "{file}, line 4 has 3 cells, and there are four columns.",
         ),
-        (lines("0,0,zero,0"), "{file}, line 2: y is 'zero', which is no number."),
-        (lines("0,0,0,0", "1,,0,0"), "{file}, line 3: x is '', which is no number."),
+        (lines("0,0,zero,0"), "{file}, line 2: y is 'zero', which is not a number."),
+        (lines("0,0,0,0", "1,,0,0"), "{file}, line 3: x is '', which is not a number."),
         (lines("0,0,0,0", "1,0,0,nan"), "{file}, line 3: z is 'nan', which is not finite."),
         (lines("0,0,0,0", "-inf,0,0,0"), "{file}, line 3: t is '-inf', which is not finite."),
         (
@@ -111,7 +111,7 @@ def lines(*rows: str) -> str:
         ),
         (
             lines("0,0,0,0", "0.1,0,0,0", "0.2,0,0,0", "0.8,0,0,0"),
-            "{file}, line 5: 0.6 s have passed since the row before, a gap: the median is 0.1 s, "
+            "{file}, line 5: the time step of 0.6 s is a gap: the median is 0.1 s, "
             "and 5 times as much is allowed.",
         ),
         (
@@ -126,7 +126,7 @@ def lines(*rows: str) -> str:
         ),
         (
             lines('0,0,0,"0'),
-            "{file}, line 2, is no line of a CSV: unexpected end of data.",
+            "{file}, line 2, is not valid CSV: unexpected end of data.",
         ),
     ],
 )
@@ -149,6 +149,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: File) -> None:
     assert str(caught.value) == f"{missing} cannot be read: No such file or directory."
     with pytest.raises(PathError) as caught:
         from_csv(noise)
-    assert str(caught.value) == f"{noise} is no text in UTF-8: invalid start byte."
+    assert str(caught.value) == f"{noise} is not UTF-8 text: invalid start byte."
     with pytest.raises(PathError, match="cannot be read: "):
         from_csv(tmp_path)

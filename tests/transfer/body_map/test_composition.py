@@ -147,7 +147,7 @@ def test_copies_without_a_namesake_have_no_way_back() -> None:
         Layout((motor("foot"), motor("toe"))),
         rules={"*/motor": "copy ankle/motor"},
     )
-    with pytest.raises(MapError, match="is taken by 'foot/motor' and 'toe/motor', and none"):
+    with pytest.raises(MapError, match="is copied to 'foot/motor' and 'toe/motor', none"):
         there.inverse()
 
 

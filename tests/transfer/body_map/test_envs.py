@@ -62,7 +62,7 @@ def test_envs_are_mapped_by_their_layouts() -> None:
 
 def test_an_env_without_layouts_is_refused() -> None:
     """The message says what to add."""
-    with pytest.raises(MapError, match="publishes no action_layout: give Silent a property"):
+    with pytest.raises(MapError, match="publishes no action_layout: add a property"):
         body_map(Recorder(), Silent())
 
 
@@ -112,9 +112,9 @@ def test_a_mapped_env_publishes_the_source_layouts() -> None:
 def test_a_space_of_the_wrong_size_is_refused() -> None:
     """A map for other bodies is found when the env is built."""
     built = body_map(Recorder(), Recorder(feet=True))
-    with pytest.raises(SpaceMismatch, match=r"target observation layout holds 59 numbers"):
+    with pytest.raises(SpaceMismatch, match=r"target observation has 59 numbers"):
         wrap(Recorder(), built)
-    with pytest.raises(SpaceMismatch, match="source action layout holds 8"):
+    with pytest.raises(SpaceMismatch, match="source action has 8"):
         wrap(Recorder(feet=True), built, action_space=gym.spaces.Box(-1.0, 1.0, (7,)))
 
 

@@ -127,9 +127,9 @@ def test_the_affine_form_is_the_map() -> None:
 
 def test_a_vector_of_another_body_is_refused() -> None:
     """The message counts the numbers."""
-    with pytest.raises(SpaceMismatch, match=r"holds 2 numbers, .*target observation.*\(3,\)"):
+    with pytest.raises(SpaceMismatch, match=r"target observation features has 2 numbers.*\(3,\)"):
         small().adapt_observation(np.zeros(3))
-    with pytest.raises(SpaceMismatch, match=r"source action feature.* shape given is \(\)"):
+    with pytest.raises(SpaceMismatch, match=r"source action feature.* shape is \(\)"):
         small().adapt_action(0.0)
 
 
@@ -153,7 +153,7 @@ def test_the_table_states_each_rule() -> None:
 def test_the_short_form_counts_the_rules() -> None:
     """A map of an ant has a hundred lines, which nobody wants in a traceback."""
     assert repr(small()) == (
-        "BodyMap(observation: 1 Take, 1 Zero, 1 Hold; action: 3 Take, 1 Learn)"
+        "BodyMap(observation: 1 Copy, 1 Zero, 1 Hold; action: 3 Copy, 1 Learn)"
     )
 
 

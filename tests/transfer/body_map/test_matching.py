@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from shapechanger.errors import MapError, UnknownName
@@ -127,7 +129,7 @@ def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
     """Silence about a feature is answered by `otherwise`."""
     assert rules_of(grown(otherwise="learn"))["foot_2/motor"] == Learn()
     assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
-    with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', and not 'copy hip_1/motor'"):
+    with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', not 'copy hip_1/motor'"):
         grown(otherwise="copy hip_1/motor")
 
 
@@ -167,7 +169,7 @@ def test_units_are_not_mixed() -> None:
     """0.1 rad is not 0.1 m, whatever the name; a scale says that somebody thought of it."""
     sides = pendulum_observation(), pendulum_observation(unit="deg")
     motors = pendulum_action(), pendulum_action()
-    with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot take .* hinge/angle \[deg\]"):
+    with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot copy .* hinge/angle \[deg\]"):
         BodyMap.between(*sides, *motors)
     built = BodyMap.between(
         *sides,
@@ -185,7 +187,7 @@ def test_blocks_of_different_shapes_are_no_partners() -> None:
     """A picture is not cut to size in passing."""
     small = Layout((Feature("eye", "1", 0.0, 1.0, shape=(2, 3)),))
     large = Layout((Feature("eye", "1", 0.0, 1.0, shape=(4, 3)),))
-    with pytest.raises(MapError, match=r"'eye' has the shape \(2, 3\) and cannot take"):
+    with pytest.raises(MapError, match=r"'eye' has the shape \(2, 3\) and cannot copy"):
         BodyMap.between(small, large, pendulum_action(), pendulum_action())
 
 
@@ -246,3 +248,16 @@ def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
     assert built.action[0].rule == Copy("slide/motor")
+
+
+@pytest.mark.parametrize("rule", [{"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None])
+def test_a_rule_of_another_type_is_refused_in_a_sentence(rule: Any) -> None:
+    """A table of TOML is no rule in Python."""
+    with pytest.raises(MapError, match=r"The rule 'foot_1/motor' is .*: give 'zero', 'hold'"):
+        BodyMap.between(
+            ant_observation(),
+            ant_observation(feet=True),
+            ant_action(),
+            ant_action(feet=True),
+            rules={"foot_1/motor": rule},
+        )

@@ -119,7 +119,7 @@ def test_the_symmetry_of_a_third_body_is_refused() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"a": Copy("b")}, "'a' and 'b' both take 'b'"),
+        ({"a": Copy("b")}, "'a' and 'b' both copy 'b'"),
         ({"a": Copy("b", 2.0), "b": Copy("a", 0.5)}, "in a symmetry the scale is 1 or -1"),
     ],
 )
@@ -174,8 +174,12 @@ def test_an_element_that_is_not_there_is_unknown(
 @pytest.mark.parametrize(
     ("swap", "flip", "message"),
     [
-        ({"hip_1": "hip_4", "hip_2": "hip_4"}, [], "'hip_4' is to mirror both 'hip_1' and 'hip_2'"),
-        (ANT_SWAP, ["hip_1"], "flip both of them or neither"),
+        (
+            {"hip_1": "hip_4", "hip_2": "hip_4"},
+            [],
+            "'hip_4' cannot mirror both 'hip_1' and 'hip_2'",
+        ),
+        (ANT_SWAP, ["hip_1"], "flip both or neither"),
     ],
 )
 def test_a_mirror_that_is_none_is_refused(

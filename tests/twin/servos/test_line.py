@@ -4,7 +4,7 @@ import pytest
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.servos.bus import SimulatedBus
-from shapechanger.twin.servos.protocol import packed, status
+from shapechanger.twin.servos.protocol import pack, status
 from shapechanger.twin.servos.servo import ServoPlan
 
 MS = 1_000_000
@@ -15,7 +15,7 @@ def _line(count: int = 1) -> SimulatedBus:
 
 
 def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> bytes:
-    line.receive(packed(servo_id, code, body))
+    line.receive(pack(servo_id, code, body))
     return line.send()
 
 
@@ -117,7 +117,7 @@ def test_any_packet_feeds_the_watchdog_and_a_damaged_one_does_not() -> None:
         _ask(line, 2, 1)
     assert line.servos[1].pulls_a > 0.0
     line.advance(80 * MS)
-    line.receive(packed(2, 1, b"")[:-1] + b"\x00")
+    line.receive(pack(2, 1, b"")[:-1] + b"\x00")
     line.advance(30 * MS)
     assert line.servos[1].pulls_a == 0.0
 
@@ -178,7 +178,7 @@ def test_a_late_answer_comes_when_its_time_is_there() -> None:
 def test_half_a_packet_is_dropped_after_a_while() -> None:
     """Else what comes later would be taken for its end."""
     line = _line()
-    line.receive(packed(1, 1, b"")[:7])
+    line.receive(pack(1, 1, b"")[:7])
     line.advance(20 * MS)
     assert _ask(line, 1, 1) != b""
 

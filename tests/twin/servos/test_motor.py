@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from shapechanger.twin.servos.models import MODELS
-from shapechanger.twin.servos.motor import EndStops, SimulatedMotor, Tendon
+from shapechanger.twin.servos.motor import MODELS, EndStops, SimulatedMotor, Tendon
 
 
 def _run(

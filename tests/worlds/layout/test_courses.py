@@ -10,15 +10,16 @@ import pytest
 from scipy import ndimage
 
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.worlds.course import HELD_OUT, Course, Thing
-from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
+from shapechanger.worlds.course import HELD_OUT, Course, Obstacle
+from shapechanger.worlds.layout import WORLDS, lay_out
 from shapechanger.worlds.layout.geometry import (
-    between,
-    cross_each_other,
-    from_thing,
-    segments,
-    to_segments,
+    any_crossing,
+    distances_from_obstacle,
+    distances_to_segments,
+    obstacle_gap,
+    wall_segments,
 )
+from tests.worlds.layout.raster import occupancy
 
 _SEEDS = [*range(20), *HELD_OUT[:20]]
 _WIDTHS = {"corridor": (1.8, 2.4), "yard": (3.0, 5.0), "harbour": (4.0, 7.0)}
@@ -48,7 +49,7 @@ def _same(one: Course, other: Course) -> bool:
     return (
         np.array_equal(one.route, other.route)
         and np.array_equal(one.half_width, other.half_width)
-        and (one.walls, one.things, one.lamps) == (other.walls, other.things, other.lamps)
+        and (one.walls, one.obstacles, one.lamps) == (other.walls, other.obstacles, other.lamps)
         and (one.gap_m, one.current_mps) == (other.gap_m, other.current_mps)
     )
 
@@ -107,7 +108,7 @@ def test_the_walls_are_closed_lines(world: str) -> None:
         assert sorted(starts) == sorted(ends)
         lengths = [math.dist(wall.start, wall.end) for wall in course.walls]
         assert min(lengths) > 0.05
-        assert not cross_each_other(segments(course.walls))
+        assert not any_crossing(wall_segments(course.walls))
 
 
 @each_world
@@ -116,7 +117,7 @@ def test_no_view_escapes_and_walls_face_it(world: str) -> None:
     angles = np.linspace(0.0, 2 * math.pi, 90, endpoint=False) + 0.0123
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     for course in _courses(world)[::3]:
-        feet = segments(course.walls)
+        feet = wall_segments(course.walls)
         along = feet[:, 2:] - feet[:, :2]
         for eye in course.route[::40]:
             to = feet[:, :2] - eye
@@ -135,7 +136,7 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
     """The middle is the middle: no wall is nearer than `half_width`, and one is that near."""
     low, high = _WIDTHS[world]
     for course in _courses(world):
-        nearest = to_segments(course.route, segments(course.walls)).min(axis=1)
+        nearest = distances_to_segments(course.route, wall_segments(course.walls)).min(axis=1)
         assert course.half_width == pytest.approx(nearest, abs=1e-6)
         assert nearest.min() >= low / 2.0 - 1e-6
         # A corner of a corridor is as wide as its diagonal.
@@ -146,12 +147,12 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
 def test_things_touch_at_most(world: str) -> None:
     """Nothing stands in something else, neither in a wall nor outside."""
     for course in _courses(world):
-        feet = segments(course.walls)
+        feet = wall_segments(course.walls)
         blocked, (x0, y0) = occupancy(_without(course), 0.05)
-        for i, thing in enumerate(course.things):
-            assert from_thing(thing, feet).min() > 0.0
-            assert not blocked[round((thing.y - y0) / 0.05), round((thing.x - x0) / 0.05)]
-            assert all(between(thing, other) > 0.0 for other in course.things[:i])
+        for i, obstacle in enumerate(course.obstacles):
+            assert distances_from_obstacle(obstacle, feet).min() > 0.0
+            assert not blocked[round((obstacle.y - y0) / 0.05), round((obstacle.x - x0) / 0.05)]
+            assert all(obstacle_gap(obstacle, other) > 0.0 for other in course.obstacles[:i])
 
 
 @each_world
@@ -163,8 +164,8 @@ def test_the_start_is_free(world: str) -> None:
         near = course.route[np.arange(-behind, before + 1) % n]
         pieces = np.concatenate([near[:-1], near[1:]], axis=1)
         half = float(course.half_width.min())
-        for thing in course.things:
-            assert from_thing(thing, pieces).min() > min(0.5, half / 2.0)
+        for obstacle in course.obstacles:
+            assert distances_from_obstacle(obstacle, pieces).min() > min(0.5, half / 2.0)
 
 
 @each_world
@@ -210,7 +211,7 @@ def test_corridors_have_corners_and_doors() -> None:
         assert turned >= 5.99
         assert {wall.height for wall in course.walls} == {2.5}
         surfaces |= {wall.surface for wall in course.walls}
-        kinds |= {thing.kind for thing in course.things}
+        kinds |= {obstacle.kind for obstacle in course.obstacles}
     assert surfaces == {"plaster", "door", "window", "brick", "board", "glass"}
     assert kinds == {"box", "bin", "bench", "plant", "cabinet", "crate"}
 
@@ -219,9 +220,9 @@ def test_yards_and_harbours_have_all_that_belongs_there() -> None:
     """Over all seeds every surface and every obstacle occurs; quays are as high as they should."""
     yards, harbours = _courses("yard"), _courses("harbour")
     assert {w.surface for c in yards for w in c.walls} == {"hedge", "fence", "brick", "shed"}
-    assert {t.kind for c in yards for t in c.things} == {"cone", "crate", "bin", "post", "tree"}
+    assert {t.kind for c in yards for t in c.obstacles} == {"cone", "crate", "bin", "post", "tree"}
     assert {w.surface for c in harbours for w in c.walls} == {"quay", "rock"}
-    assert {t.kind for c in harbours for t in c.things} == {"buoy", "dinghy", "crate"}
+    assert {t.kind for c in harbours for t in c.obstacles} == {"buoy", "dinghy", "crate"}
     quays = {w.height for c in harbours for w in c.walls if w.surface == "quay"}
     assert quays == {0.6}
 
@@ -238,7 +239,7 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
     """The message says what exists, or what is wrong with the seed."""
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         lay_out("harbor", 0)
-    with pytest.raises(WorldError, match="-1 is less"):
+    with pytest.raises(WorldError, match="from 0, got -1"):
         lay_out("yard", -1)
 
 
@@ -255,8 +256,8 @@ def test_a_world_that_never_fits_is_an_error(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def _without(course: Course) -> Course:
-    things: tuple[Thing, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     return Course(
-        course.world, course.seed, course.route, course.half_width, course.walls, things,
+        course.world, course.seed, course.route, course.half_width, course.walls, obstacles,
         course.lamps, course.ceiling_m, course.gap_m,
     )  # fmt: skip

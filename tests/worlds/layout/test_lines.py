@@ -8,10 +8,10 @@ import pytest
 from shapechanger.worlds.layout.geometry import (
     length,
     normals,
-    resampled,
-    smoothed,
+    resample,
+    smooth,
     tangent_radii,
-    turns,
+    turn_angles,
 )
 
 
@@ -22,7 +22,7 @@ def _ellipse(a: float, b: float, n: int) -> np.ndarray:
 
 def test_resampled_points_are_evenly_apart() -> None:
     """Also where the line bends much, and from points that were crowded there."""
-    line = resampled(_ellipse(6.0, 2.0, 2000), 0.1)
+    line = resample(_ellipse(6.0, 2.0, 2000), 0.1)
     chords = np.hypot(*np.diff(line, axis=0, append=line[:1]).T)
     assert chords == pytest.approx(chords[0], rel=1e-3)
     assert chords[0] == pytest.approx(0.1, rel=0.01)
@@ -33,8 +33,8 @@ def test_normals_point_left_and_turns_sum_to_once_round() -> None:
     """Counter-clockwise round a circle, left is inwards, and a round is 2 pi."""
     circle = _ellipse(3.0, 3.0, 100)
     assert normals(circle) == pytest.approx(-circle / 3.0)
-    assert turns(circle).sum() == pytest.approx(2 * np.pi)
-    assert turns(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
+    assert turn_angles(circle).sum() == pytest.approx(2 * np.pi)
+    assert turn_angles(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
 
 
 def test_tangent_radii_know_bends_and_necks() -> None:
@@ -49,6 +49,6 @@ def test_smoothing_keeps_the_middle_and_removes_wiggles() -> None:
     """The mean stays, and a wiggle of two points is gone."""
     rng = np.random.default_rng(0)
     values = rng.normal(size=(100, 2))
-    assert smoothed(values, 4.0).mean(axis=0) == pytest.approx(values.mean(axis=0))
+    assert smooth(values, 4.0).mean(axis=0) == pytest.approx(values.mean(axis=0))
     wiggle = np.where(np.arange(100) % 2, 1.0, -1.0)
-    assert smoothed(wiggle, 4.0) == pytest.approx(0.0, abs=1e-9)
+    assert smooth(wiggle, 4.0) == pytest.approx(0.0, abs=1e-9)

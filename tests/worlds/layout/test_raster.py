@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.errors import WorldError
-from shapechanger.worlds.course import Course, Surface, Thing, Wall
-from shapechanger.worlds.layout import WORLDS, lay_out, occupancy
-from shapechanger.worlds.layout.geometry import segments, to_segments
+from shapechanger.worlds.course import Course, Obstacle, Surface, Wall
+from shapechanger.worlds.layout import WORLDS, lay_out
+from shapechanger.worlds.layout.geometry import distances_to_segments, wall_segments
+from tests.worlds.layout.raster import occupancy
 
 
-def _ring(*things: Thing) -> Course:
+def _ring(*obstacles: Obstacle) -> Course:
     """A square lane 2 m wide round a block of 2 m by 2 m."""
 
     def walls(corners: list[tuple[float, float]]) -> list[Wall]:
@@ -23,7 +23,7 @@ def _ring(*things: Thing) -> Course:
     inner = walls([(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)])
     route = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
     return Course(
-        "corridor", 0, route, np.ones(4), (*outer, *inner), things, (), 2.5, 1.0
+        "corridor", 0, route, np.ones(4), (*outer, *inner), obstacles, (), 2.5, 1.0
     )  # fmt: skip
 
 
@@ -41,20 +41,20 @@ def test_the_lane_is_free_and_the_rest_blocked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("thing", "area"),
+    ("obstacle", "area"),
     [
-        (Thing("box", 2.0, 0.3, 0.7, 0.8, 0.4, 0.5), 0.32),
-        (Thing("bin", -2.0, 0.3, 0.0, 0.6, 0.6, 0.5), np.pi * 0.09),
+        (Obstacle("box", 2.0, 0.3, 0.7, 0.8, 0.4, 0.5), 0.32),
+        (Obstacle("bin", -2.0, 0.3, 0.0, 0.6, 0.6, 0.5), np.pi * 0.09),
     ],
 )
-def test_things_are_blocked(thing: Thing, area: float) -> None:
+def test_things_are_blocked(obstacle: Obstacle, area: float) -> None:
     """As many cells are blocked as the thing covers, round its middle."""
     empty, (x0, y0) = occupancy(_ring(), 0.02)
-    full, _ = occupancy(_ring(thing), 0.02)
+    full, _ = occupancy(_ring(obstacle), 0.02)
     rows, columns = np.nonzero(full & ~empty)
     assert len(rows) * 0.02**2 == pytest.approx(area, rel=0.05)
-    assert x0 + 0.02 * columns.mean() == pytest.approx(thing.x, abs=0.01)
-    assert y0 + 0.02 * rows.mean() == pytest.approx(thing.y, abs=0.01)
+    assert x0 + 0.02 * columns.mean() == pytest.approx(obstacle.x, abs=0.01)
+    assert y0 + 0.02 * rows.mean() == pytest.approx(obstacle.y, abs=0.01)
     assert not (empty & ~full).any()
 
 
@@ -65,10 +65,12 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     blocked, (x0, y0) = occupancy(course, 0.05)
     rows, columns = np.nonzero(~blocked)
     middles = np.stack([x0 + 0.05 * columns, y0 + 0.05 * rows], axis=1)
-    near = to_segments(middles[::50], np.hstack([course.route, np.roll(course.route, -1, 0)]))
+    near = distances_to_segments(
+        middles[::50], np.hstack([course.route, np.roll(course.route, -1, 0)])
+    )
     # The farthest free place is the outer corner of a corridor, or a nook between rocks.
     assert near.min(axis=1).max() <= 1.5 * course.half_width.max()
-    walls = segments(course.walls)
+    walls = wall_segments(course.walls)
     middle_of_walls = (walls[:, :2] + walls[:, 2:]) / 2.0
     back = walls[:, 2:] - walls[:, :2]
     behind = middle_of_walls + 0.1 * np.stack([back[:, 1], -back[:, 0]], axis=1) / np.hypot(
@@ -78,10 +80,3 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     c = np.rint((behind[:, 0] - x0) / 0.05).astype(int)
     inside = (r >= 0) & (c >= 0) & (r < blocked.shape[0]) & (c < blocked.shape[1])
     assert blocked[r[inside], c[inside]].mean() > 0.97  # The jambs of doors have the lane behind.
-
-
-@pytest.mark.parametrize("cell_m", [0.0, -1.0, float("nan")])
-def test_cells_without_width_are_refused(cell_m: float) -> None:
-    """A sentence, instead of a grid without end."""
-    with pytest.raises(WorldError, match="wider than 0"):
-        occupancy(_ring(), cell_m)

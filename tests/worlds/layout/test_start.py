@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapechanger.worlds.course import HELD_OUT, Thing
+from shapechanger.worlds.course import HELD_OUT, Obstacle
 from shapechanger.worlds.layout import WORLDS, lay_out, start_pose
-from shapechanger.worlds.layout.geometry import from_thing, segments
+from shapechanger.worlds.layout.geometry import distances_from_obstacle, wall_segments
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -29,11 +29,15 @@ def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
         assert abs((turned + math.pi) % (2 * math.pi) - math.pi) < 0.1
         # One metre of vehicle and trailer, 0.24 m wide, from 0.3 m before the pose backwards.
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
-        body = Thing("box", pose.x - 0.25 * cos, pose.y - 0.25 * sin, pose.heading, 1.1, 0.24, 0.2)
-        assert from_thing(body, segments(course.walls)).min() > 0.3
+        body = Obstacle(
+            "box", pose.x - 0.25 * cos, pose.y - 0.25 * sin, pose.heading, 1.1, 0.24, 0.2
+        )
+        assert distances_from_obstacle(body, wall_segments(course.walls)).min() > 0.3
         ahead = course.route[np.arange(i, i + 20) % len(far)]
         pieces = np.concatenate([ahead[:-1], ahead[1:]], axis=1)
-        assert all(from_thing(thing, pieces).min() > 0.3 for thing in course.things)
+        assert all(
+            distances_from_obstacle(obstacle, pieces).min() > 0.3 for obstacle in course.obstacles
+        )
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -47,7 +51,8 @@ def test_a_lane_that_is_full_begins_at_its_first_point() -> None:
     """Where no place is free, the first point of the route is where to begin."""
     course = lay_out("corridor", 0)
     full = replace(
-        course, things=tuple(Thing("bin", x, y, 0.0, 0.3, 0.3, 0.5) for x, y in course.route[::10])
+        course,
+        obstacles=tuple(Obstacle("bin", x, y, 0.0, 0.3, 0.3, 0.5) for x, y in course.route[::10]),
     )
     pose = start_pose(full, 3)
     assert (pose.x, pose.y) == tuple(course.route[0])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapechanger.worlds.course import Course, Lamp, Surface, Thing, Wall
+from shapechanger.worlds.course import Course, Lamp, Obstacle, Surface, Wall
 
 __all__ = ["square", "with_walls"]
 
@@ -44,9 +44,9 @@ def square(world: str) -> Course:
         route=route,
         half_width=np.ones(len(route)),
         walls=walls,
-        things=(
-            Thing("bench", 3.0, 0.6, 0.0, 1.2, 0.4, 0.45),
-            Thing("bin", 6.6, 3.0, 0.3, 0.3, 0.3, 0.6),
+        obstacles=(
+            Obstacle("bench", 3.0, 0.6, 0.0, 1.2, 0.4, 0.45),
+            Obstacle("bin", 6.6, 3.0, 0.3, 0.3, 0.3, 0.6),
         ),
         lamps=(Lamp(5.0, 0.0, 0.5 * np.pi, 1.2, 0.3),) if indoors else (),
         ceiling_m=2.4 if indoors else 0.0,
@@ -56,4 +56,4 @@ def square(world: str) -> Course:
 
 def with_walls(course: Course, *walls: Wall) -> Course:
     """The course with other walls and nothing in its way."""
-    return replace(course, walls=walls, things=(), lamps=())
+    return replace(course, walls=walls, obstacles=(), lamps=())

@@ -64,9 +64,9 @@ def test_walls_and_things_are_named_by_their_number() -> None:
     course = square("corridor")
     for number in range(len(course.walls)):
         assert model.geom(f"world/wall/{number}").contype == 1
-    for number, thing in enumerate(course.things):
+    for number, obstacle in enumerate(course.obstacles):
         geom = model.geom(f"world/thing/{number}")
-        assert geom.pos == pytest.approx([thing.x, thing.y, 0.5 * thing.height])
+        assert geom.pos == pytest.approx([obstacle.x, obstacle.y, 0.5 * obstacle.height])
 
 
 @pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])

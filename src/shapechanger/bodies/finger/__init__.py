@@ -1,4 +1,4 @@
-"""A human index finger: anatomy, parameters, and its MuJoCo model."""
+"""Human index finger: anatomy, parameters, tendon drives and MuJoCo model."""
 
 from __future__ import annotations
 

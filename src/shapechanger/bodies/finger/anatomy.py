@@ -1,7 +1,7 @@
-"""The human index finger in numbers: bones, joints, tendons, and where each number is from.
+"""Anatomical constants of the human index finger with their sources: bones, joints and tendons.
 
-Axes: x points to the tip of the straight finger, y to the thumb (radially), z to the back of the
-hand; the origin is the knuckle (MCP). Flexion and radial abduction are positive.
+The x axis points to the tip of the straight finger, y radially to the thumb, and z to the back of
+the hand; the origin is the knuckle (MCP). Flexion and radial abduction are positive.
 """
 
 from __future__ import annotations
@@ -31,58 +31,60 @@ __all__ = [
 ]
 
 JOINTS: Final = ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
-"""Knuckle (two axes), middle joint and end joint, in the order of every array over joints."""
+"""Names of the joints, in the order of all arrays over joints: knuckle (two axes), middle joint and
+end joint."""
 
 TENDONS: Final = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
-"""In the order of every array over tendons: flexor digitorum profundus and superficialis, extensor
-indicis proprius, extensor digitorum communis, lumbrical, first dorsal and first palmar
-interosseous."""
+"""Names of the tendons, in the order of all arrays over tendons: flexor digitorum profundus and
+superficialis, extensor indicis proprius, extensor digitorum communis, lumbrical, first dorsal and
+first palmar interosseous."""
 
 PHALANGES: Final = ("proximal", "middle", "distal")
 
 # Shares of a hand's length, 0.245, 0.143 and 0.097 (Buchholz, Armstrong & Goldstein 1992,
 # "Anthropometric data for describing the kinematics of the human hand", Ergonomics 35:261, as
-# other models' constants give them), times 189 mm.
+# quoted in other models), times 189 mm.
 PHALANX_LENGTH_M: Final = (0.0463, 0.0270, 0.0183)
 # Chosen: half the breadth of an adult's finger at each phalanx.
 PHALANX_RADIUS_M: Final = (0.0085, 0.0075, 0.0068)
 TISSUE_DENSITY: Final = 1100.0
-"""kg/m³, between muscle, 1060, and bone."""
+"""Density of the finger, kg/m³, between that of muscle, 1060, and bone."""
 
 JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
     [[-20.0, 90.0], [-20.0, 20.0], [0.0, 105.0], [-5.0, 80.0]]
 )
-"""Lowest and highest angle, rad, (4, 2): active ranges of an adult, rounded. The knuckle's lower
-end is its hyperextension, 0 to 45 degrees in adults."""
+"""Smallest and largest angle of each joint, rad, (4, 2): rounded active ranges of an adult. The
+lower end of the knuckle is its hyperextension, 0 to 45 degrees in adults."""
 
 DIP_BY_PIP: Final = 0.6
-"""How far the end joint bends for each radian of the middle one, where its ligaments lead it.
-Chosen; animators take two thirds (Rijpkema & Girard 1991, "Computer animation of knowledge-based
+"""Angle of the end joint over that of the middle joint, as its ligaments couple them. Chosen;
+animators take two thirds (Rijpkema & Girard 1991, "Computer animation of knowledge-based
 human grasping", SIGGRAPH)."""
 
 JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 12.0])
-"""Where the passive tissue pulls to, rad: the slightly curled finger of a hand at rest. Chosen."""
+"""Equilibrium angles of the passive tissue, rad: the slightly curled finger of a resting hand.
+Chosen."""
 
-# The knuckle's flexion was measured: 0.033 to 0.047 N·m/rad in the middle of its range, in four
-# healthy people (PMC7775510, table 2). The others are chosen, smaller towards the tip.
+# For flexion of the knuckle, 0.033 to 0.047 N·m/rad was measured in the middle of its range, in
+# four healthy people (PMC7775510, table 2). The others are chosen, smaller towards the tip.
 JOINT_STIFFNESS: Final[NDArray[np.float64]] = np.array([0.04, 0.04, 0.02, 0.008])
-"""Passive, N·m/rad; near its ends a human joint is stiffer than here."""
+"""Passive joint stiffness, N·m/rad; near the ends of their range, human joints are stiffer."""
 
 JOINT_DAMPING: Final[NDArray[np.float64]] = np.array([0.015, 0.015, 0.010, 0.005])
-"""Passive, N·m·s/rad. Chosen, so that even full tensions, reversed all the time, move no joint
+"""Passive joint damping, N·m·s/rad. Chosen so that even full, alternating tensions move no joint
 faster than 50 rad/s."""
 
 JOINT_FRICTION: Final[NDArray[np.float64]] = np.array([1.0, 1.0, 0.7, 0.4]) * 1e-3
-"""Coulomb friction, N·m. Chosen, small: Esteki & Mansour 1996 (J. Biomechanics 29:443) found losses
-that hardly grow with speed."""
+"""Coulomb friction of the joints, N·m. Chosen, small: Esteki & Mansour 1996 (J. Biomechanics
+29:443) found losses that hardly grow with speed."""
 
-# mm. The laboratory of Valero-Cuevas publishes how each tendon of a cadaver's index finger turns
-# into force and torque at the fingertip (R/main.r of github.com/bc/stfeasibility), in a posture
-# that is not written down. FDS and DI pass the end joint without an arm, which gives the lever of
-# that joint: 16 mm, flexed by 10 degrees. With knuckle and middle joint flexed by 45 degrees, as
-# elsewhere in that laboratory, and the two phalanges above, the arms below follow; so do small
-# errors where the hand was another. Numbers that are often quoted from An et al. 1983 (J.
-# Biomechanics 16:419) differ from these by up to 4 mm, and no tensions would balance those.
+# Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque at the fingertip
+# of each tendon of a cadaver's index finger (R/main.r of github.com/bc/stfeasibility), in an
+# unspecified posture. FDS and DI pass the end joint without an arm, which gives the lever of that
+# joint: 16 mm, flexed by 10 degrees. With knuckle and middle joint flexed by 45 degrees, as in
+# other work of that laboratory, and the two phalanges above, the arms below follow; a different
+# posture causes small errors. Often quoted numbers of An et al. 1983 (J. Biomechanics 16:419)
+# differ from these by up to 4 mm, and no tensions balance those.
 _MOMENT_ARMS_MM: Final = {
     "FDP": (8.6, -2.7, 4.9, 3.6),
     "FDS": (9.0, -1.3, 4.0, 0.0),
@@ -93,19 +95,19 @@ _MOMENT_ARMS_MM: Final = {
     "PI": (3.6, -6.4, -2.3, -1.65),
 }
 MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in TENDONS]) * 1e-3
-"""Torque about each joint for a newton of each tendon, m, (7, 4); zero where a tendon passes no
+"""Torque about each joint per newton of each tendon, m, (7, 4); zero where a tendon passes no
 joint."""
 
-# Of the same laboratory and file.
+# From the same laboratory and file.
 FORCE_POTENTIAL_N: Final[NDArray[np.float64]] = np.array(
     [123.0, 219.0, 23.52, 91.74, 21.6, 124.8, 129.6]
 )
-"""What each muscle can pull at most, N."""
+"""Largest force of each muscle, N."""
 
 # 30 % of the potential, kept between 6 and 25 N. Chosen; hands of cadavers have been pulled with
 # 10 % (Nimbarte, Kaz & Li 2008, J. Orthopaedic Surgery and Research 3).
 MOST_TENSION_N: Final[NDArray[np.float64]] = np.clip(0.3 * FORCE_POTENTIAL_N, 6.0, 25.0)
-"""What a tendon is pulled with at most here, N."""
+"""Largest tension of each tendon in the model, N."""
 
 LEAST_TENSION_N: Final = 0.5
-"""What a tendon is pulled with at least, so that none hangs slack, N."""
+"""Smallest tension of a tendon, which keeps it from hanging slack, N."""

@@ -1,4 +1,8 @@
-"""Where each tendon runs along the bones, for display."""
+"""Visual anatomy of the finger: bones, skin, and tendons on their anatomical routes.
+
+It has no mass, collisions or forces; the finger is moved by the fixed tendons of
+`shapechanger.bodies.finger.model`.
+"""
 
 from __future__ import annotations
 
@@ -11,31 +15,31 @@ import mujoco
 from shapechanger.bodies.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
 
 __all__ = [
-    "COURSES",
     "HAND",
     "METACARPAL",
     "TENDON_COLOURS",
+    "TENDON_ROUTES",
     "THICKEST_M",
     "THINNEST_M",
     "Over",
     "TendonRoute",
     "Through",
     "add_anatomy",
-    "courses_of",
+    "route_names",
 ]
 
 HAND: Final = "hand"
-"""Name of the body that shows the hand; its axes are those of the finger, at the knuckle."""
+"""Name of the hand's body; its axes are those of the finger, at the knuckle."""
 
 
 class Through(NamedTuple):
-    """A tendon passes a point of a bone.
+    """A point of a bone that a tendon passes.
 
     Attributes:
-        body: Whose axes they are: x along the bone from its own joint, y radial, z dorsal.
-        x: mm.
-        y: mm.
-        z: mm.
+        body: Name of the bone; x runs along it from its own joint, y is radial, z dorsal.
+        x: Position, mm.
+        y: Position, mm.
+        z: Position, mm.
     """
 
     body: str
@@ -45,7 +49,7 @@ class Through(NamedTuple):
 
 
 class Over(NamedTuple):
-    """A tendon passes the back of a joint, and lies on it where it bends.
+    """The back of a joint, which a tendon wraps around when it bends.
 
     Attributes:
         joint: "MCP", "PIP" or "DIP".
@@ -65,7 +69,7 @@ _P, _M, _D = "proximal", "middle", "distal"
 
 
 def _extensor(y: float) -> TendonRoute:
-    """Over the knuckle, down the middle of the hood, to the base of the distal phalanx."""
+    """Route over the knuckle and the middle of the hood to the base of the distal phalanx."""
     return (
         *_on(HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
         Over("MCP"),
@@ -78,7 +82,7 @@ def _extensor(y: float) -> TendonRoute:
 
 
 def _to_the_hood(side: float) -> TendonRoute:
-    """From the side of the proximal phalanx into the hood, and on as its lateral band."""
+    """Route from the side of the proximal phalanx into the hood, and on as its lateral band."""
     return (
         *_on(_P, (9.0, 7.0 * side, -3.5), (30.0, 5.0 * side, 3.6)),
         Over("PIP"),
@@ -88,9 +92,8 @@ def _to_the_hood(side: float) -> TendonRoute:
     )
 
 
-# Drawn by the plates of any atlas: sides and order are anatomy, millimetres are chosen, so that
-# each is seen. Off the flexors' joints a pulley is farther than the bent tendon is below.
-COURSES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
+# Sides and order follow anatomical atlases; the positions are chosen for visibility.
+TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
     {
         # Below FDS up to the knuckle, then through its slips, to the base of the distal phalanx.
         "FDP": (
@@ -126,14 +129,14 @@ COURSES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
         "PI": ((*_on(HAND, (-42.0, -5.0, -1.5), (-9.0, -7.2, -3.6)), *_to_the_hood(-1.0)),),
     }
 )
-"""The courses of each tendon, from the wrist on: one, or one for each slip it splits into."""
+"""Routes of each tendon from the wrist on: one, or one for each slip that it splits into."""
 
 
 METACARPAL: Final = "metacarpal"
-"""Name of the geom that shows the hand."""
+"""Name of the hand's geom."""
 
-# The palette of Okabe and Ito 2008 ("Color Universal Design"), which those who cannot tell red from
-# green can read; without its yellow, which is hardly seen on skin.
+# The colour-blind safe palette of Okabe and Ito 2008 ("Color Universal Design"), without its
+# yellow, which is hardly visible on skin.
 TENDON_COLOURS: Final = {
     "FDP": (0.835, 0.369, 0.000),
     "FDS": (0.902, 0.624, 0.000),
@@ -146,42 +149,43 @@ TENDON_COLOURS: Final = {
 """Red, green and blue of each tendon, 0 to 1."""
 
 THINNEST_M: Final = 0.0007
-"""Radius that a tendon without tension is drawn with, m; chosen, as all numbers here."""
+"""Radius of a tendon without tension, m; chosen, like all numbers here."""
 THICKEST_M: Final = 0.0016
-"""The same at its largest tension."""
+"""Radius of a tendon at its largest tension, m."""
 
 _BONE: Final = (0.94, 0.91, 0.83, 1.0)
 _NAIL: Final = (0.98, 0.86, 0.84, 0.9)
 _SKIN: Final = (0.90, 0.66, 0.55, 0.20)
 _SKY: Final = ((0.98, 0.985, 0.99), (0.82, 0.86, 0.91))
-# Neither geoms nor sites of this group are drawn unless a viewer is asked to.
+# Group of geoms and sites that are hidden by default.
 _HIDDEN: Final = 4
-# m. Of each bone its shaft's radius, and that of the head at its end, which a joint turns around.
+# Radii of each bone's shaft and of the head at its end, m.
 _SHAFTS: Final = (0.0040, 0.0034, 0.0029, 0.0026)
 _HEADS: Final = (0.0060, 0.0048, 0.0039, 0.0034)
-# m. How far before its joint a bone begins, beside the head that it turns around.
+# Gap between a bone and the head of the previous one, m.
 _CARTILAGE: Final = 0.0015
 _JOINTS: Final = ("MCP", "PIP", "DIP")
 
 
-def courses_of(tendon: str) -> list[str]:
-    """Names of the spatial tendons that show a tendon: `FDS/course`, `FDS/course_2`."""
-    more = [f"{tendon}/course_{i}" for i in range(2, len(COURSES[tendon]) + 1)]
+def route_names(tendon: str) -> list[str]:
+    """Names of the spatial tendons that show a tendon, such as `FDS/course` and `FDS/course_2`."""
+    more = [f"{tendon}/course_{i}" for i in range(2, len(TENDON_ROUTES[tendon]) + 1)]
     return [f"{tendon}/course", *more]
 
 
 def add_anatomy(spec: mujoco.MjSpec) -> None:
-    """Show bones, tendons and a nail in a finger of `build_finger`, before a light background.
+    """Add bones, tendons, a nail and a light background to a finger of `build_finger`.
 
     Args:
-        spec: The finger; it is changed.
+        spec: Model to extend.
     """
     _add_scene(spec)
     hand = _add_hand(spec)
     bodies = {HAND: hand} | {name: spec.body(name) for name in PHALANGES}
     for name in PHALANGES:
         spec.geom(name).rgba = _SKIN
-    # From the joint that moves it to the next; the fingertip's flesh is before the last bone.
+    # Each bone spans from its joint to the next; the last one ends below the flesh of the
+    # fingertip.
     metacarpal = spec.geom(METACARPAL)
     begin = float(metacarpal.fromto[0])
     spans = [(begin, 0.0)]
@@ -194,7 +198,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
         _add_back(bodies[list(bodies)[i]], joint, spans[i][1], _HEADS[i])
     _add_nail(bodies[PHALANGES[-1]])
     for tendon in TENDONS:
-        for name, course in zip(courses_of(tendon), COURSES[tendon], strict=True):
+        for name, course in zip(route_names(tendon), TENDON_ROUTES[tendon], strict=True):
             _add_course(spec, bodies, name, course, TENDON_COLOURS[tendon])
 
 
@@ -212,7 +216,7 @@ def _add_scene(spec: mujoco.MjSpec) -> None:
     spec.visual.headlight.ambient[:] = (0.45, 0.45, 0.45)
     spec.visual.headlight.diffuse[:] = (0.35, 0.35, 0.35)
     spec.visual.headlight.specular[:] = (0.1, 0.1, 0.1)
-    # From above and before the finger, so that it has a bright and a dark side.
+    # From above and in front of the finger, so that it has a bright and a dark side.
     spec.worldbody.add_light(
         name="lamp",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
@@ -225,7 +229,7 @@ def _add_scene(spec: mujoco.MjSpec) -> None:
 
 
 def _add_hand(spec: mujoco.MjSpec) -> mujoco.MjsBody:
-    """Make the hand a body, as pictures show what belongs to one."""
+    """Replace the geom of the hand by a body, which cameras can follow."""
     plain = spec.geom(METACARPAL)
     fromto, size = plain.fromto.copy(), plain.size.copy()
     spec.delete(plain)
@@ -270,7 +274,7 @@ def _add_nail(body: mujoco.MjsBody) -> None:
 
 
 def _add_back(body: mujoco.MjsBody, joint: str, x: float, radius: float) -> None:
-    """What the tendons at the back of a joint lie on: a cylinder that nobody sees."""
+    """Add a hidden cylinder that the tendons at the back of a joint wrap around."""
     body.add_geom(
         name=joint,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,

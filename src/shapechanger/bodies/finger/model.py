@@ -24,7 +24,7 @@ from shapechanger.bodies.finger.looks import (
     THICKEST_M,
     THINNEST_M,
     add_anatomy,
-    courses_of,
+    route_names,
 )
 from shapechanger.bodies.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.bodies.finger.tensions import TendonDrive, drive_of
@@ -32,31 +32,31 @@ from shapechanger.bodies.finger.tensions import TendonDrive, drive_of
 __all__ = ["FINGERTIP", "SIM_DT", "SIM_DT_STRETCHED", "TARGET", "FingerFigure", "build_finger"]
 
 SIM_DT: Final = 0.002
-"""Step of the simulation, s, at which nothing diverges under any command."""
+"""Simulation step, s, that is stable under any command."""
 SIM_DT_STRETCHED: Final = 0.0005
-"""The same with tendons that stretch: a light spool on a stiff spring rings a hundred times a
-second and more."""
+"""Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
+Hz and more."""
 
 FINGERTIP: Final = "fingertip"
 """Name of the site at the end of the distal phalanx."""
 TARGET: Final = "target"
-"""Name of the body that marks where the fingertip should be, for pictures."""
+"""Name of the body that marks the target of the fingertip, for pictures."""
 
-# Of critical damping, what a stretched tendon has: cords and tissue ring, but not for long.
+# Damping ratio of a stretched tendon: cords and tissue oscillate only briefly.
 _CABLE_DAMPING_RATIO: Final = 0.3
 _SKIN: Final = (0.87, 0.68, 0.58, 1.0)
 _HAND: Final = (0.75, 0.57, 0.48, 1.0)
-# As large as what counts as reached: a fingertip within it is where it should be.
+# As large as the tolerance of a reached target.
 _MARK: Final = (0.10, 0.55, 0.25, 0.45)
 _MARK_RADIUS_M: Final = 0.005
-# A metacarpal of two thirds of a palm, for pictures only.
+# Length of the metacarpal, two thirds of a palm, for pictures only.
 _METACARPAL_M: Final = 0.060
 _FLEX: Final = (0.0, 1.0, 0.0)
 _ABDUCT: Final = (0.0, 0.0, 1.0)
-# The axis of each joint, and the phalanx that it moves.
+# Phalanx that each joint moves, and its axis.
 _HINGES: Final = ((0, _FLEX), (0, _ABDUCT), (1, _FLEX), (2, _FLEX))
-# What a joint is held in its range with: a time constant, s, the smallest that is stable, and a
-# ratio of critical damping; and a constraint that hardly gives under full tension.
+# Joint limits: the smallest stable time constant, s, and a damping ratio; and an impedance that
+# hardly yields under full tension.
 _LIMIT: Final = (2.0 * SIM_DT, 1.0)
 _LIMIT_IMPEDANCE: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
 
@@ -64,16 +64,16 @@ _LIMIT_IMPEDANCE: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
 def build_finger(
     parameters: FingerParameters, drive: TendonDrive, *, anatomy: bool = False
 ) -> mujoco.MjSpec:
-    """A finger that `drive` moves.
+    """Build the MuJoCo model of a finger.
 
     Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`. Tendons have the
-    names of `TENDONS`; their length is that beyond the straight finger's, m. Where tendons stretch,
-    each has a motor, a slide joint called `FDP/motor` and so on, whose travel winds it up.
+    names of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has
+    a motor: a slide joint such as `FDP/motor`, whose travel winds it up.
 
     Args:
-        parameters: Of the finger.
-        drive: What its motors do.
-        anatomy: Whether to show bones and the tendons' courses, for pictures; it moves alike.
+        parameters: Parameters of the finger.
+        drive: Drive of its tendons.
+        anatomy: Whether to add bones and tendon routes for pictures; the motion is the same.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "finger"
@@ -118,7 +118,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
     for k, name in enumerate(PHALANGES):
         length, radius = PHALANX_LENGTH_M[k], PHALANX_RADIUS_M[k]
         body = parent.add_body(name=name, pos=[at, 0, 0])
-        # As long as the bone with its caps; they overlap in pictures only where joints are.
+        # As long as the bone with its caps, which overlap at the joints.
         body.add_geom(
             name=name,
             type=capsule,
@@ -154,7 +154,7 @@ def _add_hinge(
 def _add_path(
     spec: mujoco.MjSpec, name: str, arms: tuple[float, float, float, float]
 ) -> mujoco.MjsTendon:
-    """A tendon as a sum of angles: flexion shortens a flexor by its moment arm."""
+    """Add a tendon as a weighted sum of angles: flexion shortens a flexor by its moment arm."""
     path = spec.add_tendon(name=name)
     for joint, arm in zip(JOINTS, arms, strict=True):
         path.wrap_joint(joint, -arm)
@@ -162,7 +162,7 @@ def _add_path(
 
 
 def _add_spool(spec: mujoco.MjSpec, name: str, parameters: FingerParameters) -> str:
-    """What winds a tendon up, as a mass that slides; its joint's name."""
+    """Add the motor of a tendon as a sliding mass, and return the name of its joint."""
     spool = spec.worldbody.add_body(
         name=f"{name}/motor",
         mass=parameters.motor_kg,
@@ -187,12 +187,12 @@ def _add_cable(
     joint: str,
     parameters: FingerParameters,
 ) -> None:
-    """The spring between spool and finger; its length is the stretch."""
+    """Add the spring between motor and finger, whose length is the stretch."""
     stiffness = parameters.tendon_stiffness or 0.0
     cable = _add_path(spec, f"{name}/stretch", arms)
     cable.wrap_joint(joint, 1.0)
     cable.stiffness = [stiffness, 0.0, 0.0]
-    # It only pulls: below the backlash it is slack.
+    # It only pulls; below the backlash it is slack.
     cable.springlength = [-1e3, parameters.backlash]
     critical = 2.0 * math.sqrt(stiffness * parameters.motor_kg)
     cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
@@ -208,7 +208,7 @@ def _add_motor(
     target: str,
     sign: float,
 ) -> None:
-    """What gives a tendon its tension; `sign` is the force's where it pulls."""
+    """Add the actuator of a tendon; `sign` is that of a pulling force."""
     motor = spec.add_actuator(
         name=name,
         trntype=transmission,
@@ -223,7 +223,7 @@ def _add_motor(
     )
     motor.dynprm[0] = parameters.motor_lag
     motor.gainprm[0] = sign * drive.gain[i]
-    # Winding up by a metre shortens the tendon by one, so its length has the sign of minus travel.
+    # Travel shortens the tendon, so the length has the opposite sign.
     motor.biasprm[:3] = (sign * drive.offset[i], -drive.stiffness, -drive.damping)
     if parameters.command_delay > 0.0:
         motor.delay = parameters.command_delay
@@ -231,13 +231,13 @@ def _add_motor(
 
 
 class FingerFigure:
-    """A finger with its anatomy that takes whatever posture it is shown in, and never moves itself.
+    """Visual model of a finger with its anatomy, posed from outside and never simulated.
 
-    One figure shows every finger: they differ in what is not seen.
+    It serves for every finger, because their differences are invisible.
 
     Attributes:
-        model: What is drawn.
-        data: How.
+        model: The model.
+        data: Its state.
     """
 
     def __init__(self) -> None:
@@ -246,18 +246,18 @@ class FingerFigure:
         self.data = mujoco.MjData(self.model)
         self._mark = self.model.body(TARGET).mocapid[0]
         self._courses = [
-            [self.model.tendon(course).id for course in courses_of(name)] for name in TENDONS
+            [self.model.tendon(course).id for course in route_names(name)] for name in TENDONS
         ]
 
     def show(
         self, angles: NDArray[np.float64], pulled: NDArray[np.float64], target: NDArray[np.float64]
     ) -> None:
-        """Take a posture.
+        """Set the posture.
 
         Args:
-            angles: rad, (4,).
-            pulled: Tension of each tendon over its largest, 0 to 1, (7,): how thick it is drawn.
-            target: Where the fingertip should be, m, (3,).
+            angles: Joint angles, rad, (4,).
+            pulled: Tension of each tendon over its largest, 0 to 1, (7,), shown as its thickness.
+            target: Target of the fingertip, m, (3,).
         """
         widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
         for courses, width in zip(self._courses, widths, strict=True):
@@ -267,7 +267,7 @@ class FingerFigure:
         mujoco.mj_forward(self.model, self.data)
 
     def without_target(self) -> mujoco.MjModel:
-        """A copy of the model in which no target is seen."""
+        """A copy of the model with an invisible target."""
         model = self.model.__copy__()
         model.geom_rgba[model.geom(TARGET).id, 3] = 0.0
         return model

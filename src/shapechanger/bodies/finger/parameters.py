@@ -1,4 +1,4 @@
-"""What differs from one finger to the next: tendons, joints, motors, and what its sensors say."""
+"""Parameters that differ between fingers: tendons, joints, motors and sensor noise."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from shapechanger.errors import FingerError
 
 __all__ = ["NOMINAL", "FingerParameters"]
 
-# Between a command and its force. Chosen.
+# Time constant between a command and its force. Chosen.
 _MOTOR_LAG_S: Final = 0.020
-# What a motor without gears and its spool weigh at the tendon. Chosen. Geared servos weigh a
-# hundred times as much and more.
+# Mass of a motor without gears and its spool, at the tendon. Chosen. That of geared servos is a
+# hundred times as large and more.
 _MOTOR_KG: Final = 0.010
 # N·s/m. Chosen.
 _TENDON_DAMPING: Final = 2.0
@@ -34,36 +34,35 @@ Arms = tuple[tuple[float, float, float, float], ...]
 
 
 def _plain(numbers: NDArray[np.float64]) -> tuple[Any, ...]:
-    """An array as tuples."""
+    """Nested tuples of an array."""
     if numbers.ndim > 1:
         return tuple(_plain(row) for row in numbers)
     return tuple(float(number) for number in numbers)
 
 
 class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A finger's mechanics and the faults of its drive and senses; without arguments the nominal.
+    """Mechanics of a finger, and errors of its drives and sensors; the defaults are nominal.
 
     Attributes:
-        moment_arms: Torque about each joint for a newton of each tendon, m, 7 x 4.
-        most_tension: What each tendon is pulled with at most, N.
-        least_tension: What each is pulled with at least, so that none hangs slack, N.
-        joint_stiffness: Passive, N·m/rad.
-        joint_damping: Passive, N·m·s/rad.
+        moment_arms: Torque about each joint per newton of each tendon, m, 7 x 4.
+        most_tension: Largest tension of each tendon, N.
+        least_tension: Smallest tension of each tendon, which keeps it from hanging slack, N.
+        joint_stiffness: Passive stiffness of the joints, N·m/rad.
+        joint_damping: Passive damping of the joints, N·m·s/rad.
         joint_friction: Coulomb friction of the joints, N·m.
-        tendon_damping: What a tendon resists its own speed with, N·s/m.
+        tendon_damping: Damping of the tendons, N·s/m.
         tendon_friction: Coulomb friction between motor and finger, N.
-        tendon_stiffness: What a newton stretches: N/m between motor and finger; None for a tendon
-            that does not give.
-        backlash: What a motor winds up before its tendon pulls, m; only with a stiffness.
-        motor_kg: Motor and spool, as mass at the tendon, kg.
+        tendon_stiffness: Stiffness between motor and finger, N/m; None for stiff tendons.
+        backlash: Travel of a motor before its tendon pulls, m; only with a stiffness.
+        motor_kg: Mass of motor and spool at the tendon, kg.
         motor_lag: Time constant between a command and its force, s.
-        command_delay: How much later a command acts, s.
+        command_delay: Delay of the commands, s.
         joint_noise: Standard deviation of a measured angle, rad.
         tension_noise: Standard deviation of a measured tension, N.
 
     Raises:
-        FingerError: If a number is not finite or has the wrong sign, there are too many or too
-            few, or a backlash comes without a stiffness.
+        FingerError: If a number is not finite or has the wrong sign, an array has the wrong shape,
+            or a backlash is given without a stiffness.
     """
 
     moment_arms: Arms = tuple(map(tuple, MOMENT_ARMS.tolist()))  # pyright: ignore[reportAssignmentType]
@@ -93,7 +92,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
             try:
                 given = np.asarray(value, np.float64)
             except (TypeError, ValueError) as error:
-                raise FingerError(f"{name}: these are no numbers: {value!r}.") from error
+                raise FingerError(f"{name} must hold numbers, got {value!r}.") from error
             shape = sizes.get(name, (len(JOINTS),) if name.startswith("joint_") else ())
             if name == "joint_noise":
                 shape = ()
@@ -103,7 +102,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
                 raise FingerError(f"{name}: the numbers must be finite, got {value}.")
             if name != "moment_arms" and given.min() < 0.0:
                 raise FingerError(f"{name}: the numbers must not be below zero, got {value}.")
-            if shape:  # Arrays become what compares and is written as JSON.
+            if shape:  # Tuples compare, and become JSON.
                 msgspec.structs.force_setattr(self, name, _plain(given))
         for name in ("motor_kg", "motor_lag"):
             if not numbers[name] > 0.0:
@@ -116,16 +115,16 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     @property
     def arms(self) -> NDArray[np.float64]:
-        """The moment arms, m, (7, 4)."""
+        """Moment arms, m, (7, 4)."""
         return np.array(self.moment_arms)
 
     @property
     def gives(self) -> bool:
-        """Whether the tendons stretch, so that motors move otherwise than the finger."""
+        """Whether the tendons stretch."""
         return self.tendon_stiffness is not None
 
     def replace(self, **changes: Any) -> FingerParameters:
-        """The same but for these.
+        """A copy with some parameters replaced.
 
         Raises:
             FingerError: See the class.
@@ -133,22 +132,22 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         return msgspec.structs.replace(self, **changes)
 
     def to_json(self) -> str:
-        """As JSON."""
+        """Encode as JSON."""
         return msgspec.json.encode(self).decode()
 
     @classmethod
     def from_json(cls, text: str | bytes) -> FingerParameters:
-        """Read what `to_json` wrote.
+        """Decode the result of `to_json`.
 
         Raises:
-            FingerError: If the text is none.
+            FingerError: If the text is not a valid finger.
         """
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-            said = str(error).rstrip(".")
-            raise FingerError(f"These are no parameters of a finger: {said}.") from error
+            reason = str(error).rstrip(".")
+            raise FingerError(f"Invalid finger parameters: {reason}.") from error
 
 
 NOMINAL: Final = FingerParameters()
-"""The finger of the anatomy: stiff tendons, no friction in them, no delay, no noise."""
+"""Finger of the anatomy, with stiff tendons without friction, delay and noise."""

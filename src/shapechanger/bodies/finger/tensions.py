@@ -1,4 +1,4 @@
-"""How a number from -1 to 1 becomes the tension of a tendon."""
+"""Tendon tensions: the drives that commands act through, and the tensions that hold a torque."""
 
 from __future__ import annotations
 
@@ -29,26 +29,27 @@ __all__ = [
     "tensions_for_torque",
 ]
 
-# N/m and N·s/m. Like the short-range stiffness of active muscle in kind; the size is chosen: a
-# centimetre of stretch is worth 3 N.
+# N/m and N·s/m, like the short-range stiffness of active muscle. The size is chosen: 3 N per
+# centimetre of stretch.
 _MUSCLE_STIFFNESS: Final = 300.0
 _MUSCLE_DAMPING: Final = 6.0
-# What a servo holds its spool with. Chosen: a centimetre off is 20 N, nearly all it has.
+# Gains of a servo that holds its spool. Chosen: 20 N, nearly its largest force, per centimetre.
 _SERVO_STIFFNESS: Final = 2000.0
 _SERVO_DAMPING: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class TendonDrive:
-    """Tension = `offset` + `gain` u + `stiffness` l + `damping` dl/dt, kept in the tendon's range.
+    """Affine map from commands to tensions, which are clipped to the tendons' range.
 
-    u is the command, -1 to 1, and l the tendon's length beyond that of the straight finger, m.
+    tension = `offset` + `gain` u + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1,
+    and the tendon's length l beyond that of the straight finger, m.
 
     Attributes:
-        offset: N, (7,).
-        gain: N, (7,), above zero where 1 pulls most.
-        stiffness: N/m.
-        damping: N·s/m.
+        offset: Tension at rest, N, (7,).
+        gain: Tension per command, N, (7,), > 0.
+        stiffness: Stiffness, N/m.
+        damping: Damping, N·s/m.
     """
 
     offset: NDArray[np.float64]
@@ -62,7 +63,13 @@ class TendonDrive:
         length: NDArray[np.float64],
         speed: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """What a command asks of each tendon, N, (7,), before it is kept in its range."""
+        """Tensions of a command, N, (7,), before clipping.
+
+        Args:
+            command: Command, -1 to 1, (7,).
+            length: Lengths, m, (7,).
+            speed: Rates of the lengths, m/s, (7,).
+        """
         pulled = self.stiffness * length + self.damping * speed
         return self.offset + self.gain * command + pulled
 
@@ -72,7 +79,13 @@ class TendonDrive:
         length: NDArray[np.float64],
         speed: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """The command, (7,), that asks for a tension, N; it may lie beyond -1 to 1."""
+        """Command that gives a tension, (7,); it may lie outside -1 to 1.
+
+        Args:
+            tension: Tensions, N, (7,).
+            length: Lengths, m, (7,).
+            speed: Rates of the lengths, m/s, (7,).
+        """
         pulled = self.stiffness * length + self.damping * speed
         return (tension - self.offset - pulled) / self.gain
 
@@ -90,10 +103,10 @@ def _impedance(most: NDArray[np.float64]) -> TendonDrive:
 
 
 def _length(most: NDArray[np.float64]) -> TendonDrive:
-    # The longest and shortest that a tendon can be, by the corners of the joints' ranges.
+    # The largest and smallest length of each tendon, from the ends of the joints' ranges.
     ends = -MOMENT_ARMS[:, :, None] * JOINT_RANGE[None]
     shortest, longest = ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)
-    # Winding up to below the shortest length is what gives the shortest its tension.
+    # The servo winds up below the shortest length, to have its full tension there.
     shortest = shortest - most / _SERVO_STIFFNESS
     half, middle = 0.5 * (longest - shortest), 0.5 * (longest + shortest)
     offset = LEAST_TENSION_N - _SERVO_STIFFNESS * middle
@@ -107,46 +120,50 @@ DRIVES: Final[Mapping[str, str]] = MappingProxyType(
         "length": "a length: -1 is the longest, 1 the shortest, held as a servo holds it",
     }
 )
-"""What each mode of action commands."""
+"""Modes of action, and the meaning of a command in each."""
 
 _MAKERS: Final = {"impedance": _impedance, "tension": _tension, "length": _length}
 
 
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
-    """The drive of a mode of action.
+    """Make the drive of a mode of action.
 
-    A drive is what the controller of a finger holds to be true: it rests on the nominal moment
-    arms, whatever those of the finger are.
+    A drive is part of the controller, so it uses the nominal moment arms, whatever those of the
+    finger are.
+
+    Args:
+        mode: One of `DRIVES`.
+        parameters: Finger with the range of tensions.
 
     Raises:
-        UnknownName: If there is no such mode.
+        UnknownName: If the mode is unknown.
     """
     if mode not in _MAKERS:
         raise UnknownName("mode of action", str(mode), _MAKERS)
     return _MAKERS[mode](np.array(parameters.most_tension))
 
 
-# N·m. A hundredth of what a fingertip of 4 g in the air weighs about its joint.
+# Tolerance of a torque, N·m: a hundredth of that of a fingertip of 4 g about its joint.
 _TOLERANCE_NM: Final = 1e-6
 _LITTLE: Final = 1e-3
-# N. The solver wants room between its bounds, however little.
+# Smallest distance between bounds that the solver accepts, N.
 _NOTHING: Final = 1e-9
 
 
 def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
-    """The smallest tensions, each at least 1, that move no joint; None if there are none.
+    """Smallest tensions, each at least 1, without torque about any joint; None if there are none.
 
-    With such tensions, and moment arms of full rank, every torque can be made: whatever a tendon
-    would have to push with is added to all.
+    With such tensions and moment arms of full rank, every torque is possible: a negative tension is
+    made positive by adding a multiple of them.
 
     Args:
-        arms: Torque about each joint for a newton of each tendon, m, (tendons, joints).
+        arms: Torque about each joint per newton of each tendon, m, (tendons, joints).
 
     Returns:
-        Shape (tendons,), in multiples of the smallest.
+        Tensions in multiples of the smallest, (tendons,).
     """
     r = np.asarray(arms, np.float64)
-    # Scaled, so that the solver's tolerance is a millionth of a typical arm.
+    # Scaled to make the solver's tolerance a millionth of a typical arm.
     scale = np.abs(r).max()
     if not scale > 0.0:
         return None
@@ -158,7 +175,11 @@ def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
 
 
 def spans_all_torques(arms: ArrayLike) -> bool:
-    """Whether pulling alone gives every torque, as a finger needs that moves at will."""
+    """Whether non-negative tensions can give every torque.
+
+    Args:
+        arms: Moment arms, m, (tendons, joints).
+    """
     r = np.asarray(arms, np.float64)
     return bool(np.linalg.matrix_rank(r) == r.shape[1]) and co_contraction(r) is not None
 
@@ -166,21 +187,21 @@ def spans_all_torques(arms: ArrayLike) -> bool:
 def tensions_for_torque(
     arms: ArrayLike, torque: ArrayLike, least: ArrayLike, most: ArrayLike
 ) -> tuple[NDArray[np.float64], bool]:
-    """Tensions that give a torque with as little co-contraction as can be, or come nearest to it.
+    """Tensions that give a torque, or the nearest possible one, with the least co-contraction.
 
     Args:
-        arms: m, (tendons, joints).
-        torque: N·m, (joints,).
+        arms: Moment arms, m, (tendons, joints).
+        torque: Torque, N·m, (joints,).
         least: Smallest tensions, N, a number or (tendons,).
         most: Largest tensions, N, a number or (tendons,).
 
     Returns:
-        Tensions, N, (tendons,), and whether they give the torque to within a µN·m.
+        Tensions, N, (tendons,), and whether they give the torque to within 1 µN·m.
     """
     r = np.asarray(arms, np.float64)
     low, high = (np.broadcast_to(np.asarray(b, np.float64), len(r)) for b in (least, most))
     wanted = np.asarray(torque, np.float64)
-    # In mN·m; what the tensions weigh beside the torque only chooses among those that give it.
+    # In mN·m; the small weight of the tensions only chooses among those that give the torque.
     matrix = np.concatenate([r.T * 1e3, _LITTLE * np.eye(len(r))])
     goal = np.concatenate([(wanted - r.T @ low) * 1e3, np.zeros(len(r))])
     above = np.asarray(cast("Any", nnls(matrix, goal))[0])

@@ -1,4 +1,4 @@
-"""Vehicles: bodies, motors and servos of a car, a tank, a truck and a boat."""
+"""Vehicles: models of a car, a tank, a truck and a boat with their motors and servos."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from shapechanger.bodies.vehicles.fleet import (
     require_fit,
     vehicle_model,
 )
-from shapechanger.bodies.vehicles.model import BoundVehicle, CameraMount, Outputs, VehicleModel
+from shapechanger.bodies.vehicles.model import (
+    BoundVehicle,
+    CameraMount,
+    Outputs,
+    PlanarPose,
+    VehicleModel,
+)
 
 __all__ = [
     "SIM_DT",
@@ -17,6 +23,7 @@ __all__ = [
     "BoundVehicle",
     "CameraMount",
     "Outputs",
+    "PlanarPose",
     "VehicleModel",
     "add_vehicle",
     "require_fit",

@@ -1,7 +1,7 @@
-"""The boat: a hull, a propeller with a rudder behind it, and two propellers to steer by instead.
+"""Boat: a hull with a central propeller and a rudder, and twin propellers as an alternative.
 
-A robot drives either the one in the middle or the pair; what it does not drive stands still and
-does nothing. There are no brakes.
+A robot drives either the central propeller and the rudder, or the twins; parts that it does not
+drive stay still and have no effect.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = ["BOAT"]
 _LENGTH: Final = 0.60  # m
 _WIDTH: Final = 0.20  # m
 _DRAUGHT: Final = 0.04  # m
-_BLOCK: Final = 0.55  # Share of length x width x draught that is hull: usual for workboats.
+_BLOCK: Final = 0.55  # Block coefficient, usual for workboats.
 _MASS: Final = WATER_DENSITY * _BLOCK * _LENGTH * _WIDTH * _DRAUGHT
 
 # Radius of gyration in yaw over length: 0.25, the usual estimate for ships (Fossen, chapter 6).
@@ -46,14 +46,14 @@ _INERTIA: Final = _MASS * (0.25 * _LENGTH) ** 2
 _ADDED_SURGE: Final = 2.0 / 23.8
 _ADDED_SWAY: Final = 10.0 / 23.8
 _ADDED_YAW: Final = 1.0 / 1.76
-# Wetted surface and drag coefficient at a Froude number near 0.5: estimates; friction alone is
-# about 0.005 by the line of ITTC 1957, waves make the rest.
+# Wetted surface and drag coefficient at a Froude number near 0.5: estimates. Friction alone gives
+# about 0.005 by the ITTC 1957 line, waves the rest.
 _WETTED: Final = 0.8 * _LENGTH * (_WIDTH + 2.0 * _DRAUGHT)  # m2
 _SURGE_COEFFICIENT: Final = 0.0135
 # Cross-flow drag of a hull with rounded bilges, an estimate after Hoerner in Fossen's chapter 6.
 _CROSSFLOW_COEFFICIENT: Final = 0.7
 
-# A hull that moves askew is a wing of little height. Clarke, Gedling and Hine's formulas (1983; in
+# A hull with drift acts as a low wing. Clarke, Gedling and Hine's formulas (1983; in
 # Fossen, chapter 6) for the derivatives Y_v and N_r, from length L, beam B, draught T and block.
 _WING: Final = math.pi * (_DRAUGHT / _LENGTH) ** 2
 _SWAY_LIFT: Final = _WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT)
@@ -65,21 +65,20 @@ _HULL: Final = Hull(
     added_surge=_ADDED_SURGE * _MASS,
     added_sway=_ADDED_SWAY * _MASS,
     added_yaw=_ADDED_YAW * _INERTIA,
-    # Linear terms are estimates: at 0.1 m/s they equal the quadratic ones, and 0.5 rad/s in yaw.
+    # Linear terms are estimates: they equal the quadratic ones at 0.1 m/s, and at 0.5 rad/s in yaw.
     surge=0.1 * 0.5 * WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
     surge_2=0.5 * WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
     sway=0.1 * 0.5 * WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
     sway_2=0.5 * WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
     sway_lift=0.5 * WATER_DENSITY * _LENGTH**2 * _SWAY_LIFT,
-    # Cross-flow summed over the length, for a turn about the middle.
+    # Cross-flow drag integrated over the length, for a turn about the middle.
     yaw=0.5 * 0.5 * WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
     yaw_2=0.5 * WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
     yaw_lift=0.5 * WATER_DENSITY * _LENGTH**4 * _YAW_LIFT,
 )
 
-# Lines near the open-water curves of a Wageningen propeller B3-50 with a pitch of 0.9 diameters
-# (M. Oosterveld and P. van Oossanen 1975), read by eye. Astern, with its edges the wrong way
-# round, about half is left: an estimate.
+# Linear fits by eye to the open-water curves of a Wageningen B3-50 propeller with a pitch of 0.9
+# diameters (M. Oosterveld and P. van Oossanen 1975). Astern about half is left: an estimate.
 _PROPELLER: Final = Propeller(
     diameter=0.035,
     thrust=0.38,
@@ -94,13 +93,13 @@ _TWIN: Final = Propeller(0.028, 0.38, 0.95, 0.045, 1.1, 0.5, 0.9, 0.9)
 _SHAFTS: Final = {"propeller": 0.0, "left propeller": 0.07, "right propeller": -0.07}  # m, y
 _SHAFT_X: Final = -0.23  # m
 
-# The motor with a gear of 2.5:1 in place of its own 4.4:1, as sold for model boats.
+# The motor with a gear of 2.5:1 instead of its own 4.4:1, as sold for model boats.
 _MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
-_PROPELLER_INERTIA: Final = 2e-6  # kg·m2, with the water that it carries: an estimate
+_PROPELLER_INERTIA: Final = 2e-6  # kg·m2, with entrained water: an estimate
 
 _RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)
 _SKEG: Final = Fin(x=-0.20, height=0.035, chord=0.10)
-_FULL_RUDDER: Final = math.radians(35.0)  # As far as ships' rudders go.
+_FULL_RUDDER: Final = math.radians(35.0)  # The usual limit of ships.
 
 _CAMERA: Final = CameraMount(
     x=0.16, y=0.0, z=0.14, pitch_rad=math.radians(3.0), fovy_deg=PI_CAMERA_FOVY_DEG
@@ -118,7 +117,7 @@ def _build(spec: mujoco.MjSpec) -> None:
     chassis.explicitinertial = True
     chassis.mass = _MASS
     chassis.inertia = [0.1 * _INERTIA, _INERTIA, _INERTIA]
-    # What bumps: a box amidships and a rounded bow, whose masses count for nothing.
+    # Collision geoms: a box amidships and a rounded bow, without mass.
     add_hull(chassis, "vehicle/hull", box, (-0.06, 0.0, 0.02), (0.24, _WIDTH / 2, 0.05), 0.0)
     bow = (0.16, 0.0, 0.02), (0.14, _WIDTH / 2, 0.05)
     add_hull(chassis, "vehicle/bow", ellipsoid, *bow, 0.0)
@@ -141,7 +140,7 @@ def _add_propeller(
     spec: mujoco.MjSpec, chassis: mujoco.MjsBody, part: str, y: float, paint: Paint
 ) -> None:
     name = f"vehicle/{part}"
-    # Its weight is the hull's, which leaves the hull's middle where it is.
+    # Its weight is part of the hull's, so that the centre of mass stays amidships.
     shaft = chassis.add_body(name=name, pos=[_SHAFT_X, y, -_DRAUGHT])
     shaft.explicitinertial = True
     shaft.mass = 1e-4
@@ -195,7 +194,7 @@ BOAT: Final = VehicleModel(
     camera=_CAMERA,
     battery_v=BATTERY_V,
     top_speed_mps=1.2,
-    turning_radius_m=0.7,  # At full throttle, by a test.
+    turning_radius_m=0.7,  # At full throttle; measured in a test.
     build=_build,
     bind=_bind,
 )

@@ -1,4 +1,4 @@
-"""The car: two driven wheels at the rear, two that steer at the front, a red bonnet."""
+"""Car: two driven rear wheels, two steered front wheels, a red bonnet."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
 
 __all__ = ["CAR"]
 
-# Sizes of a touring car of scale 1:10, rounded; its mass with battery and computer. Estimates.
+# Rounded sizes of a touring car at the scale 1:10; mass with battery and computer. Estimates.
 _LENGTH: Final = 0.40  # m
 _WIDTH: Final = 0.20  # m
 _BODY_KG: Final = 1.3
 _AXLES: Final = Axles(
     front_x=0.13,
     rear_x=-0.13,
-    gauge=0.140,  # So that at full lock no wheel sticks out of the body.
+    gauge=0.140,  # At full lock no wheel sticks out of the body.
     radius=0.0325,  # Tyres of 65 mm, the usual ones at 1:10.
     width=0.026,
     wheel_kg=0.05,
     full_lock=math.radians(28.0),
 )
 
-# Spur gear from the motor's shaft to the axle, chosen for 2 m/s; what it loses is an estimate.
+# Spur gear to the axle, chosen for 2 m/s; its efficiency is an estimate.
 _MOTOR: Final = HOBBY_MOTOR.geared(4.3, efficiency=0.9)
 
 _CAMERA: Final = CameraMount(x=0.055, y=0.0, z=0.118, pitch_rad=0.0, fovy_deg=PI_CAMERA_FOVY_DEG)
@@ -46,7 +46,7 @@ def _build(spec: mujoco.MjSpec) -> None:
     paint = Paint(spec)
     chassis = spec.worldbody.add_body(name="vehicle/chassis")
     chassis.add_freejoint(name="vehicle/chassis")
-    # Battery and motor lie low. The hull is as wide as the wheels, so that it meets walls first.
+    # The centre of mass is low. The hull is as wide as the wheels, so that it meets walls first.
     size = (_LENGTH / 2, _WIDTH / 2, 0.025)
     add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.045), size, _BODY_KG)
     red, dark = paint("red", (0.62, 0.06, 0.05)), paint("dark", (0.07, 0.07, 0.08))

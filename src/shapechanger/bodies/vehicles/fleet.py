@@ -1,4 +1,4 @@
-"""The vehicles by name, and how one gets into a model."""
+"""Vehicles by name, and adding one to a model."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from shapechanger.errors import ProfileError, UnknownName
 __all__ = ["SIM_DT", "VEHICLES", "add_vehicle", "require_fit", "vehicle_model"]
 
 SIM_DT: Final = 0.005
-"""Step of the simulation, s, at which all of them run stably."""
+"""Simulation step, s, at which all vehicles are stable."""
 
 VEHICLES: Final[Mapping[str, VehicleModel]] = MappingProxyType(
     {model.name: model for model in (CAR, TANK, TRUCK, BOAT)}
 )
-"""Every vehicle by its name."""
+"""Vehicle models by name."""
 
 
 def vehicle_model(name: str) -> VehicleModel:
-    """The vehicle of this name.
+    """Find a vehicle model by name.
 
     Raises:
-        UnknownName: If there is none.
+        UnknownName: If no vehicle has this name.
     """
     if name not in VEHICLES:
         raise UnknownName("vehicle", name, VEHICLES)
@@ -38,17 +38,21 @@ def vehicle_model(name: str) -> VehicleModel:
 
 
 def add_vehicle(spec: mujoco.MjSpec, name: str) -> VehicleModel:
-    """Add a vehicle to a model, at its origin, and set the step and the solver that it needs.
+    """Add a vehicle at the origin of a model, and set the step and solver options that it needs.
+
+    Args:
+        spec: Model to extend.
+        name: Name of the vehicle.
 
     Raises:
         UnknownName: If no vehicle has this name.
     """
     model = vehicle_model(name)
     spec.option.timestep = SIM_DT
-    # Back EMF and servos act as damping, which this integrator takes in implicitly.
+    # Back EMF and servos act as damping, which this integrator treats implicitly.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # A cone that is round lets wheels slip alike in every direction; the ratio keeps a vehicle
-    # at rest from creeping.
+    # The elliptic cone lets wheels slip alike in all directions; the impedance ratio keeps a
+    # vehicle at rest from creeping.
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
     model.build(spec)
@@ -56,15 +60,15 @@ def add_vehicle(spec: mujoco.MjSpec, name: str) -> VehicleModel:
 
 
 def require_fit(name: str, parts: Collection[str]) -> None:
-    """Let pass a robot whose parts fit the vehicle.
+    """Check that a robot's parts fit a vehicle.
 
     Args:
-        name: Of the vehicle.
-        parts: What the robot's outputs turn, such as "wheels" and "steering".
+        name: Name of the vehicle.
+        parts: Parts that the robot's outputs drive, such as "wheels" and "steering".
 
     Raises:
         UnknownName: If no vehicle has this name.
-        ProfileError: If a part is missing, or is none of the vehicle's; the message says which.
+        ProfileError: If a part is missing, or the vehicle does not have it.
     """
     model = vehicle_model(name)
     given = frozenset(parts)

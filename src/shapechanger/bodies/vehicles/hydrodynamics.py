@@ -1,8 +1,8 @@
-"""What water does to a small boat: on its hull, its propellers and its rudder.
+"""Hydrodynamics of a small boat: hull, propellers, rudder, and the boat in a simulation.
 
-Surge u is ahead, sway v to the left, r the rate of turn counter-clockwise, all relative to the
-water; forces X, Y in N and the moment N in N·m about the middle. Names as in T. I. Fossen,
-Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, Wiley 2021.
+Surge u points ahead and sway v to the left; the rate of turn r is counter-clockwise. All are
+relative to the water. X and Y are forces, N, and N is the moment about the middle, N·m. Names
+follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ from typing import Final
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import Outputs
+from shapechanger.bodies.vehicles.model import Outputs, PlanarPose
 from shapechanger.bodies.vehicles.parts import DcMotor, MotorDrive, joints_below_chassis, settle
-from shapechanger.worlds.world import Pose
 
 __all__ = ["WATER_DENSITY", "Afloat", "Fin", "Floating", "Hull", "Propeller"]
 
@@ -25,22 +24,22 @@ WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """A hull that keeps its masses, its drag and what holds it straight.
+    """Masses, added masses, drag and lift of a hull.
 
     Attributes:
-        mass: kg.
-        inertia: About the upright axis, kg·m2.
-        added_surge: Mass of water that it carries along when it speeds up, kg.
-        added_sway: The same to the side, kg.
-        added_yaw: The same in a turn, kg·m2.
-        surge: Linear drag, N·s/m.
-        surge_2: Quadratic drag, N·s2/m2.
-        sway: Linear, N·s/m.
-        sway_2: Quadratic, N·s2/m2.
-        sway_lift: Of the hull as a wing, times speed and sway, N·s2/m2.
-        yaw: Linear, N·m·s.
-        yaw_2: Quadratic, N·m·s2.
-        yaw_lift: Of the hull as a wing, times speed and rate of turn, N·s2.
+        mass: Dry mass, kg.
+        inertia: Dry moment of inertia about the vertical axis, kg·m2.
+        added_surge: Added mass ahead, kg: water that accelerates with the hull.
+        added_sway: Added mass to the side, kg.
+        added_yaw: Added moment of inertia, kg·m2.
+        surge: Linear drag ahead, N·s/m.
+        surge_2: Quadratic drag ahead, N·s2/m2.
+        sway: Linear drag to the side, N·s/m.
+        sway_2: Quadratic drag to the side, N·s2/m2.
+        sway_lift: Lift coefficient of the hull as a wing, times speed and sway, N·s2/m2.
+        yaw: Linear drag of a turn, N·m·s.
+        yaw_2: Quadratic drag of a turn, N·m·s2.
+        yaw_lift: Lift moment of the hull as a wing, times speed and rate of turn, N·s2.
     """
 
     mass: float
@@ -62,8 +61,16 @@ class Hull:
     ) -> tuple[float, float, float]:
         """Rates of change of u, v and r under the forces of propellers and rudder.
 
-        The equations of manoeuvring in three degrees of freedom, Fossen's chapter 6: a body that
-        turns feels what its masses, which differ along and across, had ahead and aside.
+        These are the manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with
+        the Coriolis terms of different masses along and across.
+
+        Args:
+            u: Surge, m/s.
+            v: Sway, m/s.
+            r: Rate of turn, rad/s.
+            x: Force ahead, N.
+            y: Force to the left, N.
+            n: Moment, N·m.
         """
         along, across = self.mass + self.added_surge, self.mass + self.added_sway
         pace = math.hypot(u, v)
@@ -76,18 +83,17 @@ class Hull:
 
 @dataclass(frozen=True, slots=True)
 class Propeller:
-    """A propeller whose thrust and torque fall in straight lines with its advance J = V / (n D).
+    """A propeller whose thrust and torque are linear in the advance ratio J = V / (n D).
 
     Attributes:
-        diameter: m.
-        thrust: Coefficient at J = 0.
-        thrust_ends: J at which it pushes no more.
-        torque: Coefficient at J = 0.
-        torque_ends: J at which it turns by itself.
-        astern: Share of thrust and torque that is left when it turns backwards.
-        wake: Speed of the water at it, as a share of the boat's.
-        pushes: Share of its thrust that moves the boat; the rest is lost in the water that it
-            draws from below the stern.
+        diameter: Diameter, m.
+        thrust: Thrust coefficient at J = 0.
+        thrust_ends: J at which the thrust is 0.
+        torque: Torque coefficient at J = 0.
+        torque_ends: J at which the torque is 0.
+        astern: Share of thrust and torque when turning backwards.
+        wake: Speed of the water at the propeller, as a share of the boat's.
+        pushes: Share of the thrust that moves the boat; the rest is thrust deduction.
     """
 
     diameter: float
@@ -100,11 +106,11 @@ class Propeller:
     pushes: float
 
     def loads(self, n: float, u: float) -> tuple[float, float]:
-        """Thrust in N and torque in N·m that it takes.
+        """Thrust, N, and torque, N·m.
 
         Args:
-            n: Turns a second; negative is backwards.
-            u: Of the boat through the water, m/s.
+            n: Turns per second; negative is backwards.
+            u: Speed of the boat through the water, m/s.
         """
         inflow = self.wake * u / self.diameter
         common = WATER_DENSITY * self.diameter**4 * abs(n) * (self.astern if n < 0.0 else 1.0)
@@ -113,7 +119,12 @@ class Propeller:
         return thrust, torque
 
     def wash(self, thrust: float, u: float) -> float:
-        """Speed of the water behind it, m/s, by the theory of momentum."""
+        """Speed of the water behind the propeller, m/s, by momentum theory.
+
+        Args:
+            thrust: Thrust, N.
+            u: Speed of the boat through the water, m/s.
+        """
         ahead = self.wake * u
         if thrust <= 0.0 or ahead < 0.0:
             return ahead
@@ -122,19 +133,19 @@ class Propeller:
         return ahead + _CONTRACTED * (far - ahead)
 
 
-# How much of its full speed the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
+# Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
 # Y. Yoshimura, Introduction of MMG standard method, J. Mar. Sci. Technol. 20 (2015).
 _CONTRACTED: Final = 0.6
 
 
 @dataclass(frozen=True, slots=True)
 class Fin:
-    """A rudder or a skeg: an upright plate in the water.
+    """A rudder or a skeg: a vertical plate in the water.
 
     Attributes:
-        x: Ahead of the middle, m; negative.
-        height: m.
-        chord: m.
+        x: Position ahead of the middle, m; negative.
+        height: Height, m.
+        chord: Length along the flow, m.
     """
 
     x: float
@@ -143,9 +154,9 @@ class Fin:
 
     @property
     def lift(self) -> float:
-        """Force by sine of the angle and square of the speed, N·s2/m2.
+        """Normal force over the sine of the angle and the square of the speed, N·s2/m2.
 
-        The slope 6.13 Λ / (Λ + 2.25) of a plate with the aspect ratio Λ is Fujii's, see Yasukawa
+        The slope 6.13 Λ / (Λ + 2.25) of a plate with the aspect ratio Λ is Fujii's; see Yasukawa
         and Yoshimura (2015).
         """
         aspect = self.height / self.chord
@@ -153,13 +164,13 @@ class Fin:
         return 0.5 * WATER_DENSITY * self.height * self.chord * slope
 
     def force(self, flow: float, v: float, r: float, angle: float) -> tuple[float, float, float]:
-        """X, Y and N of it.
+        """Forces X and Y, N, and moment N, N·m.
 
         Args:
-            flow: Of the water from ahead, m/s.
+            flow: Speed of the water from ahead, m/s.
             v: Sway, m/s.
             r: Rate of turn, rad/s.
-            angle: Of its blade, rad, counter-clockwise; so negative turns the boat to the left.
+            angle: Angle of the blade, rad, counter-clockwise; a negative one turns the boat left.
         """
         aside = v + self.x * r
         sine, cosine = math.sin(angle), math.cos(angle)
@@ -173,15 +184,15 @@ _TURN: Final = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True)
 class Afloat:
-    """What of a boat is in the water.
+    """Underwater parts of a boat.
 
     Attributes:
         hull: The hull.
-        propellers: Each part's propeller, and how far to the left it is, m.
-        rudder: Behind the part "propeller".
-        skeg: The fixed fin that keeps the boat straight.
-        full_rudder: Angle at a value of 1, rad.
-        motor: Of each propeller.
+        propellers: Propeller of each part, and its position to the left, m.
+        rudder: Rudder behind the part "propeller".
+        skeg: Fixed fin.
+        full_rudder: Rudder angle at an output of 1, rad.
+        motor: Motor of each propeller.
     """
 
     hull: Hull
@@ -193,15 +204,15 @@ class Afloat:
 
 
 class Floating:
-    """A `Vehicle` on water, which moves in the plane only: no heave, roll or pitch.
+    """A `BoundVehicle` on water, which moves in the plane only: no heave, roll or pitch.
 
-    The simulation knows the dry hull. So that it moves as the equations of manoeuvring say, it is
-    pushed with the dry mass times the acceleration that these give.
+    The simulated body has the dry mass. The applied force is that mass times the acceleration of
+    the manoeuvring equations.
 
     Args:
-        model: Model of everything.
-        data: State of everything.
-        boat: What is in the water.
+        model: Compiled model with the boat.
+        data: Its state.
+        boat: Underwater parts.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, boat: Afloat) -> None:
@@ -232,7 +243,7 @@ class Floating:
         self._has_rudder = True
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Put it there, at rest in the world."""
+        """Put the boat at a pose, at rest in the world."""
         p, v = self._qpos0, self._qvel0
         self._qpos[p : p + 3] = (x, y, heading)
         self._qvel[v : v + 3] = 0.0
@@ -240,7 +251,7 @@ class Floating:
         settle(self._model, self._data, self._joints)
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Set the motors, and what the water does."""
+        """Apply outputs and the forces of the water."""
         rudder = outputs.get("rudder", 0.0)
         self._has_rudder = "rudder" in outputs or "propeller" in outputs
         if rudder is not None:
@@ -249,45 +260,45 @@ class Floating:
             drive.set(outputs.get(part, 0.0), battery_v)
         self._float()
 
-    def pose(self) -> Pose:
-        """Where it is."""
+    def pose(self) -> PlanarPose:
+        """Current pose."""
         x, y, heading = self._qpos[self._qpos0 : self._qpos0 + 3].tolist()
-        return Pose(x, y, math.remainder(heading, _TURN))
+        return PlanarPose(x, y, math.remainder(heading, _TURN))
 
     def speed(self) -> float:
-        """Along its heading, over ground, m/s."""
+        """Speed over ground along the heading, m/s."""
         cosine, sine, vx, vy, _ = self._motion()
         return vx * cosine + vy * sine
 
     def lateral_speed(self) -> float:
-        """To its left, over ground, m/s."""
+        """Speed over ground to the left, m/s."""
         cosine, sine, vx, vy, _ = self._motion()
         return vy * cosine - vx * sine
 
     def yaw_rate(self) -> float:
-        """Counter-clockwise seen from above, rad/s."""
+        """Rate of turn, rad/s, counter-clockwise seen from above."""
         return float(self._qvel[self._qvel0 + 2])
 
     def travelled_m(self) -> float:
-        """How far it went through the water since it was placed, ahead less astern."""
+        """Distance through the water since `place`; astern counts down."""
         return self._log_m
 
     def current_a(self) -> float:
-        """What its motors draw together, A."""
+        """Current of all motors, A."""
         return sum(drive.current_a() for _, _, _, drive, _ in self._shafts)
 
     def set_current(self, vx: float, vy: float) -> None:
-        """Let the water flow so, m/s."""
+        """Set the flow of the water, m/s."""
         self._flow = (vx, vy)
 
     def _motion(self) -> tuple[float, float, float, float, float]:
-        """Cosine and sine of the heading, speeds along the axes of the world, rate of turn."""
+        """Cosine and sine of the heading, speeds along the world's axes, and rate of turn."""
         heading = float(self._qpos[self._qpos0 + 2])
         vx, vy, r = self._qvel[self._qvel0 : self._qvel0 + 3].tolist()
         return math.cos(heading), math.sin(heading), vx, vy, r
 
     def _float(self) -> None:
-        """Push the hull and brake the propellers as the water does."""
+        """Apply the forces of the water to the hull and the propellers."""
         boat, hull = self._boat, self._boat.hull
         cosine, sine, vx, vy, r = self._motion()
         wx, wy = vx - self._flow[0], vy - self._flow[1]
@@ -297,7 +308,7 @@ class Floating:
         flow = u
         for part, propeller, beside, drive, dof in self._shafts:
             rate = drive.rate()
-            if abs(rate) < 1e-3:  # It stands still: no thrust, no torque.
+            if abs(rate) < 1e-3:  # Stopped: neither thrust nor torque.
                 self._push[dof] = 0.0
                 continue
             thrust, torque = propeller.loads(rate / _TURN, u)
@@ -306,12 +317,12 @@ class Floating:
             n -= propeller.pushes * thrust * beside
             if part == "propeller":
                 flow = _on_rudder(propeller, boat.rudder, thrust, u)
-        if self._has_rudder:  # A boat that steers by two propellers has none.
+        if self._has_rudder:  # Twin propellers steer without one.
             rx, ry, rn = boat.rudder.force(flow, v, r, float(self._qpos[self._rudder]))
             x, y, n = x + rx, y + ry, n + rn
         du, dv, dr = hull.acceleration(u, v, r, x, y, n)
-        # From the rates in the boat's frame, which turns, to the acceleration in the world's.
-        # Water that flows evenly adds nothing: u and v are relative to it.
+        # From rates in the turning frame of the boat to the acceleration in the world. A uniform
+        # flow adds nothing, because u and v are relative to it.
         along, across = hull.mass * (du - r * v), hull.mass * (dv + r * u)
         i = self._qvel0
         self._push[i] = along * cosine - across * sine
@@ -320,9 +331,9 @@ class Floating:
 
 
 def _on_rudder(propeller: Propeller, rudder: Fin, thrust: float, u: float) -> float:
-    """Speed of the water at the rudder, m/s: the part behind the propeller gets its wash.
+    """Speed of the water at the rudder, m/s, part of which is in the propeller's wash.
 
-    Squares of speeds are averaged over the height, as forces go with them.
+    Squares of speeds are averaged over the height, because forces are proportional to them.
     """
     if thrust <= 0.0 or u < 0.0:
         return u

@@ -1,35 +1,47 @@
-"""What every vehicle is, before and after it is part of a simulation."""
+"""Interfaces of a vehicle: its model, and the vehicle in a running simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import mujoco
 
-from shapechanger.worlds.world import Pose
-
-__all__ = ["BoundVehicle", "CameraMount", "Outputs", "VehicleModel"]
+__all__ = ["BoundVehicle", "CameraMount", "Outputs", "PlanarPose", "VehicleModel"]
 
 Outputs = Mapping[str, float | None]
-"""Value of each part, from -1 to 1; None for a motor that nothing is connected to.
+"""Output of each part, from -1 to 1; None for a motor that is disconnected.
 
 For a motor it is a share of the battery's voltage, for a servo a share of its travel. Steering
-and rudder are negative to the left. A servo without pulses, None, stays where it was sent.
+and rudder are negative to the left. A servo without pulses, None, keeps its last angle.
 """
+
+
+class PlanarPose(NamedTuple):
+    """Pose of a vehicle seen from above.
+
+    Attributes:
+        x: Position, m.
+        y: Position, m.
+        heading: Angle from the x axis, rad, counter-clockwise.
+    """
+
+    x: float
+    y: float
+    heading: float
 
 
 @dataclass(frozen=True, slots=True)
 class CameraMount:
-    """Where the camera sits and what it sees.
+    """Pose and field of view of a vehicle's camera.
 
     Attributes:
-        x: Ahead of the vehicle's origin, m.
-        y: To the left of it, m.
-        z: Above the ground, m.
-        pitch_rad: How far its axis points below the horizon.
-        fovy_deg: Angle from the upper to the lower edge of its picture.
+        x: Position ahead of the vehicle's origin, m.
+        y: Position to the left of it, m.
+        z: Height above the ground, m.
+        pitch_rad: Angle of the optical axis below the horizon.
+        fovy_deg: Vertical field of view.
     """
 
     x: float
@@ -40,49 +52,57 @@ class CameraMount:
 
 
 class BoundVehicle(Protocol):
-    """A vehicle in a simulation that runs. Its origin is on the ground below its middle."""
+    """A vehicle in a running simulation. Its origin is on the ground below its middle."""
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Put it there at rest, its wheels straight. Lengths in m, the angle in rad."""
+        """Put the vehicle at a pose, at rest and with straight wheels.
+
+        Args:
+            x: Position, m.
+            y: Position, m.
+            heading: Angle from the x axis, rad, counter-clockwise.
+        """
         ...
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Set the forces of its motors; to be called before every step of the simulation.
+        """Apply outputs; call it before every simulation step.
 
         Args:
-            outputs: Value of each part. One that is missing is 0.
+            outputs: Output of each part; 0 for those that are missing.
             battery_v: Voltage of the battery under load.
         """
         ...
 
-    def pose(self) -> Pose:
-        """Where it is."""
+    def pose(self) -> PlanarPose:
+        """Current pose."""
         ...
 
     def speed(self) -> float:
-        """Along its heading, m/s; backward is negative."""
+        """Speed along the heading, m/s; backward is negative."""
         ...
 
     def lateral_speed(self) -> float:
-        """To its left, m/s."""
+        """Speed to the left, m/s."""
         ...
 
     def yaw_rate(self) -> float:
-        """Counter-clockwise seen from above, rad/s."""
+        """Rate of turn, rad/s, counter-clockwise seen from above."""
         ...
 
     def travelled_m(self) -> float:
-        """What its wheels rolled since it was placed, or how far it went through the water."""
+        """Distance that the wheels rolled since `place`, or that a boat moved through the water."""
         ...
 
     def current_a(self) -> float:
-        """What its motors draw, A; 0 or more. A motor that brakes draws nothing."""
+        """Current of the motors, A, >= 0; a braking motor draws none."""
         ...
 
     def set_current(self, vx: float, vy: float) -> None:
-        """Let the water flow so from now on, m/s along the axes of the world.
+        """Set the flow of the water; land vehicles ignore it, and `place` keeps it.
 
-        On land nothing happens. Placing the vehicle does not change it.
+        Args:
+            vx: Flow along the world's x axis, m/s.
+            vy: Flow along the world's y axis, m/s.
         """
         ...
 
@@ -92,19 +112,19 @@ class VehicleModel:
     """A kind of vehicle.
 
     Attributes:
-        name: Such as "car".
-        drives: Sets of parts of which a robot has one, whole: what drives and steers the vehicle.
-        optional_parts: Parts that a robot may have besides; they do nothing here.
-        length_m: From bumper to bumper, a trailer included.
-        width_m: Over the widest part.
-        nose_m: From the origin to the front of the bumper.
+        name: Name, such as "car".
+        drives: Alternative sets of parts that drive and steer it; a robot has exactly one set.
+        optional_parts: Further parts that a robot may have; they have no effect in simulation.
+        length_m: Length from bumper to bumper, trailer included.
+        width_m: Largest width.
+        nose_m: Distance from the origin to the front bumper.
         floats: Whether it moves on water.
-        camera: Where its camera sits.
-        battery_v: Voltage that the sizes below are for.
-        top_speed_mps: On even ground, or in still water, at full throttle and `battery_v`.
-        turning_radius_m: Of the origin's path at full lock, or 0 for one that turns on the spot.
+        camera: Mount of its camera.
+        battery_v: Battery voltage at which `top_speed_mps` holds.
+        top_speed_mps: Speed on level ground, or in still water, at full throttle.
+        turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
         build: Adds its body, joints and motors to a model.
-        bind: Finds them again in the compiled model.
+        bind: Finds them in the compiled model.
     """
 
     name: str
@@ -123,5 +143,5 @@ class VehicleModel:
 
     @property
     def parts(self) -> frozenset[str]:
-        """Every part that does something."""
+        """All parts that have an effect."""
         return frozenset[str]().union(*self.drives)

@@ -1,4 +1,4 @@
-"""What the bodies are put together from: hulls, wheels, paint and cameras."""
+"""Parts that vehicles are built from: hulls, wheels, cameras, motors and servos."""
 
 from __future__ import annotations
 
@@ -29,31 +29,40 @@ __all__ = [
     "settle",
 ]
 
-# What touches what: MuJoCo lets two geoms collide if the type of one meets the affinity of the
-# other. The world is 1 and meets 2, the ground is 4 and meets 8.
-_HULL_TYPE, _HULL_MEETS = 2, 1  # Walls and things, not the ground.
-_WHEEL_TYPE, _WHEEL_MEETS = 10, 5  # Those and the ground.
+# Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
+# conaffinity of the other. Walls have the type 1 and the affinity 2, the ground 4 and 8.
+_HULL_TYPE, _HULL_MEETS = 2, 1  # Collides with walls and obstacles, not with the ground.
+_WHEEL_TYPE, _WHEEL_MEETS = 10, 5  # Collides with all of them.
 
 _HIDDEN_GROUP: Final = 3
 
 HULL_FRICTION: Final = 0.2
-"""Between a smooth plastic body and a wall, an estimate; rubber at the wheels grips more."""
+"""Friction between a smooth plastic hull and a wall; an estimate, below that of rubber tyres."""
 
-_WHEEL_FRICTION: Final = 0.3  # Of the wheel alone: the ground's counts where that is larger.
+_WHEEL_FRICTION: Final = 0.3  # The larger one of the wheel and the ground counts.
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
 """Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
 
 
 class Paint:
-    """Colours that shine by themselves a little, for worlds whose light is painted on."""
+    """Makes materials, partly emissive because courses have no lights for vehicles.
+
+    Args:
+        spec: Model that the materials are added to.
+    """
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self._spec = spec
         self._made: set[str] = set()
 
     def __call__(self, name: str, rgb: tuple[float, float, float]) -> str:
-        """The name of the material of this colour."""
+        """Name of a material, which is added on the first call.
+
+        Args:
+            name: Name without the prefix "vehicle/".
+            rgb: Red, green and blue, 0 to 1.
+        """
         material = f"vehicle/{name}"
         if material not in self._made:
             self._spec.add_material(
@@ -72,7 +81,16 @@ def add_look(
     *,
     euler_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
-    """Add a shape that is seen, but neither weighs nor touches anything."""
+    """Add a visual geom: without mass and collisions.
+
+    Args:
+        body: Body to extend.
+        kind: Shape.
+        pos: Position, m.
+        size: MuJoCo sizes of the shape, m.
+        material: Name of its material.
+        euler_deg: Orientation, x-y-z Euler angles.
+    """
     quat = np.empty(4)
     mujoco.mju_euler2Quat(quat, np.radians(euler_deg), "xyz")
     body.add_geom(
@@ -91,7 +109,17 @@ def add_hull(
     *,
     quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
 ) -> None:
-    """Add a shape that weighs and that bumps into things, a little softly, and is not seen."""
+    """Add a hidden collision geom with mass and slightly soft contacts.
+
+    Args:
+        body: Body to extend.
+        name: Name of the geom.
+        kind: Shape.
+        pos: Position, m.
+        size: MuJoCo sizes of the shape, m.
+        mass: Mass, kg.
+        quat: Orientation.
+    """
     body.add_geom(
         name=name, type=kind, pos=pos, size=_three(size), quat=quat, mass=mass,
         friction=[HULL_FRICTION, 0.005, 0.0001], priority=1, condim=3,
@@ -114,22 +142,22 @@ def add_wheel(
     friction: float | None = None,
     tyre: tuple[float, float, float] = (0.05, 0.05, 0.05),
 ) -> mujoco.MjsBody:
-    """Add a wheel that rolls: forward is positive.
+    """Add a wheel; rolling forward is positive.
 
-    It touches the ground as a flat ellipsoid does, in one point.
+    It collides as a flat ellipsoid, which touches the ground in one point.
 
     Args:
-        body: What it is fixed to.
-        name: Of its body, joint and geom.
-        pos: Of its middle, m.
-        radius: m.
-        width: m.
-        mass: kg.
-        paint: For its colours.
-        armature: Share of the motor's rotor, kg·m2.
-        damping: Of its bearing, N·m·s/rad; small, an estimate.
-        friction: Its own, whatever the ground; or else the ground's.
-        tyre: Colour, red, green and blue.
+        body: Body to extend.
+        name: Name of its body, joint and geom.
+        pos: Position of its middle, m.
+        radius: Radius, m.
+        width: Width, m.
+        mass: Mass, kg.
+        paint: Source of its materials.
+        armature: Share of the motor's rotor inertia, kg·m2.
+        damping: Damping of its bearing, N·m·s/rad; small, an estimate.
+        friction: Friction on any ground; None for that of the ground.
+        tyre: Red, green and blue of the tyre, 0 to 1.
     """
     wheel = body.add_body(name=name, pos=pos)
     wheel.add_joint(
@@ -148,15 +176,20 @@ def add_wheel(
     aside = (90.0, 0.0, 0.0)
     add_look(wheel, cylinder, (0.0, 0.0, 0.0), (radius, width / 2), black, euler_deg=aside)
     add_look(wheel, cylinder, (0.0, 0.0, 0.0), (0.55 * radius, 0.52 * width), grey, euler_deg=aside)
-    box = mujoco.mjtGeom.mjGEOM_BOX  # A spoke, so that one sees it turn.
+    box = mujoco.mjtGeom.mjGEOM_BOX  # A spoke, so that its rotation is visible.
     add_look(wheel, box, (0.0, 0.0, 0.0), (0.5 * radius, 0.54 * width, 0.12 * radius), black)
     return wheel
 
 
 def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
-    """Add the camera, which looks ahead."""
+    """Add the camera "vehicle/camera", which looks ahead.
+
+    Args:
+        body: Body to extend.
+        mount: Its pose and field of view.
+    """
     s, c = math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)
-    # Columns are its axes: x to the right, y up, and z backwards, for it looks against that.
+    # The columns are its axes: x to the right, y up, and z backwards, against its view.
     axes = np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
@@ -165,13 +198,13 @@ def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
 
 
 def _three(size: ArrayLike) -> NDArray[np.float64]:
-    """The size with zeros for the numbers that a shape does not have."""
+    """Sizes padded with zeros to three numbers."""
     given = np.asarray(size, dtype=np.float64)
     return np.concatenate([given, np.zeros(3 - len(given))])
 
 
 BATTERY_V: Final = 7.2
-"""Six cells of NiMH, the usual battery of cars of this size."""
+"""Voltage of six NiMH cells, the usual battery of cars of this size."""
 
 _KGF_CM: Final = 0.0980665  # N·m
 _RPM: Final = 2.0 * math.pi / 60.0  # rad/s
@@ -179,17 +212,17 @@ _RPM: Final = 2.0 * math.pi / 60.0  # rad/s
 
 @dataclass(frozen=True, slots=True)
 class DcMotor:
-    """A brushed DC motor behind its gear, seen from the gear's shaft.
+    """A brushed DC motor with a gear, seen from the output shaft.
 
-    Voltage = resistance times current + `volts_per_speed` times speed. What the gear loses is in
-    `torque_per_current`, and its dry friction in `free_a`: that makes the dead band.
+    voltage = resistance * current + volts_per_speed * speed. Losses of the gear are part of
+    `torque_per_current`; dry friction is part of `free_a` and makes the dead band.
 
     Attributes:
-        resistance: Of the winding, Ohm.
+        resistance: Resistance of the winding, Ohm.
         volts_per_speed: Back EMF, V·s/rad.
-        torque_per_current: At a standstill, N·m/A.
+        torque_per_current: Stall torque per current, N·m/A.
         free_a: Current without load, A.
-        rotor_inertia: As felt at the shaft, kg·m2.
+        rotor_inertia: Inertia at the output shaft, kg·m2.
     """
 
     resistance: float
@@ -200,16 +233,21 @@ class DcMotor:
 
     @property
     def friction(self) -> float:
-        """Torque that holds the shaft until the motor overcomes it, N·m."""
+        """Dry friction torque at the shaft, N·m."""
         return self.torque_per_current * self.free_a
 
     @property
     def damping(self) -> float:
-        """How the shorted motor brakes, N·m·s/rad."""
+        """Damping of the shorted motor, N·m·s/rad."""
         return self.torque_per_current * self.volts_per_speed / self.resistance
 
     def geared(self, ratio: float, efficiency: float = 1.0) -> DcMotor:
-        """With one more stage: `ratio` turns of this shaft for one of the next."""
+        """The motor with one more gear stage.
+
+        Args:
+            ratio: Turns of this shaft per turn of the next.
+            efficiency: Share of the torque that the stage transmits, 0 to 1.
+        """
         return replace(
             self,
             volts_per_speed=self.volts_per_speed * ratio,
@@ -218,23 +256,32 @@ class DcMotor:
         )
 
     def amperes(self, volts: float, speed: float) -> float:
-        """Current that the battery gives, A, at a voltage and a speed of the shaft in rad/s.
+        """Current from the battery, A; 0 while the motor brakes through its bridge.
 
-        The bridge lets a motor that is faster than its voltage brake on itself: that is 0.
+        Args:
+            volts: Voltage at the motor.
+            speed: Speed of the shaft, rad/s.
         """
         current = (volts - self.volts_per_speed * speed) / self.resistance
         return max(0.0, current if volts > 0.0 else -current) if volts else 0.0
 
     def add(self, spec: mujoco.MjSpec, name: str) -> mujoco.MjsTendon:
-        """Add the motor, whose control is a voltage, and its shaft: a tendon for joints to wrap.
+        """Add the motor as an actuator controlled by a voltage, and its shaft as a fixed tendon.
 
-        MuJoCo's affine actuator is the motor's equation:
+        MuJoCo's affine actuator implements the motor's equation:
         https://mujoco.readthedocs.io/en/stable/XMLreference.html#actuator-general
+
+        Args:
+            spec: Model to extend.
+            name: Name of the actuator and the tendon.
+
+        Returns:
+            The tendon, for joints to wrap.
         """
         shaft = spec.add_tendon(
             name=name,
             frictionloss=self.friction,
-            # MuJoCo's friction is a little soft; harder than its default, so that it holds.
+            # Stiffer than MuJoCo's default, so that friction holds the shaft.
             solref_friction=[0.01, 1.0],
             solimp_friction=[0.99, 0.999, 0.001, 0.5, 2.0],
         )
@@ -271,12 +318,12 @@ def _from_data_sheet(
 
 @dataclass(frozen=True, slots=True)
 class ServoMotor:
-    """A hobby servo: it turns to an angle no faster than its motor can, and holds it.
+    """A hobby servo, which turns to an angle at a limited speed and holds it.
 
     Attributes:
-        stall_torque: N·m.
-        free_rate: Without load, rad/s.
-        error_at_stall: How far from its angle it has to be to give all its torque, rad.
+        stall_torque: Largest torque, N·m.
+        free_rate: Speed without load, rad/s.
+        error_at_stall: Smallest error of its angle at which it gives its largest torque, rad.
     """
 
     stall_torque: float
@@ -285,11 +332,18 @@ class ServoMotor:
 
     @property
     def damping(self) -> float:
-        """Of the joint, N·m·s/rad: at full torque it turns at the free rate, as a motor does."""
+        """Damping of its joint, N·m·s/rad: at full torque it turns at the free rate."""
         return self.stall_torque / self.free_rate
 
     def add(self, spec: mujoco.MjSpec, name: str, joint: str, share: float = 1.0) -> None:
-        """Add the actuator, whose control is an angle in rad, with a share of the torque."""
+        """Add the servo as an actuator controlled by an angle in rad.
+
+        Args:
+            spec: Model to extend.
+            name: Name of the actuator.
+            joint: Name of its joint.
+            share: Share of the torque that this joint gets.
+        """
         torque = share * self.stall_torque
         stiffness = torque / self.error_at_stall
         spec.add_actuator(
@@ -315,7 +369,7 @@ HOBBY_MOTOR: Final = _from_data_sheet(
     # An estimate: a rotor of 20 g and 8 mm radius, times the gear squared.
     rotor_inertia=0.5 * 0.020 * 0.008**2 * 4.4**2,
 )
-"""The motor of every vehicle here, each behind one more stage of its own."""
+"""Motor of all vehicles here, each with a further gear stage."""
 
 HOBBY_SERVO: Final = ServoMotor(
     # Hitec HS-311 at 4.8 V: 3.0 kgf·cm, 60 degrees in 0.19 s, by its data sheet.
@@ -325,13 +379,13 @@ HOBBY_SERVO: Final = ServoMotor(
 
 
 class MotorDrive:
-    """A motor in the simulation: it turns the mean of some joints, which a tendon takes.
+    """A motor in a running simulation, which turns the joints of a tendon.
 
     Args:
-        model: Model of everything.
-        data: State of everything.
-        name: Of the actuator and of the tendon.
-        motor: What it is.
+        model: Compiled model.
+        data: Its state.
+        name: Name of the actuator and the tendon.
+        motor: Properties of the motor.
     """
 
     def __init__(
@@ -346,7 +400,12 @@ class MotorDrive:
         self._is_open = False
 
     def set(self, value: float | None, battery_v: float) -> None:
-        """Give it a share of the battery; without a connection it runs along."""
+        """Set the voltage.
+
+        Args:
+            value: Share of the battery's voltage, -1 to 1; None for a disconnected motor.
+            battery_v: Voltage of the battery.
+        """
         self._is_open = value is None
         self._ctrl[self._actuator] = (
             self._motor.volts_per_speed * self._velocity[self._tendon]
@@ -355,22 +414,22 @@ class MotorDrive:
         )
 
     def current_a(self) -> float:
-        """What it draws, A."""
+        """Current from the battery, A."""
         if self._is_open:
             return 0.0
         return self._motor.amperes(float(self._ctrl[self._actuator]), self.rate())
 
     def turned(self) -> float:
-        """Angle of its shaft, rad."""
+        """Angle of the shaft, rad."""
         return float(self._angle[self._tendon])
 
     def rate(self) -> float:
-        """Speed of its shaft, rad/s."""
+        """Speed of the shaft, rad/s."""
         return float(self._velocity[self._tendon])
 
 
 def joints_below_chassis(model: mujoco.MjModel) -> tuple[tuple[int, int], ...]:
-    """Place in qpos and in qvel of each joint of the vehicle but those that carry it about."""
+    """Addresses in qpos and qvel of the vehicle's joints, without those of its chassis."""
     return tuple(
         (int(joint.qposadr[0]), int(joint.dofadr[0]))
         for joint in map(model.joint, range(model.njnt))
@@ -379,7 +438,13 @@ def joints_below_chassis(model: mujoco.MjModel) -> tuple[tuple[int, int], ...]:
 
 
 def settle(model: mujoco.MjModel, data: mujoco.MjData, joints: tuple[tuple[int, int], ...]) -> None:
-    """Set these joints to 0 at rest, let no motor pull, and work out what follows."""
+    """Set joints to 0 at rest, release all controls and forces, and run `mj_forward`.
+
+    Args:
+        model: Compiled model.
+        data: State to change.
+        joints: See `joints_below_chassis`.
+    """
     for qpos, qvel in joints:
         data.qpos[qpos] = 0.0
         data.qvel[qvel] = 0.0

@@ -1,4 +1,4 @@
-"""The tank: a track on each side, with a motor of its own."""
+"""Tank: two tracks with a motor each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapechanger.bodies.vehicles.wheels import Rolling
 
 __all__ = ["TANK"]
 
-# Sizes of a toy tank of scale 1:16 to 1:24; its mass is an estimate.
+# Sizes of a toy tank at the scale 1:16 to 1:24; the mass is an estimate.
 _LENGTH: Final = 0.32  # m
 _WIDTH: Final = 0.24  # m
 _BODY_KG: Final = 1.8
@@ -32,11 +32,11 @@ _RADIUS: Final = 0.035  # m, over the track
 _TRACK_WIDTH: Final = 0.04  # m
 _WHEEL_KG: Final = 0.05
 
-# A track of hard plastic slides aside easily, on whatever ground: an estimate for such toys, low
-# for rubber. It has to, for a tank turns by dragging its tracks sideways.
+# Friction of hard plastic tracks on any ground, below that of rubber; an estimate. A tank turns by
+# dragging its tracks sideways.
 _TRACK_FRICTION: Final = 0.5
 
-# Chosen for 1 m/s; the loss is an estimate for a gear and a track.
+# Chosen for 1 m/s; the efficiency of gear and track is an estimate.
 _MOTOR: Final = HOBBY_MOTOR.geared(9.7, efficiency=0.8)
 
 _CAMERA: Final = CameraMount(
@@ -72,7 +72,7 @@ def _build(spec: mujoco.MjSpec) -> None:
 def _add_track(
     spec: mujoco.MjSpec, chassis: mujoco.MjsBody, side: str, y: float, paint: Paint
 ) -> None:
-    """Add the three wheels under a track, which turn together."""
+    """Add the three wheels of a track, which turn together."""
     part = f"vehicle/{side} track"
     track = _MOTOR.add(spec, part)
     wheels = {where: f"vehicle/{side} {where} wheel" for where in _WHEEL_XS}

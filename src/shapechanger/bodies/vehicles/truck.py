@@ -1,4 +1,4 @@
-"""The truck: a tractor that steers like a car, and a semi-trailer behind it."""
+"""Truck: a tractor with Ackermann steering and a semi-trailer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
 
 __all__ = ["TRUCK"]
 
-# Sizes of a tractor and a semi-trailer of scale 1:14, shortened; masses are estimates.
+# Sizes of a tractor and a semi-trailer at the scale 1:14, shortened; masses are estimates.
 _TRACTOR_LENGTH: Final = 0.50  # m
 _TRAILER_LENGTH: Final = 0.50  # m
 _WIDTH: Final = 0.20  # m
@@ -31,7 +31,7 @@ _TRAILER_KG: Final = 1.2
 _AXLES: Final = Axles(
     front_x=0.17,
     rear_x=-0.15,
-    gauge=0.132,  # So that at full lock no wheel sticks out of the body.
+    gauge=0.132,  # At full lock no wheel sticks out of the body.
     radius=0.0375,
     width=0.028,
     wheel_kg=0.07,
@@ -42,7 +42,7 @@ _HITCH_Z: Final = 0.085  # m
 _TRAILER_FRONT: Final = 0.05  # m of the trailer ahead of the hitch
 _TRAILER_GAUGE: Final = 0.165  # m
 _TRAILER_AXLE_X: Final = -0.36  # m behind the hitch
-_MOST_YAW: Final = math.radians(85.0)  # Then the trailer meets the cab.
+_MOST_YAW: Final = math.radians(85.0)  # The trailer meets the cab.
 _MOST_PITCH: Final = math.radians(12.0)
 
 # Chosen for 1.5 m/s.
@@ -73,11 +73,11 @@ def _build(spec: mujoco.MjSpec) -> None:
 
 
 def _add_trailer(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> None:
-    """Add the trailer on its kingpin, which lets it turn and nod but not roll."""
+    """Add the trailer with its kingpin, which allows yaw and pitch but no roll."""
     box, hinge = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_HINGE
     trailer = chassis.add_body(name="vehicle/trailer", pos=[_HITCH_X, 0.0, _HITCH_Z])
-    unit = 1.0 if not spec.compiler.degree else math.degrees(1.0)  # Of the angles in the model.
-    # The damping stands for the grease of the plate: estimates.
+    unit = 1.0 if not spec.compiler.degree else math.degrees(1.0)  # Unit of angles in the model.
+    # Damping of the greased plate: estimates.
     trailer.add_joint(
         name="vehicle/trailer yaw", type=hinge, axis=[0.0, 0.0, 1.0], damping=0.01, limited=True,
         range=[-unit * _MOST_YAW, unit * _MOST_YAW],

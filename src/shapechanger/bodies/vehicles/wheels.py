@@ -1,4 +1,4 @@
-"""What all vehicles on land share: a body that is free, and wheels that roll."""
+"""Land vehicles: rolling wheels, and Ackermann steering of the front ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import Outputs
+from shapechanger.bodies.vehicles.model import Outputs, PlanarPose
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_SERVO,
     DcMotor,
@@ -18,19 +18,18 @@ from shapechanger.bodies.vehicles.parts import (
     joints_below_chassis,
     settle,
 )
-from shapechanger.worlds.world import Pose
 
 __all__ = ["Axles", "Rolling", "Steered", "add_axles"]
 
 
 class Rolling:
-    """A vehicle on land, bound to a simulation: a `Vehicle` but for its steering.
+    """A `BoundVehicle` on land, without steering.
 
     Args:
-        model: Model of everything.
-        data: State of everything.
-        motors: For each part that drives its motor; the actuator is "vehicle/" and the part.
-        radius: Of the wheels that the motors drive, m.
+        model: Compiled model with the vehicle.
+        data: Its state.
+        motors: Motor of each driving part; its actuator is named "vehicle/" plus the part.
+        radius: Radius of the driven wheels, m.
     """
 
     def __init__(
@@ -55,7 +54,7 @@ class Rolling:
         self._joints = joints_below_chassis(model)
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Put it there at rest, its wheels straight."""
+        """Put the vehicle at a pose, at rest and with straight wheels."""
         p, v = self._qpos0, self._qvel0
         half = heading / 2
         self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
@@ -67,39 +66,39 @@ class Rolling:
         for part, drive in self._drives:
             drive.set(outputs.get(part, 0.0), battery_v)
 
-    def pose(self) -> Pose:
-        """Where it is."""
+    def pose(self) -> PlanarPose:
+        """Current pose."""
         p = self._qpos0
         x, y = self._qpos[p : p + 2].tolist()
-        return Pose(x, y, self._heading())
+        return PlanarPose(x, y, self._heading())
 
     def speed(self) -> float:
-        """Along its heading, m/s."""
+        """Speed along the heading, m/s."""
         heading = self._heading()
         vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
         return vx * math.cos(heading) + vy * math.sin(heading)
 
     def lateral_speed(self) -> float:
-        """To its left, m/s."""
+        """Speed to the left, m/s."""
         heading = self._heading()
         vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
         return vy * math.cos(heading) - vx * math.sin(heading)
 
     def yaw_rate(self) -> float:
-        """Counter-clockwise seen from above, rad/s."""
+        """Rate of turn, rad/s, counter-clockwise seen from above."""
         return float(self._qvel[self._qvel0 + 5])
 
     def travelled_m(self) -> float:
-        """What its driven wheels rolled since it was placed, on average."""
+        """Mean distance that the driven wheels rolled since `place`, m."""
         turned = sum(drive.turned() for _, drive in self._drives)
         return self._radius * turned / len(self._drives)
 
     def current_a(self) -> float:
-        """What its motors draw together."""
+        """Current of all motors, A."""
         return sum(drive.current_a() for _, drive in self._drives)
 
     def set_current(self, vx: float, vy: float) -> None:
-        """Nothing: there is no water."""
+        """Ignored on land."""
 
     def _heading(self) -> float:
         p = self._qpos0 + 3
@@ -112,16 +111,16 @@ _SIDES = (("left", 1), ("right", -1))
 
 @dataclass(frozen=True, slots=True)
 class Axles:
-    """Where the wheels are, and how far the front ones turn.
+    """Dimensions of two axles, the front one with Ackermann steering.
 
     Attributes:
-        front_x: Of the front axle, m ahead of the origin.
-        rear_x: Of the rear axle, m; negative.
-        gauge: Between the middles of the wheels of an axle, m.
-        radius: Of a wheel, m.
-        width: Of a wheel, m.
+        front_x: Position of the front axle, m ahead of the origin.
+        rear_x: Position of the rear axle, m; negative.
+        gauge: Distance between the wheels of an axle, m.
+        radius: Wheel radius, m.
+        width: Wheel width, m.
         wheel_kg: Mass of a wheel.
-        full_lock: Angle at a steering of 1, of a wheel in the middle of the axle, rad.
+        full_lock: Steering angle at an output of 1, for a wheel in the middle of the axle, rad.
     """
 
     front_x: float
@@ -134,21 +133,21 @@ class Axles:
 
     @property
     def wheelbase(self) -> float:
-        """Between the axles, m."""
+        """Distance between the axles, m."""
         return self.front_x - self.rear_x
 
     @property
     def turning_radius(self) -> float:
-        """Of the path of the origin at full lock, m."""
+        """Radius of the origin's path at full lock, m."""
         return math.hypot(self.wheelbase / math.tan(self.full_lock), self.rear_x)
 
     def angles(self, steering: float) -> tuple[float, float]:
-        """Angles of the left and of the right wheel, rad, positive to the left.
+        """Angles of the left and the right wheel, rad, positive to the left.
 
-        All wheels roll round one point on the line of the rear axle: Ackermann's condition.
+        All wheels roll around one point on the line of the rear axle (Ackermann's condition).
 
         Args:
-            steering: From -1, left, to 1, right.
+            steering: Output from -1, left, to 1, right.
         """
         curvature = math.tan(-steering * self.full_lock) / self.wheelbase
         along, half = self.wheelbase * curvature, curvature * self.gauge / 2
@@ -158,10 +157,17 @@ class Axles:
 def add_axles(
     spec: mujoco.MjSpec, chassis: mujoco.MjsBody, axles: Axles, motor: DcMotor, paint: Paint
 ) -> None:
-    """Add four wheels, the servo of the front ones and the motor of the rear ones.
+    """Add four wheels, the steering servo and the motor of the rear axle.
 
-    The rear axle has a differential: its wheels share the torque, and the mean of their speeds is
-    that of the motor. A fixed tendon is just that.
+    The rear axle has a differential, modelled by a fixed tendon: its wheels share the torque, and
+    their mean speed is the motor's.
+
+    Args:
+        spec: Model to extend.
+        chassis: Body of the vehicle.
+        axles: Dimensions.
+        motor: Motor of the rear axle.
+        paint: Materials of the wheels.
     """
     size = (axles.radius, axles.width, axles.wheel_kg)
     axle = motor.add(spec, "vehicle/wheels")
@@ -187,13 +193,13 @@ def add_axles(
 
 
 class Steered(Rolling):
-    """A vehicle that steers by its front wheels.
+    """A `BoundVehicle` with Ackermann steering.
 
     Args:
-        model: Model of everything.
-        data: State of everything.
+        model: Compiled model with the vehicle.
+        data: Its state.
         motors: See `Rolling`.
-        axles: Where its wheels are.
+        axles: Dimensions of its axles.
     """
 
     def __init__(
@@ -210,12 +216,12 @@ class Steered(Rolling):
         self._steering = 0.0
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Put it there at rest, its wheels straight."""
+        """Put the vehicle at a pose, at rest and with straight wheels."""
         self._steering = 0.0
         super().place(x, y, heading)
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Set the voltage of the motor and the angles of the front wheels."""
+        """Set the voltages of the motors and the angles of the front wheels."""
         super().drive(outputs, battery_v)
         steering = outputs.get("steering", 0.0)
         if steering is not None and steering != self._steering:

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import tyro
 
-from shapechanger.cli.demos.edit import Bad, Cut, Good, MarkStep, Merge, RepairEpisodes
+from shapechanger.cli.demos.edit import Bad, CutEpisode, Good, MarkStep, Merge, RepairEpisodes
 from shapechanger.cli.demos.exchange import Export, Import
-from shapechanger.cli.demos.record import Record
+from shapechanger.cli.demos.record import RecordEpisodes
 from shapechanger.cli.demos.replay import Replay
-from shapechanger.cli.demos.show import ListEpisodes, Show
-from shapechanger.cli.demos.train import Evaluate, Train
+from shapechanger.cli.demos.show import ListEpisodes, ShowEpisodes
+from shapechanger.cli.demos.train import Evaluate, TrainClone
 
 __all__ = ["Demos"]
 
@@ -22,10 +22,10 @@ class Demos:
     """Record, inspect and edit demonstrations, and learn from them."""
 
     command: (
-        Annotated[Record, tyro.conf.subcommand("record")]
+        Annotated[RecordEpisodes, tyro.conf.subcommand("record")]
         | Annotated[ListEpisodes, tyro.conf.subcommand("list")]
-        | Annotated[Show, tyro.conf.subcommand("show")]
-        | Annotated[Cut, tyro.conf.subcommand("cut")]
+        | Annotated[ShowEpisodes, tyro.conf.subcommand("show")]
+        | Annotated[CutEpisode, tyro.conf.subcommand("cut")]
         | Annotated[Bad, tyro.conf.subcommand("bad")]
         | Annotated[Good, tyro.conf.subcommand("good")]
         | Annotated[MarkStep, tyro.conf.subcommand("mark")]
@@ -34,7 +34,7 @@ class Demos:
         | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Import, tyro.conf.subcommand("import")]
         | Annotated[Export, tyro.conf.subcommand("export")]
-        | Annotated[Train, tyro.conf.subcommand("train")]
+        | Annotated[TrainClone, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     )
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Bad",
-    "Cut",
+    "CutEpisode",
     "Good",
     "MarkStep",
     "Merge",
@@ -76,7 +76,7 @@ _To = Annotated[int | None, tyro.conf.arg(name="to", metavar="STEP")]
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutEpisode:
     """Keep a range of steps of an episode and drop the rest."""
 
     episode: _Episode

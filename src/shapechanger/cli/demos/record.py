@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["EXPERT", "Record", "pilot_of"]
+__all__ = ["EXPERT", "RecordEpisodes", "pilot_of"]
 
 EXPERT: Final = "expert"
 
@@ -37,7 +37,9 @@ _CRAWLS_MPS: Final = 0.05
 _BRAKES: Final = 0.0
 
 
-def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> EpisodeDriver:
+def pilot_of(
+    env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int, *, trust: bool = False
+) -> EpisodeDriver:
     """Return the requested driver.
 
     Args:
@@ -45,6 +47,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         driver: "expert", or a policy file.
         corrected_by: "expert" to correct the policy, or "".
         seed: Seed of the expert's errors.
+        trust: Load the policy even if its file contains something that can run code.
 
     Raises:
         DemosError: If the driver is unknown, or the env has no expert.
@@ -63,7 +66,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     from shapechanger.transfer.learners.ppo import use_one_thread
 
     use_one_thread()  # Inference on single frames is slower with more threads.
-    act = _policy(Path(driver), env)
+    act = _policy(Path(driver), env, trust=trust)
     if not corrected_by:
         return PolicyPilot(act)
     rule = GateRule()
@@ -82,7 +85,7 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
     return cast("TaskExpert", give(seed))
 
 
-def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
+def _policy(path: Path, env: gym.Env[Any, Any], *, trust: bool) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
     from shapechanger.transfer.learners.cloning import is_clone, load_clone
 
@@ -98,7 +101,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     from shapechanger.transfer.env_ref import layouts_of
     from shapechanger.transfer.learners.policy_file import load_policy
 
-    policy = load_policy(path)
+    policy = load_policy(path, trust=trust)
     if (policy.card.observation, policy.card.action) != layouts_of(env):
         raise DemosError(
             f"{path} was trained in {policy.card.env}, which senses or moves something else than "
@@ -160,7 +163,7 @@ def _name(env: gym.Env[Any, Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Record:
+class RecordEpisodes:
     """Record an expert or a policy in an env."""
 
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
@@ -171,6 +174,8 @@ class Record:
     """How long, in minutes of the env."""
     driver: str = EXPERT
     """"expert", or the file of a policy."""
+    trust: bool = False
+    """Load the policy even if its file contains something that can run code."""
     corrected_by: str = ""
     """"expert" to let it take over where the policy would go wrong. Only what the expert does is
     learned from then."""
@@ -205,7 +210,7 @@ class Record:
             hz = float(made.metadata.get("render_fps") or 20.0)
             longest = max(1, round(self.episode_s * hz))
             steps = max(1, round(self.minutes * 60.0 * hz))
-            pilot = pilot_of(made, self.driver, self.corrected_by, self.seed)
+            pilot = pilot_of(made, self.driver, self.corrected_by, self.seed, trust=self.trust)
             env = RecordEpisodes(
                 TimeLimit(made, longest), self.out, driver="program", about=self._about(made)
             )

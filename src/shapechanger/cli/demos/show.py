@@ -14,8 +14,9 @@ from rich.table import Table
 from shapechanger.cli.console import plain_console
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
+from shapechanger.reports.numbers import duration_text, shares_text
 
-__all__ = ["ListEpisodes", "Show", "shares", "told_length"]
+__all__ = ["ListEpisodes", "ShowEpisodes"]
 
 _WIDEST: Final = 400
 
@@ -54,8 +55,8 @@ class ListEpisodes:
                 one.what,
                 one.created[:16].replace("T", " "),
                 str(one.steps) if one.kept == one.steps else f"{one.kept} of {one.steps}",
-                told_length(one.seconds),
-                shares({str(driver): count for driver, count in one.drivers.items()}),
+                duration_text(one.seconds),
+                shares_text({str(driver): count for driver, count in one.drivers.items()}),
                 str(one.marks or ""),
                 one.outcome if one.closed else "not closed",
             )
@@ -64,37 +65,13 @@ class ListEpisodes:
         needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
         plain_console(width=max(console.width, needed)).print(table)
         many = f"{len(paths)} episode{'' if len(paths) == 1 else 's'}"
-        console.print(f"{many}: {kept} of {steps} steps count, {told_length(seconds)}")
+        console.print(f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}")
         for sentence in broken:
             console.print(sentence, soft_wrap=True)
 
 
-def told_length(seconds: float) -> str:
-    """Format a duration.
-
-    >>> told_length(4.25), told_length(59.97), told_length(754.0)
-    ('4.2 s', '1:00 min', '12:34 min')
-    """
-    if round(seconds, 1) < 60.0:  # A minute.
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes}:{rest:02d} min"
-
-
-def shares(counts: dict[str, int]) -> str:
-    """Format shares in percent.
-
-    >>> shares({"policy": 30, "expert": 10}), shares({"expert": 4})
-    ('policy 75 %, expert 25 %', 'expert')
-    """
-    total = sum(counts.values())
-    if len(counts) == 1:
-        return next(iter(counts))
-    return ", ".join(f"{name} {100.0 * count / total:.0f} %" for name, count in counts.items())
-
-
 @dataclass(frozen=True)
-class Show:
+class ShowEpisodes:
     """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
@@ -144,9 +121,9 @@ def _told(episodes: Sequence[Episode]) -> list[str]:
     many = f"{len(episodes)} episode{'' if len(episodes) == 1 else 's'}"
     steps = sum(len(one.steps) for one in episodes)
     kept = sum(len(one.kept) for one in episodes)
-    lines = [f"{many}: {kept} of {steps} steps count, {told_length(seconds)}"]
+    lines = [f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}"]
     if counts:
-        lines.append(f"driven by {shares(dict(counts.most_common()))}")
+        lines.append(f"driven by {shares_text(dict(counts.most_common()))}")
     outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
     if outcomes:
         ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Evaluate", "Shrinking", "Train", "print_judgement"]
+__all__ = ["Evaluate", "Shrinking", "TrainClone", "print_judgement"]
 
 
 @dataclass(frozen=True)
-class Train:
+class TrainClone:
     """Clone a driver from demonstrations; write the policy and a report."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]

@@ -1,4 +1,4 @@
-"""`shapechanger robot`: what is done on a robot, and from afar."""
+"""`shapechanger robot`: set up, serve, find, drive and test robots."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import tyro
 from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
-from shapechanger.cli.robot.fetch import Fetch
+from shapechanger.cli.robot.fetch import FetchEpisodes
 from shapechanger.cli.robot.find import Find, Forget, Remember
 from shapechanger.cli.robot.init import Home, Init
 from shapechanger.cli.robot.key import Key
@@ -24,7 +24,7 @@ __all__ = ["Robot"]
 
 @dataclass(frozen=True)
 class Robot:
-    """Set a robot up, serve it, find it and drive it."""
+    """Set up, serve, find, drive and test robots."""
 
     command: (
         Annotated[Init, tyro.conf.subcommand("init")]
@@ -37,12 +37,12 @@ class Robot:
         | Annotated[Remember, tyro.conf.subcommand("remember")]
         | Annotated[Forget, tyro.conf.subcommand("forget")]
         | Annotated[Drive, tyro.conf.subcommand("drive")]
-        | Annotated[Fetch, tyro.conf.subcommand("fetch")]
+        | Annotated[FetchEpisodes, tyro.conf.subcommand("fetch")]
         | Annotated[Stop, tyro.conf.subcommand("stop")]
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
         | Annotated[Selftest, tyro.conf.subcommand("selftest")]
     )
 
     def run(self) -> None:
-        """Do what was asked."""
+        """Run the subcommand."""
         self.command.run()

@@ -1,4 +1,4 @@
-"""`shapechanger robot calibrate`: a person jogs each output, and the profile learns from it."""
+"""`shapechanger robot calibrate`: jog each output and write the calibration to the profile."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Find the ends and the middle of servos, the direction of motors and the way of a wheel."""
+    """Calibrate servo ends and centres, motor directions and wheel circumferences."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile; what is found is written into it, and its comments stay."""
@@ -64,7 +64,7 @@ class Calibrate:
     """Without --twin: the wheels are off the ground, so do not ask."""
 
     def run(self) -> None:
-        """Jog, ask, and write what was found; after an error, what was found before it."""
+        """Calibrate interactively and write the result, or the partial result after an error."""
         from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
         from shapechanger.teleop import Terminal
 
@@ -85,7 +85,7 @@ class Calibrate:
             try:
                 changes = calibration.run()
             except ShapechangerError:
-                # An hour's work is not thrown away because the last wire was loose. The date is
+                # Keep the results so far if the last wire was loose. The date is
                 # left out: it is not calibrated.
                 if calibration.found:
                     console.print("\nIt did not come to its end. What was found before:")
@@ -98,7 +98,7 @@ class Calibrate:
 
 
 def _write(path: Path, changes: dict[str, Any]) -> None:
-    """Write what was found into the profile, and show it."""
+    """Write the changes to the profile and print them."""
     from shapechanger.robot.profile.edit import rewrite
 
     rewrite(path, changes)
@@ -109,34 +109,34 @@ def _write(path: Path, changes: dict[str, Any]) -> None:
 
 
 _STEP: Final = 0.02
-# How near to what was asked an output is there, and how long one that is held back is waited for.
+# Tolerance of the requested value, and time to wait for an output that is held back.
 _THERE: Final = 0.07
 _SETTLES_S: Final = 4.0
-_STOP_LOOKS: Final = 50  # Observations until an emergency stop must be seen.
+_STOP_LOOKS: Final = 50  # Observations within which an emergency stop must be visible.
 
 
 class Keys(Protocol):
-    """Where keys come from, such as a terminal."""
+    """Source of key presses, such as a terminal."""
 
     def keys(self, wait_s: float) -> list[str]:
-        """The keys that were pressed; waits so long for the first one."""
+        """Return pressed keys, waiting up to `wait_s` seconds for the first."""
         ...
 
 
 class Ended(Exception):
-    """The person ends it all."""
+    """The person quits."""
 
 
 class Jogger:
-    """Moves one output by keys, and holds it where it is.
+    """Jog one output with keys.
 
     Args:
-        robot: The robot, armed for us.
-        profile: What it is.
-        output: The output, with the settings that it is jogged in.
-        keys: Where keys come from.
-        console: Where to show what the output does.
-        step: How much one key changes the value.
+        robot: The robot, armed for this client.
+        profile: Its profile.
+        output: The output, with the settings for jogging.
+        keys: Source of key presses.
+        console: Display of the output's value.
+        step: Change per key press.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class Jogger:
         self._console = console
         self._step = step
         self._output = output
-        # The action that moves this output most.
+        # The action with the largest weight on this output.
         name = max(output.mix, key=lambda action: abs(output.mix[action]))
         self._names = [action.name for action in profile.actions]
         self._rests = [action.rest for action in profile.actions]
@@ -165,12 +165,11 @@ class Jogger:
         """Jog until Enter.
 
         Args:
-            cap: Largest value that is commanded.
-            ask_beyond: Asks, at the cap, whether to go beyond it, which Y then does; None where
-                nobody may.
+            cap: Largest commanded value.
+            ask_beyond: Question at the cap, on which Y goes beyond it; None to forbid that.
 
         Returns:
-            Where the output really is then; None where the person skips.
+            The applied value of the output, or None if skipped.
 
         Raises:
             RobotError: If the robot stopped.
@@ -181,7 +180,7 @@ class Jogger:
     def _jogged(
         self, cap: float, ask_beyond: Callable[[float], None] | None, live: Live
     ) -> float | None:
-        """As `find`, and shows all the while where the output is."""
+        """Run `find` with a live display."""
         value = self._action.rest
         self._robot.acknowledge()
         newest = self._robot.newest
@@ -215,7 +214,7 @@ class Jogger:
                         asked = True
                     value = min(max(value + step, -cap), cap)
                     value = min(max(value, self._action.low), self._action.high)
-            # It may still be on its way there: a slew, or a controller that is not awake yet.
+            # It may still be moving: a slew, or a controller that is not armed yet.
             elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
                 is_there = abs(seen.action_applied[self._place] - value) < _THERE
                 if is_there or time.monotonic() > accepted_s + _SETTLES_S:
@@ -223,19 +222,19 @@ class Jogger:
             before = seen.action_applied
 
     def _is_at(self, applied: tuple[float, ...]) -> float:
-        """The value of the output that follows from what the actions are."""
+        """Return the value of the output for the applied actions."""
         mix = self._output.mix
         mixed = sum(mix.get(name, 0.0) * v for name, v in zip(self._names, applied, strict=True))
         return min(max(self._output.offset + mixed, -1.0), 1.0)
 
 
 def live_line(console: Console) -> Live:
-    """A line that follows what is measured, and is gone afterwards."""
+    """Return a live line that disappears afterwards."""
     return Live(console=console, refresh_per_second=10, transient=True)
 
 
 def end_if_asked(key: str, robot: RobotClient | None = None) -> None:
-    """Q ends it all; Space besides stops the robot, and waits until that is seen."""
+    """Quit on Q; on Space, stop the robot and wait until the stop is visible."""
     if key == "space" and robot is not None:
         robot.emergency_stop("calibrate")
         for _ in range(_STOP_LOOKS):
@@ -252,17 +251,17 @@ _MOTORS: Final = ("hbridge", "phase_enable")
 
 
 class Calibration:
-    """One round over all outputs and encoders of a robot.
+    """Calibration of all outputs and encoders of a robot.
 
     Args:
         profile: The robot.
-        keys: Where keys come from.
-        console: Where to ask.
-        cap: Largest value that a motor is jogged with, and an ESC unless the person goes beyond.
+        keys: Source of key presses.
+        console: Console for questions.
+        cap: Largest value for motors, and for ESCs unless the person goes beyond.
         twin: Whether on the twin.
 
     Attributes:
-        found: What was found so far, by dotted name; whole outputs and sensors only.
+        found: Results so far by dotted name, for completed outputs and sensors.
     """
 
     def __init__(
@@ -276,13 +275,13 @@ class Calibration:
         self.found: dict[str, Any] = {}
 
     def run(self) -> dict[str, Any]:
-        """Go over everything.
+        """Calibrate everything.
 
         Returns:
-            What to write into the profile, by dotted name; nothing where the person ends it.
+            Changes to the profile by dotted name; empty if the person quits.
 
         Raises:
-            RobotError: If what was found cannot be.
+            RobotError: If a result is impossible.
         """
         self._console.print(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
@@ -319,7 +318,7 @@ class Calibration:
         self._console.print(f"\n{output.name}: A and D move it, Enter where it is …")
         with self._served(settings) as robot:
             jogger = Jogger(robot, self._profile, wide, self._keys, self._console)
-            # A servo's ends are what is looked for; an ESC's end is full speed.
+            # Servo ends are searched for; an ESC's end is full speed.
             cap = self._cap if output.driver == "esc" else 1.0
             found: list[float] = []
             for name in names:
@@ -369,7 +368,7 @@ class Calibration:
 
     @contextmanager
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
-        """The robot with other settings, served and armed for a person."""
+        """Serve the robot with other settings, armed for a person."""
         from shapechanger.robot.profile.edit import rewrite
         from shapechanger.twin.robot import run_robot
 
@@ -377,7 +376,7 @@ class Calibration:
             path = Path(folder) / "profile.toml"
             path.write_bytes(self._profile.path.read_bytes())
             profile = rewrite(path, settings) if settings else load_profile(path)
-            # Nobody looks through the camera while calibrating, so it may be missing.
+            # Calibration does not need the camera, which may be missing.
             files = Path(folder) / "robot"
             files.mkdir()
             with (
@@ -385,7 +384,7 @@ class Calibration:
                     profile,
                     twin=self._twin,
                     folder=files,
-                    # Nor does anybody need a place to drive in.
+                    # Nor does it need a course.
                     arguments=("--world", "room") if self._twin else (),
                 ) as robot,
                 robot.client(role="person", frames=False, name="calibrate") as client,
@@ -409,10 +408,10 @@ def _number(value: object) -> float:
 
 
 def ask_for_wheels_up() -> None:
-    """Ask at the terminal.
+    """Ask at the terminal to confirm that the wheels are off the ground.
 
     Raises:
-        RobotError: If the answer is not yes, or nobody can be asked.
+        RobotError: If the answer is not yes, or there is no terminal.
     """
     if not sys.stdin.isatty():
         raise RobotError("The robot will drive: lift its wheels, and say so with --wheels-up.")

@@ -1,4 +1,4 @@
-"""`shapechanger robot doctor`: what keeps a robot from being safe, or from working."""
+"""`shapechanger robot doctor`: diagnose a robot's set-up."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
 
 @dataclass(frozen=True)
 class Doctor:
-    """Look at everything that a robot's safety and work depend on, and move nothing."""
+    """Check everything that a robot's safety and operation depend on, without moving it."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
@@ -29,7 +29,7 @@ class Doctor:
     """Folder of its key and certificate, if not the one that `init` made."""
 
     def run(self) -> None:
-        """Print what was found, and exit with 1 if something is missing."""
+        """Print the findings and exit with 1 if something is missing."""
         from shapechanger.cli.robot.serve import credentials_of
         from shapechanger.robot.profile.load import find_profile, load_profile
         from shapechanger.robot.setup.doctor import Finding, examine_robot

@@ -1,4 +1,4 @@
-"""`shapechanger robot drive`: a person drives, or is in charge while a policy does."""
+"""`shapechanger robot drive`: drive a robot, or supervise a policy."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _LOOK_EVERY_S: Final = 0.2
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive a robot: in its console, where there is a browser, or with the keys of this terminal.
+    """Drive a robot in its web console, or with the keys of this terminal.
 
-    A person comes before any program. With --policy a policy drives once a person lets it, and the
-    person may take over at any time: what they do then can be learned from.
+    People take precedence over programs. With --policy, a policy drives once a person permits it,
+    and the person can take over at any time; the corrections can be learned from.
     """
 
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
@@ -53,7 +53,7 @@ class Drive:
     """Record all of it on the robot, and bring it to this folder at the end."""
 
     def run(self) -> None:
-        """Drive until Q, or until Ctrl-C beside the console."""
+        """Drive until Q, or until Ctrl-C if the console is used."""
         from shapechanger.cli.robot.key import can_open
         from shapechanger.remote.known_robots import recall
 
@@ -67,7 +67,7 @@ class Drive:
             self._drive_there(known, pilot)
 
     def _drive_here(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """With the keys of this terminal."""
+        """Drive with the keys of this terminal."""
         from contextlib import nullcontext
 
         from shapechanger.cli.robot.fetch import recorded
@@ -84,7 +84,7 @@ class Drive:
                 driving.run()
 
     def _drive_there(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """In the console; this process stays only where it has something to do."""
+        """Drive in the console; this process stays only for a policy."""
         from contextlib import nullcontext
 
         from shapechanger.cli.robot.fetch import recorded
@@ -107,7 +107,7 @@ class Drive:
 
 
 def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
-    """Say what the policy says, until Ctrl-C or until it can no longer drive."""
+    """Print the policy's state until Ctrl-C or until it fails."""
     console = plain_console()
     said = ""
     try:
@@ -128,21 +128,21 @@ _HELP: Final = (
     "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q leaves"
 )
 _CAP_STEP: Final = 0.1
-# s. A program that waits in its `reset` takes a robot that is free within a moment.
+# s. A program waiting in `reset` takes a free robot within this time.
 _TAKEN_WITHIN_S: Final = 2.0
-# Observations in a row in which a key moves nothing, and the robot names no reason.
+# Consecutive observations in which a key has no effect and the robot gives no reason.
 _UNMOVED_LOOKS: Final = 10
 _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
 class Driving:
-    """One person at one terminal.
+    """Terminal session of a person driving a robot.
 
     Args:
         robot: The robot, connected to as a person.
-        terminal: Where the keys come from.
-        cap: Largest steering and throttle to ask for, 0 to 1.
-        pilot: What drives when the person lets it; None for whatever program waits.
+        terminal: Source of key presses.
+        cap: Largest steering and throttle, 0 to 1.
+        pilot: Policy that may drive; None for any waiting program.
 
     Raises:
         LinkError: If the robot has no throttle.
@@ -185,7 +185,7 @@ class Driving:
                     self._pilot.require_well()
                 now_s = time.monotonic()
                 values = [
-                    # What no key moves stays where it is, which need not be 0.
+                    # Actions without keys keep their value, which may differ from 0.
                     self._keys.value(name, now_s) if name in _BY_KEYS else held / self._cap
                     for name, held in zip(self._actions.names, seen.action_applied, strict=True)
                 ]
@@ -196,7 +196,7 @@ class Driving:
                 live.update(self._line(seen, self._unanswered(values, seen)))
 
     def _take_keys(self, wait_s: float, seen: Observation) -> bool:
-        """Do what the keys say; whether to go on."""
+        """Handle key presses and return whether to continue."""
         until_s = time.monotonic() + wait_s
         while (left_s := until_s - time.monotonic()) > 0.0:
             for key in self._terminal.keys(left_s):
@@ -209,13 +209,13 @@ class Driving:
         return True
 
     def _act(self, key: str, seen: Observation) -> None:
-        """Do what one key says.
+        """Handle one key press.
 
         Raises:
-            RobotRefused: If the robot says no.
+            RobotRefused: If the robot refuses.
         """
         if key in DIRECTIONS:
-            # A hand on the keys is what takes the robot from a policy: there is no time to think.
+            # A driving key takes the robot from a policy immediately.
             if not seen.mine and seen.holder_role == "program":
                 self._robot.take()
             self._keys.press(key, time.monotonic())
@@ -242,10 +242,10 @@ class Driving:
             self._record(key)
 
     def _record(self, key: str) -> None:
-        """What R, M and U do with the robot's recorder.
+        """Handle R, M and U: record, mark and undo.
 
         Raises:
-            RobotRefused: If the robot cannot.
+            RobotRefused: If the robot refuses.
         """
         state = self._robot.recorder
         if key == "r":
@@ -256,7 +256,7 @@ class Driving:
             self._robot.undo()
 
     def _hand_over(self) -> str:
-        """Give the robot to a program that waits for it, and arm it for that; what came of it.
+        """Hand the robot to a waiting program, arm it, and describe the outcome.
 
         Raises:
             RobotRefused: If the robot does not arm.
@@ -267,13 +267,13 @@ class Driving:
             seen = self._robot.ask().message
             if seen.holder and not seen.mine:
                 self._robot.arm()
-                if self._pilot is not None:  # Which says itself what it does.
+                if self._pilot is not None:  # The policy reports its own state.
                     return ""
                 return f"armed for {seen.holder}: any direction takes over, Space stops"
         return "no program waits: start one, and press P while its reset waits"
 
     def _unanswered(self, values: list[float], seen: Observation) -> str:
-        """Which key moves nothing though nothing is said against it, as below a threshold."""
+        """Return a hint for a key without effect, such as a value below a threshold."""
         quiet = seen.mine and seen.armed and not seen.stop_reason
         for name, asked, does in zip(self._actions.names, values, seen.action_applied, strict=True):
             if name in _BY_KEYS:
@@ -284,7 +284,7 @@ class Driving:
         return ""
 
     def _line(self, seen: Observation, remark: str) -> Text:
-        """The state of the robot in a line, with a remark on it."""
+        """Format the robot's state and a remark as one line."""
         if seen.emergency:
             state = "EMERGENCY STOP"
         elif not seen.mine:
@@ -324,16 +324,16 @@ class Driving:
         return "" if self._pilot is None else self._pilot.note
 
 
-# s. How long a reset waits for the person before it looks whether to end; then it waits again.
+# s. A reset waits in steps of this length, and checks between them whether to end.
 _PILOTING_LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
 
 
 def load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
-    """The policy in a file, if it can drive the robot; nothing moves yet.
+    """Load a policy and check that it can drive the robot.
 
     Raises:
-        PolicyError: If it is none, or one for another robot.
+        PolicyError: If the file is not a policy, or is one for another robot.
         LinkError: If the robot cannot be reached.
     """
     from shapechanger.demos.cloning.policy import CameraPolicy
@@ -351,19 +351,18 @@ def load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
 
 
 class PolicyDriver:
-    """Lets a policy drive, from when a person says so until they take the robot or stop it.
+    """A policy that drives between a person's permission and their next intervention.
 
-    Then it waits until they let it drive again. It works in a thread, between `__enter__` and
-    `__exit__`.
+    Between these it waits. It runs in a thread from `__enter__` to `__exit__`.
 
     Args:
         policy: The policy.
-        name: What people see it called.
+        name: Displayed name.
         robot: The robot.
-        size: Width and height of the pictures that the policy gets.
+        size: Width and height of the policy's frames, pixels.
 
     Attributes:
-        note: What it does, in words.
+        note: Its state, for display.
     """
 
     def __init__(
@@ -390,20 +389,20 @@ class PolicyDriver:
         self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to wait for the person."""
+        """Start the thread."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the robot back."""
+        """Release the robot and end the thread."""
         self._ended.set()
         self._thread.join(_END_S)
 
     def require_well(self) -> None:
-        """Pass on what ended it.
+        """Raise the error that ended the thread.
 
         Raises:
-            Exception: If anything did.
+            Exception: If there is one.
         """
         if self._failure is not None:
             raise self._failure
@@ -415,12 +414,12 @@ class PolicyDriver:
             env = RemoteVehicleEnv(**self._options)
             try:
                 while not self._ended.is_set():
-                    # It says that the person has not armed it yet, or who has the robot.
+                    # Refused while the robot is disarmed or held by another client.
                     with contextlib.suppress(RobotRefused):
                         self._drive(env, env.reset()[0])
             finally:
                 env.close()
-        except Exception as error:  # Whatever it was, the thread of the person raises it.
+        except Exception as error:  # Raised again in the main thread.
             self._failure = error
 
     def _drive(self, env: RemoteVehicleEnv, observation: Any) -> None:
@@ -435,7 +434,7 @@ class PolicyDriver:
                 return
 
     def _perceived(self, observation: Any) -> tuple[Any, Any]:
-        """The picture and the state in an observation; None for what the policy does not use."""
+        """Split an observation into frame and state; None for unused parts."""
         if self._options["image"] and self._options["state"]:
             return observation["image"], observation["state"]
         return (observation, None) if self._options["image"] else (None, observation)

@@ -1,4 +1,4 @@
-"""`shapechanger robot fetch`: brings what a robot recorded to this machine."""
+"""`shapechanger robot fetch`: download recordings from a robot."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from shapechanger.link.messages import EpisodeSummary
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["Fetch", "episodes_there", "fetch_episode", "recorded"]
+__all__ = ["FetchEpisodes", "episodes_there", "fetch_episode", "recorded"]
 
 
 @dataclass(frozen=True)
-class Fetch:
-    """Bring what a robot recorded to this machine, byte for byte; a second time, what is new."""
+class FetchEpisodes:
+    """Download a robot's recordings to this machine, or only what is new."""
 
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
     """Name of a robot that is known here, see `remember`."""
@@ -48,7 +48,7 @@ class Fetch:
     """Only these episodes, by their ids; all of them if not given."""
 
     def run(self) -> None:
-        """Fetch; exits with 1 where an episode could not be fetched."""
+        """Download; exit with 1 if an episode failed."""
         from shapechanger.remote.client import RobotClient
         from shapechanger.remote.known_robots import recall
 
@@ -87,15 +87,15 @@ _LINES: Final = 1_000
 
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSummary]:
-    """The episodes on a robot, oldest first.
+    """Return the episodes on a robot, oldest first.
 
     Args:
         robot: The robot.
-        wanted: Ids of those that are wanted; empty for all.
+        wanted: Ids of the episodes; empty for all.
 
     Raises:
-        UnknownName: If one is not there.
-        LinkError: If the robot does not answer.
+        UnknownName: If one does not exist.
+        LinkError: If the robot does not respond.
     """
     found: list[EpisodeSummary] = []
     more = True
@@ -112,22 +112,22 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSum
 
 
 def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
-    """Bring one episode, or what is new of it.
+    """Download one episode, or the new part of it.
 
-    Until it is all here it lies in a folder that no reader of recordings looks at.
+    An incomplete episode is kept in a folder that readers ignore.
 
     Args:
         robot: The robot.
         name: Id of the episode.
-        data: Folder of the recording to put it into.
+        data: Folder of the recording.
 
     Returns:
-        How many lines came.
+        Number of new lines.
 
     Raises:
-        DemosError: If what came is damaged, or what is here is not the beginning of it.
-        OutputError: If it cannot be written; what came before stays.
-        LinkError: If the robot does not answer, or refuses.
+        DemosError: If the data is damaged, or the local part is not its beginning.
+        OutputError: If it cannot be written; the part before that is kept.
+        LinkError: If the robot does not respond or refuses.
     """
     here, part = data / name, data / f".{name}{_PART}"
     folder = here if is_episode(here) else part
@@ -157,7 +157,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
         if folder is part:
             part.rename(here)
     except OSError as error:
-        if isinstance(error, ConnectionError):  # The link, and not the disk.
+        if isinstance(error, ConnectionError):  # From the link, not the disk.
             raise
         raise cannot_write(folder, error) from error
     finally:
@@ -166,10 +166,10 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
 
 
 def _complete_lines(folder: Path, fd: int) -> list[bytes]:
-    """The lines that are here; one that was cut off while it came is taken away.
+    """Return the number of local lines, after removing a truncated last one.
 
     Raises:
-        DemosError: If a line of an episode that was here whole is cut off.
+        DemosError: If a line of a complete episode is truncated.
     """
     lines = split_lines((folder / STEPS).read_bytes())
     if lines and not lines[-1].endswith(b"\n"):
@@ -181,16 +181,16 @@ def _complete_lines(folder: Path, fd: int) -> list[bytes]:
 
 
 def _goes_on(piece: Piece, last: bytes) -> bool:
-    """Whether a piece begins with the last line that is here."""
+    """Return whether a piece starts with the last local line."""
     return bool(piece.lines) and piece.lines[0].encode() + b"\n" == last
 
 
 def _checked(piece: Piece, folder: Path) -> list[bytes]:
-    """The lines of a piece, each whole and with its picture on the disk.
+    """Check the lines of a piece and store their frames.
 
     Raises:
-        DemosError: If one is not, or what came is no part of an episode.
-        OSError: If a picture cannot be written.
+        DemosError: If a line is incomplete or not part of an episode.
+        OSError: If a frame cannot be written.
     """
     lines = [line.encode() + b"\n" for line in piece.lines]
     if len(piece.frames) != len(lines):
@@ -210,13 +210,13 @@ def _checked(piece: Piece, folder: Path) -> list[bytes]:
 
 
 def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
-    """Write the picture of a step, unless it is here.
+    """Write the frame of a step, unless it exists.
 
     Raises:
-        DemosError: If it is not the one that the step names.
+        DemosError: If it is not the frame of the step.
         OSError: If it cannot be written.
     """
-    # What a robot says must not write anywhere else.
+    # A robot's data must not escape the folder.
     if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
         raise DemosError(f"A step names the picture {step.frame!r}.")
     file = frames / step.frame
@@ -234,33 +234,33 @@ def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
 
 
 def _write_header(folder: Path, text: str) -> None:
-    """Write the header as it is on the robot, whole or not at all."""
+    """Write the robot's header atomically."""
     part = folder / f".{HEADER}.part"
     part.write_bytes(text.encode())
     part.replace(folder / HEADER)
 
 
-# s. A memory card may take so long for the last steps.
+# s. Time that a memory card may need for the last steps.
 _CLOSED_WITHIN_S: Final = 10.0
 _LOOK_EVERY_S: Final = 0.1
 
 
 @contextlib.contextmanager
 def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None]:
-    """Record on the robot until the end of the block.
+    """Record on the robot for the duration of a block.
 
-    What was recorded stays on the robot, whatever happens here; where the block fails it is said
-    how to bring it.
+    The recording stays on the robot in any case; if the block fails, the message tells how to
+    download it.
 
     Args:
         robot: The robot, connected to as a person.
-        name: What it is known as here.
-        data: Where to bring it; None for not to record.
+        name: Its local name.
+        data: Folder to download to; None to record nothing.
 
     Raises:
-        RobotRefused: If the robot does not record.
-        DemosError: If what came is damaged.
-        OutputError: If it cannot be written here.
+        RobotRefused: If the robot refuses to record.
+        DemosError: If the data is damaged.
+        OutputError: If it cannot be written locally.
     """
     if data is None:
         yield
@@ -287,7 +287,7 @@ def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None
 
 
 def _closed(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
-    """The new episodes, once the robot has written their last steps, or does not in time."""
+    """Wait until the robot has written the last steps, and return the new episodes."""
     until_s = time.monotonic() + _CLOSED_WITHIN_S
     while True:
         new = [episode for episode in episodes_there(robot, ()) if episode.id not in before]

@@ -1,4 +1,4 @@
-"""`shapechanger robot find`, `remember`, `forget`: which robots there are, and which are ours."""
+"""`shapechanger robot find | remember | forget`: discover robots and manage known ones."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
 @dataclass(frozen=True)
 class Find:
-    """List the robots in this network."""
+    """List the robots on this network."""
 
     seconds: float = 2.0
     """How long to listen."""
 
     def run(self) -> None:
-        """Print a table, with the names under which robots are known here."""
+        """Print a table with the robots' local names."""
         from shapechanger.link.messages import VERSION
         from shapechanger.remote.discovery import find
 
@@ -53,7 +53,7 @@ class Find:
 
 @dataclass(frozen=True)
 class Remember:
-    """Write down how to reach a robot, so that its name is enough from now on."""
+    """Store a robot's address and key under a name."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """What to call it."""
@@ -63,7 +63,7 @@ class Remember:
     """SHA-256 of its certificate, as the robot shows it; "insecure" for no TLS."""
 
     def run(self) -> None:
-        """Ask for the key, which does not belong on a command line, and write it all down."""
+        """Ask for the key, which does not belong on a command line, and store everything."""
         from shapechanger.remote.known_robots import KnownRobot, remember
 
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
@@ -73,7 +73,7 @@ class Remember:
 
 @dataclass(frozen=True)
 class Forget:
-    """Remove a robot from those that are known here."""
+    """Remove a known robot."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """What it is called here."""
@@ -86,7 +86,7 @@ class Forget:
 
 
 def _known_here() -> dict[str, str]:
-    """The names of the robots that are known here, by fingerprint; a broken file is skipped."""
+    """Return the local names of known robots by fingerprint, skipping broken files."""
     from shapechanger.remote.known_robots import known_names, recall
 
     known: dict[str, str] = {}
@@ -99,7 +99,7 @@ def _known_here() -> dict[str, str]:
 
 
 def _asked_key(name: str) -> str:
-    """The key, typed without showing it or read from a pipe."""
+    """Read the key from a hidden prompt or a pipe."""
     if sys.stdin.isatty():
         return getpass.getpass(f"key of {name}: ")
     key = sys.stdin.readline()

@@ -1,4 +1,4 @@
-"""`shapechanger robot init`: everything that a new robot needs, in one folder and one go."""
+"""`shapechanger robot init | home`: create a robot's files, and find a rig's zeros."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Home", "Init"]
 
 @dataclass(frozen=True)
 class Init:
-    """Write a profile for a new robot, and make its key and its certificate."""
+    """Create the profile, key and certificate of a new robot."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND")]
     """What it is like: the name of a profile that comes with Shapechanger, such as car."""
@@ -30,7 +30,7 @@ class Init:
     configuration."""
 
     def run(self) -> None:
-        """Write it all, and say how to go on."""
+        """Write the files and print the next steps."""
         from shapechanger.cli.robot.key import how_to_remember, shown_credentials
         from shapechanger.cli.robot.serve import credentials_of
         from shapechanger.link.authentication import fingerprint_hex
@@ -41,17 +41,15 @@ class Init:
         name = self.name or self.kind
         check_name(name)
         out = self.out or Path(f"{name}.toml")
-        starter_text(
-            self.kind, out, name
-        )  # Whatever is refused is refused before anything is made.
+        starter_text(self.kind, out, name)  # Check everything before creating anything.
         credentials = credentials_of(name, self.credentials, make=True)
         key = credentials.key_file.read_text().strip()
         digits = fingerprint_hex(credentials.fingerprint)
-        # So that the same machine can drive it, on a twin above all.
+        # Lets this machine drive it, especially on a twin.
         remember(KnownRobot(name, "127.0.0.1", key, digits))
         unit, is_new = write_unit(name, out, self.credentials)
-        # Last, since one that exists is refused: whatever failed before, such as on a full disk,
-        # can be done again.
+        # Last, because an existing profile is refused: after a failure, such as a full disk, the
+        # command can be repeated.
         profile = write_profile(self.kind, out, name)
         console = plain_console()
         console.print(
@@ -71,7 +69,7 @@ _CYCLE_S: Final = 0.01
 
 @dataclass(frozen=True)
 class Home:
-    """Find the zeros of a rig's tendons and joints while somebody holds the finger straight."""
+    """Find the zeros of a rig's tendons and joints while a person holds the finger straight."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The rig's profile; the zeros are written into it, and its comments stay. The rig must not be
@@ -81,7 +79,7 @@ class Home:
     """Somebody holds the finger straight already, so do not ask."""
 
     def run(self) -> None:
-        """Pull gently, and write down where nothing moves any more."""
+        """Pull gently and store the positions at which motion stops."""
         from shapechanger.robot.hardware import REAL, connect
         from shapechanger.robot.profile.edit import rewrite
         from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles

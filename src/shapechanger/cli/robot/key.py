@@ -1,4 +1,4 @@
-"""`shapechanger robot key`: what another computer must know of a robot of this one."""
+"""`shapechanger robot key`: show a local robot's key and fingerprint."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Key:
-    """Show the key and the fingerprint of a robot that `init` or `serve` set up on this machine."""
+    """Show the key and fingerprint of a robot that was set up on this machine."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name of the robot."""
@@ -51,7 +51,7 @@ class Key:
     given."""
 
     def run(self) -> None:
-        """Print them, and how another computer remembers them."""
+        """Print them, and the command that stores them on another computer."""
         from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
 
         folder = self.credentials or credentials_folder(self.name)
@@ -69,7 +69,7 @@ class Key:
             self._show_qr(credentials)
 
     def _show_qr(self, credentials: Credentials) -> None:
-        """The console's address with the key as a QR code."""
+        """Print the console's address with the key as a QR code."""
         try:
             import segno
         except ImportError as error:
@@ -82,12 +82,12 @@ class Key:
         robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
         console = console_address(robot)
         plain_console().print(f"\nThe console is at {console}; this brings a phone there:\n")
-        # Printed as it is: what measures and wraps text would take the picture apart.
+        # Printed verbatim: wrapping would break the code.
         segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
 
 
 def shown_credentials(credentials: Credentials) -> str:
-    """The key and the fingerprint, whole and in short, for people to read and to compare."""
+    """Format the key and the fingerprint for people to compare."""
     from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 
     key = credentials.key_file.read_text().strip()
@@ -100,7 +100,7 @@ def shown_credentials(credentials: Credentials) -> str:
 
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
-    """What to type on the computer that shall drive the robot."""
+    """Return the command for the computer that is to drive the robot."""
     from shapechanger.link.authentication import fingerprint_hex
 
     return (
@@ -116,7 +116,7 @@ _LOOK_EVERY_S: Final = 0.1
 
 
 def can_open() -> bool:
-    """Whether there is a screen, and a browser to show something on it."""
+    """Return whether there is a display and a browser."""
     if sys.platform != "darwin" and not any(os.environ.get(name) for name in _SCREENS):
         return False
     try:
@@ -127,17 +127,17 @@ def can_open() -> bool:
 
 
 def console_address(robot: KnownRobot) -> str:
-    """Where a browser finds the console of a robot, without its key."""
+    """Return the address of a robot's console, without the key."""
     scheme = "http" if robot.fingerprint == INSECURE else "https"
     return f"{scheme}://{parse_address(robot.address)}/"
 
 
 def open_console(robot: KnownRobot) -> str:
-    """Open the console of a robot, which then knows the key.
+    """Open the console of a robot and pass it the key.
 
-    The key goes into the part of the address that no browser sends anywhere, and by way of a file
-    that only its owner may read: what stands on a command line can be read by everybody here. The
-    file is gone once the browser has read it, or after some seconds.
+    The key is in the fragment of the address, which browsers do not send, and passes through a file
+    that only its owner can read, because command lines are visible to all users. The file is
+    deleted once the browser has read it, or after some seconds.
 
     Returns:
         The address without the key.
@@ -166,7 +166,7 @@ def open_console(robot: KnownRobot) -> str:
 
 
 def _wait_until_read(page: Path) -> None:
-    """Wait until somebody has read a file, where the file system says so, but not for long."""
+    """Wait shortly until a file has been read, if the file system reports access times."""
     written_ns = page.stat().st_atime_ns
     until_s = time.monotonic() + _OPENED_WITHIN_S
     while page.stat().st_atime_ns == written_ns and time.monotonic() < until_s:

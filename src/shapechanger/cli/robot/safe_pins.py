@@ -1,4 +1,4 @@
-"""`shapechanger robot safe-pins`: every output at rest, whoever left it elsewhere."""
+"""`shapechanger robot safe-pins`: put every output at rest."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["SafePins", "require_pins"]
 
 @dataclass(frozen=True)
 class SafePins:
-    """Put every output of a robot at rest; for after a crash, as systemd's ExecStopPost."""
+    """Put every output of a robot at rest after a crash, as systemd's ExecStopPost."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
 
     def run(self) -> None:
-        """Do it, and say what could not be done."""
+        """Put the outputs at rest and print failures."""
         from shapechanger.robot.guard.outputs import make_safe
         from shapechanger.robot.hardware import REAL, connect
         from shapechanger.robot.profile.load import find_profile, load_profile
@@ -44,14 +44,14 @@ class SafePins:
 
 
 def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
-    """Refuse a machine without pins, before anything starts that would fail again and again.
+    """Refuse a machine without GPIO pins.
 
     Args:
         plan: The robot.
         root: Root of the file system, for tests.
 
     Raises:
-        RobotError: If an output needs a pin and there is none.
+        RobotError: If an output needs a pin and the machine has none.
     """
     if any(map(uses_pins, plan.outputs)) and not any((root / "dev").glob("gpiochip*")):
         raise RobotError(

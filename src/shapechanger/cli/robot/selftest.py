@@ -1,4 +1,4 @@
-"""`shapechanger robot selftest`: shows that a robot stops, on its twin or with its wheels up."""
+"""`shapechanger robot selftest`: prove that a robot stops, on its twin or with its wheels up."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from shapechanger.robot.profile.profile import Profile
     from shapechanger.twin.robot import RunningRobot
 
-__all__ = ["Check", "Selftest", "check_jumper", "check_robot"]
+__all__ = ["Selftest", "SelftestResult", "check_jumper", "check_robot"]
 
-# How often a trial is made again in which the robot stood before the fault: it says nothing.
+# Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES = 2
 _MARKS = {"good": "good", "bad": "BAD", "unknown": "?"}
 
 
 @dataclass(frozen=True)
 class Selftest:
-    """Show that a robot stops: with real faults on its twin, or with its wheels off the ground."""
+    """Prove that a robot stops, with faults on its twin or with its wheels off the ground."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
@@ -58,11 +58,11 @@ class Selftest:
     """Without --twin: two free BCM pins joined by a wire, an output and an input, to try first."""
 
     def run(self) -> None:
-        """Try it, print what came out, and exit with 1 if something is bad."""
+        """Run the tests, print the results, and exit with 1 on a failure."""
         from shapechanger.robot.profile.load import find_profile, load_profile
 
         profile = load_profile(find_profile(self.profile))
-        # So that what is printed says by itself what it is about.
+        # Makes the output self-contained.
         plain_console().print(
             f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
             f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
@@ -121,7 +121,7 @@ class Selftest:
 
 
 def _tried(trial: Trial, fault: Fault) -> TrialResult:
-    """A trial; made again where the robot stood before its fault, as on a busy machine."""
+    """Run a trial, and repeat it if the robot was not moving before the fault."""
     result = trial.run(fault)
     for _ in range(_MORE_TRIES):
         if result.drove or result.unauthorised:
@@ -131,7 +131,7 @@ def _tried(trial: Trial, fault: Fault) -> TrialResult:
 
 
 def _times(results: list[TrialResult]) -> str:
-    """The times of some trials, in words."""
+    """Summarise the stopping times of some trials."""
     times = sorted(result.stopped_ms for result in results)
     if not all(result.drove for result in results):
         return "it never drove"
@@ -141,7 +141,7 @@ def _times(results: list[TrialResult]) -> str:
     return f"{middle:.0f} ms, at most {times[-1]:.0f} ms" if len(times) > 1 else f"{middle:.0f} ms"
 
 
-# From the last command until the applied action is at rest, on top of the deadline.
+# Time from the last command to rest, beyond the deadline.
 _SLACK_MS: Final = 50.0
 _DRIVES_S: Final = 1.0
 _COASTS_S: Final = 3.0
@@ -149,13 +149,13 @@ _STANDS_MPS: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
-    """What one check came to.
+class SelftestResult:
+    """Result of one check.
 
     Attributes:
-        name: What was tried.
-        level: "good", "bad", or "unknown" where nothing measures it.
-        sentence: What was seen.
+        name: Name of the check.
+        level: "good", "bad", or "unknown" if it cannot be measured.
+        sentence: The observation.
     """
 
     name: str
@@ -164,30 +164,30 @@ class Check:
 
 
 class _Person:
-    """Somebody at the robot's link who drives by hand, and looks at what comes back."""
+    """Client that drives by hand and watches the observations."""
 
     def __init__(self, client: RobotClient, profile: Profile, cap: float) -> None:
         self._client = client
         self._state = Layout.from_json(client.welcome.state_layout)
         self._propels = [action.propels for action in profile.actions]
-        # Forward alone: a tank's steering propels too, and would make it turn.
+        # Forward only: a tank's steering propels too.
         forward = next((i for i, propels in enumerate(self._propels) if propels), None)
         self._forward = [float(i == forward) for i in range(len(self._propels))]
         self._cap = cap
 
     @property
     def moves(self) -> bool:
-        """Whether there is anything that propels."""
+        """Return whether an action propels the robot."""
         return any(self._forward)
 
     def look(self) -> Observation:
-        """The robot now."""
+        """Return the newest observation."""
         newest = self._client.newest
         self._client.acknowledge()
         return self._client.observation(newest.message.seq if newest else 0).message
 
     def push(self, seconds: float) -> Observation:
-        """Drive forward for so long, and say what was seen last."""
+        """Drive forward for some seconds and return the last observation."""
         seen = self.look()
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
@@ -196,7 +196,7 @@ class _Person:
         return seen
 
     def watch(self, done: Callable[[Observation], bool], seconds: float) -> Observation | None:
-        """Look until something is seen; None if it is not seen in time."""
+        """Wait for an observation that satisfies `done`; None on timeout."""
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
             if done(seen := self.look()):
@@ -204,22 +204,22 @@ class _Person:
         return None
 
     def at_rest(self, seen: Observation) -> bool:
-        """Whether nothing propels, as far as the robot says."""
+        """Return whether no applied action propels."""
         pairs = zip(self._propels, seen.action_applied, strict=True)
         return not any(propels and value for propels, value in pairs)
 
     def speed(self, seen: Observation) -> float | None:
-        """Speed in m/s where a sensor measures it."""
+        """Return the measured speed, m/s; None without a sensor."""
         if seen.sources.get("speed", "absent") in {"absent", "estimated"}:
             return None
         return dict(zip(self._state.names, seen.state, strict=True)).get("speed")
 
 
-def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Check]:
-    """Try a robot; its wheels must be off the ground.
+def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[SelftestResult]:
+    """Check a robot with its wheels off the ground.
 
     Args:
-        robot: The robot, served.
+        robot: The running robot.
         profile: Its profile.
         cap: Largest throttle, 0 to 1.
 
@@ -232,7 +232,7 @@ def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[C
         yield _boots_disarmed(person)
         client.arm()
         if not person.moves:
-            yield Check("drives", "unknown", "Nothing of this robot propels.")
+            yield SelftestResult("drives", "unknown", "Nothing of this robot propels.")
             return
         yield _drives(person)
         yield _silence(person, profile)
@@ -256,52 +256,54 @@ def check_robot(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[C
         )
 
 
-def _judged(name: str, good: bool, sentence: str) -> Check:
-    return Check(name, "good" if good else "bad", sentence)
+def _judged(name: str, good: bool, sentence: str) -> SelftestResult:
+    return SelftestResult(name, "good" if good else "bad", sentence)
 
 
-def _boots_disarmed(person: _Person) -> Check:
+def _boots_disarmed(person: _Person) -> SelftestResult:
     seen = person.push(0.3)
     good = not seen.armed and person.at_rest(seen)
     return _judged("boots disarmed", good, f"Commands before arming: {seen.stop_reason}")
 
 
-def _drives(person: _Person) -> Check:
+def _drives(person: _Person) -> SelftestResult:
     seen = person.push(_DRIVES_S)
     if person.at_rest(seen):
-        return Check("drives", "bad", f"It did not drive: {seen.stop_reason}")
+        return SelftestResult("drives", "bad", f"It did not drive: {seen.stop_reason}")
     speed = person.speed(seen)
     if speed is None:
-        return Check("drives", "unknown", "Outputs moved; nothing measures whether wheels did.")
+        return SelftestResult(
+            "drives", "unknown", "Outputs moved; nothing measures whether wheels did."
+        )
     words = f"The encoder says {speed:+.2f} m/s for forward."
     return _judged("drives", speed > 0.0, words)
 
 
-def _silence(person: _Person, profile: Profile) -> Check:
-    """Nobody commands any more; how long the outputs go on, by the robot's own clock."""
+def _silence(person: _Person, profile: Profile) -> SelftestResult:
+    """Stop commanding and measure how long the outputs continue, on the robot's clock."""
     before = person.push(0.5)
     told_ns = before.command_ns
     seen = person.watch(person.at_rest, _COASTS_S)
     if seen is None or told_ns is None:
-        return Check("stops by silence", "bad", "It did not stop.")
+        return SelftestResult("stops by silence", "bad", "It did not stop.")
     stopped_ms = (seen.state_ns - told_ns) / 1e6
     limit_ms = profile.limits.deadline_ms + _SLACK_MS + 1e3 / profile.control_hz
     words = f"At rest at most {stopped_ms:.0f} ms after the last command."
     return _judged("stops by silence", stopped_ms <= limit_ms, words)
 
 
-def _coasts(person: _Person) -> Iterator[Check]:
-    """How long the wheels turn on without power."""
+def _coasts(person: _Person) -> Iterator[SelftestResult]:
+    """Measure how long the wheels coast."""
     begin_s = time.monotonic()
     if person.speed(person.look()) is None:
-        yield Check("wheels stand", "unknown", "No encoder measures the wheels.")
+        yield SelftestResult("wheels stand", "unknown", "No encoder measures the wheels.")
         return
     seen = person.watch(lambda o: abs(person.speed(o) or 0.0) < _STANDS_MPS, _COASTS_S)
     took_s = time.monotonic() - begin_s if seen else math.inf
     yield _judged("wheels stand", seen is not None, f"The wheels stood {took_s:.2f} s later.")
 
 
-def _emergency(client: RobotClient, person: _Person) -> Check:
+def _emergency(client: RobotClient, person: _Person) -> SelftestResult:
     person.push(0.3)
     client.emergency_stop("A self-test.")
     seen = person.watch(lambda o: o.emergency, 1.0)
@@ -311,7 +313,7 @@ def _emergency(client: RobotClient, person: _Person) -> Check:
     return _judged("emergency stop", good, words)
 
 
-def _disarms(client: RobotClient, person: _Person) -> Check:
+def _disarms(client: RobotClient, person: _Person) -> SelftestResult:
     client.disarm()
     seen = person.watch(lambda o: not o.armed and person.at_rest(o), 1.0)
     words = seen.stop_reason if seen else "It did not."
@@ -325,16 +327,16 @@ _SETTLES_S: Final = 0.002
 def check_jumper(
     output: int, sensed: int, plan: GuardPlan, hardware: Hardware | None = None
 ) -> str:
-    """Toggle an output and look at the input that is joined to it.
+    """Toggle an output and check the input that is wired to it.
 
     Args:
-        output: BCM pin to drive; none that the robot uses.
-        sensed: BCM pin to read; none that the robot uses.
+        output: BCM pin to drive, unused by the robot.
+        sensed: BCM pin to read, unused by the robot.
         plan: The robot.
-        hardware: Its pins; this machine's if not given.
+        hardware: Its pins; those of this machine by default.
 
     Returns:
-        What was seen, in words.
+        Description of the result.
 
     Raises:
         RobotError: If the robot uses a pin, or the input does not follow.
@@ -366,7 +368,7 @@ def check_jumper(
 
 
 def _pins(plan: GuardPlan) -> dict[int, str]:
-    """Which pins the robot uses, and for what."""
+    """Return the robot's pins and their uses."""
     used: dict[int, str] = {}
     if plan.enable_pin is not None:
         used[plan.enable_pin] = "the enable line"

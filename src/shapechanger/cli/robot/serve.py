@@ -1,4 +1,4 @@
-"""`shapechanger robot serve`: the robot's own command, on its hardware or on a twin."""
+"""`shapechanger robot serve`: run a robot on its hardware or on a twin."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _HERE: Final = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Serve:
-    """Serve a robot to programs and people, and keep it safe."""
+    """Run a robot's guard and daemon, on its hardware or on a twin."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """A profile, such as car.toml, or the name of one that comes with Shapechanger."""
@@ -107,14 +107,14 @@ class Serve:
     given."""
 
     def run(self) -> None:
-        """Become the robot's supervisor; this returns only with an error."""
+        """Become the robot's supervisor; return only on an error."""
         from shapechanger.cli.robot.safe_pins import require_pins
         from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
         from shapechanger.robot.profile.load import find_profile, load_profile
 
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
-        # Whatever is undone is undone after an error only: the exec leaves everything as it is.
+        # Undone only after an error: exec keeps everything.
         with contextlib.ExitStack() as undo:
             board = self._board(profile, undo) if self.twin else None
             plan = serve_plan(
@@ -135,25 +135,25 @@ class Serve:
             if board is None:
                 require_pins(profile.guard_plan())
             _require_free(str(plan.daemon["host"]), self.port)
-            with contextlib.suppress(OSError):  # A full disk takes words away, and no robot.
+            with contextlib.suppress(OSError):  # A full disk loses messages, not the robot.
                 if board is not None:
                     plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
                     self._make_known(profile.name)
                 sys.stdout.flush()
-            # In place of this process, which has loaded much that a supervisor has no use for.
+            # Replaces this process, which has loaded much that a supervisor does not need.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
 
     def _make_known(self, name: str) -> None:
-        """Let this machine drive the twin by its name, as `init` does, and say so.
+        """Store the twin's address and key for this machine, as `init` does, and print that.
 
         Raises:
-            OutputError: If that cannot be written down.
+            OutputError: If it cannot be stored.
         """
         from shapechanger.link.address import Address
         from shapechanger.link.authentication import fingerprint_hex
         from shapechanger.remote.known_robots import KnownRobot
 
-        # Who asks for any port, or no TLS, tells whoever drives how to reach it.
+        # With any free port, or without TLS, the address is passed on by the caller.
         if not self.port or self.insecure or not can_be_known(name):
             return
         credentials = credentials_of(name, self.credentials, make=False)
@@ -164,7 +164,7 @@ class Serve:
         plain_console().print(make_known(robot), soft_wrap=True)
 
     def _refuse_contradictions(self) -> None:
-        """Refuse what has a meaning on a twin only."""
+        """Refuse options that only apply to a twin."""
         asked = {
             "--clock twin": self.clock == "twin",
             "--wired-as": bool(self.wired_as),
@@ -187,14 +187,14 @@ class Serve:
             )
 
     def _board(self, profile: Profile, undo: contextlib.ExitStack) -> BoardAt:
-        """The twin's board: the one that runs in the folder, or a new one.
+        """Return the twin's board: a running one in the folder, or a new one.
 
         Args:
             profile: The robot.
-            undo: What takes back what was started here.
+            undo: Stack for cleaning up.
 
         Raises:
-            RobotError: If it does not start, or runs on another clock.
+            RobotError: If it does not start or has another clock.
         """
         from shapechanger.twin.start import find_board
 
@@ -217,7 +217,7 @@ class Serve:
 
 
 def _require_free(host: str, port: int) -> None:
-    """Refuse an address that cannot be listened at, before anything starts for it."""
+    """Check that an address is free before starting anything."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -235,21 +235,21 @@ def _require_free(host: str, port: int) -> None:
 
 _EVERYWHERE: Final = "0.0.0.0"
 _ROOM: Final = "room"
-# While the twin draws a picture its time stands still, and a guard that waits for it is not dead.
+# A twin's clock is paused while it renders, and a guard that waits for it is alive.
 _TWIN_PATIENCE_MS: Final = 10_000
 
 
 @dataclass(frozen=True)
 class TwinOptions:
-    """How a twin stands in for the hardware.
+    """Options of a twin.
 
     Attributes:
-        folder: Folder for its socket, its ledger and its pictures' pipe; it must exist.
-        clock: Whether time passes by itself, or only when somebody asks for it.
-        wired_as: Profile of what is really attached; "" for the one that is served.
+        folder: Existing folder for its socket, ledger and frame pipe.
+        clock: Real time, or simulated time that passes on request.
+        wired_as: Profile of the attached hardware; "" for the served one.
         seed: Seed of the world.
         one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
-        place: Where its vehicle is; None for the plain room.
+        place: World of its vehicle; None for the plain room.
     """
 
     folder: Path
@@ -262,18 +262,17 @@ class TwinOptions:
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """How a robot is served.
+    """Options of a served robot.
 
     Attributes:
-        host: Address to listen at; "" for every one, or only this machine's own on a twin or
-            without TLS.
-        port: Port to listen at; 0 for any that is free.
-        insecure: Whether to speak without TLS.
-        credentials: Folder of the key and the certificate; None for the robot's own.
-        arm_by_program: Whether programs may arm it; on a twin they always may.
-        announce: Whether to let others find it on the network.
-        ready_file: File to write the address into; None for none.
-        recordings: Folder for what is recorded; None for the robot's own.
+        host: Address to listen on; "" for all, or for loopback on a twin or without TLS.
+        port: Port to listen on; 0 for any free one.
+        insecure: Whether to disable TLS.
+        credentials: Folder of the key and the certificate; None for the default.
+        arm_by_program: Whether programs may arm it; always true on a twin.
+        announce: Whether to announce it on the network.
+        ready_file: File for the address; None for none.
+        recordings: Folder for recordings; None for the default.
     """
 
     host: str = ""
@@ -287,22 +286,22 @@ class ServeOptions:
 
 
 def recordings_folder(name: str) -> Path:
-    """Where a robot keeps what it records, if nobody says where; by its name.
+    """Return the default folder for a robot's recordings.
 
     Raises:
-        RobotError: If the name is no name of a folder.
+        RobotError: If the name is not a valid folder name.
     """
     data = os.environ.get("XDG_DATA_HOME", "")
-    # As for the credentials: a relative path must be ignored.
+    # As for credentials: a relative path is ignored.
     base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
     return base / "shapechanger" / "recordings" / credentials_folder(name).name
 
 
 def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials:
-    """The credentials of a robot; made first if they may be.
+    """Return the credentials of a robot, creating them if permitted.
 
     Raises:
-        RobotError: If there are none, or others may read them.
+        RobotError: If they are missing or readable by others.
         OutputError: If they cannot be written.
     """
     folder = folder or credentials_folder(name)
@@ -310,20 +309,20 @@ def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials
 
 
 def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
-    """The finger on a rig, where its tendons are those of a finger and MuJoCo is there.
+    """Return the simulated finger for a rig with a finger's tendons.
 
     Args:
         profile: The robot.
-        gap: Name of the gap that the finger is drawn from; "" for the nominal finger.
-        seed: Which finger of the gap it is.
+        gap: Name of the reality gap to draw from; "" for the nominal finger.
+        seed: Seed of the draw.
 
     Returns:
-        None for any other robot.
+        The place, or None for other robots.
 
     Raises:
-        RobotError: If a gap is asked for and there is no finger.
-        UnknownName: If there is no such gap.
-        MissingExtra: If a gap is asked for and MuJoCo is not installed.
+        RobotError: If a gap is given and there is no finger.
+        UnknownName: If the gap is unknown.
+        MissingExtra: If a gap is given and MuJoCo is not installed.
     """
     tendons = {output.name for output in profile.outputs if output.driver == "dynamixel"}
     if find_spec("mujoco") is None:
@@ -349,18 +348,18 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
 
 
 def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
-    """Where the vehicle of a twin is.
+    """Return the world of a twin's vehicle.
 
     Args:
         profile: The robot.
-        world: Kind of place; "room" for the plain room, "" for where such a vehicle is at home, or
-            the room where there is no such vehicle, or no MuJoCo.
-        lenses: What is wrong with the camera.
+        world: Kind of course; "room" for the plain room, "" for the vehicle's default, or the room
+            without such a vehicle or without MuJoCo.
+        lenses: Disturbances of the camera.
 
     Raises:
-        UnknownName: If there is no such place or lens.
-        ProfileError: If there is no vehicle in MuJoCo with the parts of the profile.
-        WorldError: If that vehicle cannot drive there.
+        UnknownName: If the course or a lens is unknown.
+        ProfileError: If no simulated vehicle has the parts of the profile.
+        WorldError: If the vehicle cannot drive there.
         MissingExtra: If MuJoCo is needed and not installed.
     """
     if world == _ROOM or (not world and find_spec("mujoco") is None):
@@ -370,7 +369,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
     try:
         from shapechanger.bodies.vehicles import VEHICLES, require_fit
         from shapechanger.worlds.layout import WORLDS
-        from shapechanger.worlds.lens import lens as find_lens
+        from shapechanger.worlds.lens import find_lens
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "mujoco", "sim") from error
 
@@ -398,10 +397,10 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
 
 
 def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
-    """Start the twin of a robot's pins, in a process of its own.
+    """Start the twin of a robot's pins in a separate process.
 
     Raises:
-        ProfileError: If what is really attached is no profile.
+        ProfileError: If `wired_as` is not a profile.
         RobotError: If the twin does not start.
     """
     wiring: GuardPlan = profile.guard_plan()
@@ -424,17 +423,17 @@ def serve_plan(
     board: BoardAt | None = None,
     clock: Literal["real", "twin"] = "real",
 ) -> ServePlan:
-    """What the processes of a robot need.
+    """Return the plan for the processes of a robot.
 
     Args:
         profile: The robot.
-        options: How it is served.
+        options: Options of serving.
         board: The twin of its pins; None for the pins of this machine.
-        clock: Where its time comes from.
+        clock: Source of its time.
 
     Raises:
-        RobotError: If it has no credentials, or others may read them, or it would be open to
-            everybody.
+        RobotError: If credentials are missing or readable by others, or the robot would be open to
+            everyone.
     """
     credentials = credentials_of(profile.name, options.credentials, make=board is not None)
     here = board is not None or options.insecure
@@ -470,16 +469,16 @@ def serve_plan(
 
 
 def make_known(robot: KnownRobot) -> str:
-    """Remember a robot of this machine, unless another one bears its name.
+    """Store a local robot among the known robots, unless its name is taken.
 
     Args:
-        robot: The robot, as it is reached from here.
+        robot: The robot, as reached from this machine.
 
     Returns:
-        What was done, in a sentence.
+        A sentence on what was done.
 
     Raises:
-        OutputError: If it cannot be written down.
+        OutputError: If it cannot be stored.
     """
     name = robot.name
     drives = f"`shapechanger robot drive {name}` drives it from here"
@@ -505,7 +504,7 @@ def make_known(robot: KnownRobot) -> str:
 
 
 def can_be_known(name: str) -> bool:
-    """Whether a robot can be remembered under a name."""
+    """Return whether a robot can be stored under a name."""
     try:
         check_name(name)
     except LinkError:

@@ -1,4 +1,4 @@
-"""`shapechanger robot stop`: somebody presses the emergency stop of a robot, from afar."""
+"""`shapechanger robot stop`: remote emergency stop."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from shapechanger.errors import LinkError
 
 __all__ = ["Stop"]
 
-# s. A guard stops within a tick, and says so in the next observation.
+# s. A guard stops within a tick and reports it in the next observation.
 _CONFIRMED_WITHIN_S: Final = 2.0
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Stop a robot at once, whoever drives it; it stays stopped until a person arms it again."""
+    """Stop a robot immediately, whoever drives it, until a person arms it again."""
 
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
     """Name of a robot that is known here, see `remember`."""
@@ -28,7 +28,7 @@ class Stop:
     """Why, for people to read."""
 
     def run(self) -> None:
-        """Stop it and say what happened; exits with 1 where the robot did not confirm it."""
+        """Stop the robot; exit with 1 if it does not confirm."""
         from shapechanger.remote.client import RobotClient
         from shapechanger.remote.known_robots import recall
 

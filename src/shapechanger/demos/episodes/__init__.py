@@ -1,18 +1,18 @@
-"""Episodes on disk: what was seen, decided and done, step by step, safe from a crash at any byte.
+"""Episodes on disk: observations, actions and pictures, step by step, safe against crashes.
 
-A recording is a folder of episodes; the folder of one episode is a recording, too:
+A recording is a folder of episodes; the folder of a single episode is a recording too:
 
 ```
 DATA/20261121T103005Z-0001/
-  episode.json    what was recorded; written whole when it begins, and once more when it is closed
-  steps.jsonl     grows only; each line is a JSON object whose last key is its own CRC-32
-  frames/         pictures, as JPEG and exactly as they were received
-  lost/           what `repair` took out; there only if there was something
+  episode.json    header; written atomically when the episode begins and again when it is closed
+  steps.jsonl     append-only; each line is a JSON object whose last key is its own CRC-32
+  frames/         pictures, as JPEG, byte for byte as received
+  lost/           what `repair` moved aside, if anything
 ```
 
-The lines of `steps.jsonl` are steps (`"kind": "step"`), marks, and steps that were dropped or taken
-back (`"drop"`, `"keep"`): nothing that was recorded is ever rewritten. The standard library is all
-that is needed, because robots record, too.
+The lines of `steps.jsonl` are steps (`"kind": "step"`), marks (`"mark"`), and ranges of steps that
+are excluded or included again (`"drop"`, `"keep"`); recorded lines are never rewritten. This
+package needs the standard library only, because it also runs on robots.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The files of an episode: their names, and how they are locked and written."""
+"""File names of an episode, and how its files are locked and written."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ LOST: Final = "lost"
 
 
 def is_episode(folder: Path) -> bool:
-    """Whether a folder is that of an episode."""
+    """Return whether `folder` contains an episode."""
     return (folder / HEADER).is_file() or (folder / STEPS).is_file()
 
 
 def lock(path: Path, busy: str) -> int:
-    """Lock a file until it is closed; it is made where it is missing.
+    """Lock a file until its descriptor is closed; create the file if it is missing.
 
     Args:
         path: The file.
-        busy: What to say when somebody else has locked it.
+        busy: Error message if another process holds the lock.
 
     Returns:
-        Its file descriptor, open for appending.
+        A file descriptor, open for appending.
 
     Raises:
-        DemosError: If somebody else has locked it.
-        OutputError: If it cannot be written to.
+        DemosError: If another process holds the lock.
+        OutputError: If the file cannot be opened for writing.
     """
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
@@ -63,10 +63,10 @@ def lock(path: Path, busy: str) -> int:
 
 
 def write_all(fd: int, data: bytes) -> None:
-    """Append bytes to a file, all of them or none.
+    """Append `data` to a file completely, or leave the file as it was.
 
     Raises:
-        OSError: If they cannot be written; what was there is as it was.
+        OSError: If the data cannot be written.
     """
     before = os.fstat(fd).st_size
     try:
@@ -79,7 +79,11 @@ def write_all(fd: int, data: bytes) -> None:
 
 
 def write_header(folder: Path, content: dict[str, Any]) -> None:
-    """Write the header of an episode, whole or not at all.
+    """Write the header of an episode atomically.
+
+    Args:
+        folder: Folder of the episode.
+        content: The header, as JSON can hold it.
 
     Raises:
         OutputError: If it cannot be written.
@@ -98,5 +102,5 @@ def write_header(folder: Path, content: dict[str, Any]) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:
-    """What to say when a file cannot be written."""
+    """Return the error to raise when a file cannot be written."""
     return OutputError(f"Cannot write {path}: {error.strerror or error}.")

@@ -1,4 +1,4 @@
-"""Reads what was recorded."""
+"""Read, repair and edit recorded episodes."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ __all__ = [
     "scan",
 ]
 
-# A name that leads nowhere else.
+# Such a name cannot lead out of the folder.
 _FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
 
 
 @dataclass(frozen=True, slots=True)
 class StepLine:
-    """One line of the file of steps.
+    """One line of `steps.jsonl`.
 
     Attributes:
         raw: Its bytes.
-        fields: What it says; nothing if it is not whole.
-        step: The step, if it is one.
-        wrong: Why it does not count, in words; "" if it does.
+        fields: The decoded object; empty if the line is damaged.
+        step: The step; None for a line of another kind.
+        wrong: Why the line is ignored, as part of a sentence; "" if it is valid.
     """
 
     raw: bytes
@@ -70,12 +70,12 @@ class StepLine:
 
 
 def scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
-    """Look at every line, and at the picture that it names.
+    """Check every line of an episode, and the picture that it names.
 
     Args:
         path: Folder of the episode.
         header: Its header.
-        thorough: Whether to read each picture, and not only look at its size.
+        thorough: Whether to verify the checksum of each picture, not only its size.
 
     Raises:
         DemosError: If the file cannot be read.
@@ -111,13 +111,13 @@ def scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]
 
 
 def _wrong_with(frames: Path, step: Step, *, thorough: bool) -> str:
-    """What is wrong with the picture of a step, in words; empty for nothing."""
+    """Return what is wrong with the picture of a step, as part of a sentence; "" for nothing."""
     if not _FRAME_NAME.fullmatch(step.frame):
-        return f"its picture is called {step.frame!r}"
+        return f"its picture has the invalid name {step.frame!r}"
     try:
         size = (frames / step.frame).stat().st_size
         if size != step.frame_bytes:
-            return f"its picture {step.frame} has {size} bytes in place of {step.frame_bytes}"
+            return f"its picture {step.frame} has {size} bytes instead of {step.frame_bytes}"
         if thorough and binascii.crc32((frames / step.frame).read_bytes()) != step.frame_crc:
             return f"its picture {step.frame} was changed"
     except FileNotFoundError:
@@ -129,11 +129,11 @@ def _wrong_with(frames: Path, step: Step, *, thorough: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeMark:
-    """Something that somebody wanted to find again.
+    """A bookmark set by the operator.
 
     Attributes:
         step: Index of the step.
-        text: Their words.
+        text: Free text.
     """
 
     step: int
@@ -142,13 +142,13 @@ class EpisodeMark:
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """Steps that do not count, or count again.
+    """A range of steps to exclude, or to include again.
 
     Attributes:
-        first: Index of the first.
-        last: Index of the last.
+        first: Index of the first step.
+        last: Index of the last step, inclusive.
         why: Such as "undo", "cut" or "bad".
-        keep: Whether they count again.
+        keep: Whether the steps are included again.
     """
 
     first: int
@@ -159,16 +159,16 @@ class Drop:
 
 @dataclass(frozen=True)
 class Episode:
-    """What was recorded.
+    """A recorded episode.
 
     Attributes:
         path: Its folder.
-        header: What it is of.
-        steps: All its steps.
+        header: Its metadata.
+        steps: All steps, including excluded ones.
         marks: In the order in which they were set.
-        drops: In the order in which they were said; a later one overrules an earlier one.
-        closed: Whether it was ended, and not cut off.
-        outcome: How it ended; "" for just so.
+        drops: In the order in which they were written; later ones override earlier ones.
+        closed: Whether the episode was closed properly.
+        outcome: How it ended; "" if unspecified.
     """
 
     path: Path
@@ -181,24 +181,24 @@ class Episode:
 
     @cached_property
     def kept(self) -> tuple[Step, ...]:
-        """The steps that count."""
+        """The steps that were not excluded."""
         gone: set[int] = set()
         for drop in self.drops:
-            # Not beyond the steps that there are, whatever a line says.
+            # A line may name a range far beyond the steps that exist.
             reach = (s.index for s in self.steps if drop.first <= s.index <= drop.last)
             (gone.difference_update if drop.keep else gone.update)(reach)
         return tuple(step for step in self.steps if step.index not in gone)
 
     @property
     def seconds(self) -> float:
-        """How long the steps that count last, s."""
+        """Duration of the kept steps, s."""
         return len(self.kept) / self.header.control_hz
 
     def jpeg(self, step: Step) -> bytes | None:
-        """The picture of a step, as it was received; None for none.
+        """Return the picture of a step as it was received; None for none.
 
         Raises:
-            BrokenEpisode: If it is not the one that was recorded.
+            BrokenEpisode: If the file is missing or was modified.
         """
         if not step.frame:
             return None
@@ -212,35 +212,35 @@ class Episode:
 
 
 def read_episode(path: Path) -> Episode:
-    """Read an episode; the bytes of pictures stay where they are.
+    """Read an episode; pictures are read on demand.
 
     Raises:
-        DemosError: If this is no episode, or of another format.
-        BrokenEpisode: If something in it is not whole.
+        DemosError: If the folder is not an episode, or has another version of the format.
+        BrokenEpisode: If a line or a picture is damaged or missing.
     """
     header, closed = read_header(path)
     lines = scan(path, header, thorough=False)
     for number, line in enumerate(lines, 1):
         if line.wrong:
-            raise _broken(path, f"line {number} does not count, because {line.wrong}")
-    return _put_together(path, header, closed, lines)
+            raise _broken(path, f"line {number} is invalid, because {line.wrong}")
+    return _assemble(path, header, closed, lines)
 
 
 def read_header(path: Path) -> tuple[EpisodeHeader, dict[str, Any] | None]:
-    """The header of an episode, and how it was closed; None if it was not.
+    """Read the header of an episode, and how it was closed; None if it was not.
 
     Raises:
-        DemosError: If there is none, or it cannot be read.
+        DemosError: If the header is missing or cannot be read.
     """
     file = path / HEADER
     try:
         plain = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise DemosError(f"{path} is no episode: there is no {HEADER} in it.") from None
+        raise DemosError(f"{path} is not an episode: it has no {HEADER}.") from None
     except (OSError, ValueError) as error:
         raise DemosError(f"{file} cannot be read: {error}.") from error
     if not isinstance(plain, dict):
-        raise DemosError(f"{file} is no header.")
+        raise DemosError(f"{file} is not a JSON object.")
     fields = cast("dict[str, Any]", plain)
     closed = fields.get("closed")
     try:
@@ -251,7 +251,7 @@ def read_header(path: Path) -> tuple[EpisodeHeader, dict[str, Any] | None]:
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
-    """The folders of the episodes of a recording, the oldest first.
+    """Return the folders of the episodes of a recording, oldest first.
 
     Args:
         data: Folder of a recording, or of one episode.
@@ -264,33 +264,33 @@ def episodes_of(data: Path) -> tuple[Path, ...]:
     if not data.exists():
         raise DemosError(f"There is no recording {data}.")
     if not data.is_dir():
-        raise DemosError(f"{data} is a file, and a recording is a folder of episodes.")
+        raise DemosError(f"{data} is a file, but a recording is a folder of episodes.")
     found = sorted(p for p in data.iterdir() if not p.name.startswith(".") and is_episode(p))
     if not found:
-        raise DemosError(f"There is no episode in {data}: one is a folder with {HEADER}.")
+        raise DemosError(f"There is no episode in {data}: no folder in it has {HEADER}.")
     return tuple(found)
 
 
-def _put_together(
+def _assemble(
     path: Path, header: EpisodeHeader, closed: dict[str, Any] | None, lines: list[StepLine]
 ) -> Episode:
     marks: list[EpisodeMark] = []
     drops: list[Drop] = []
     for line in lines:
-        said = line.fields
+        fields = line.fields
         try:
-            match said.get("kind"):
+            match fields.get("kind"):
                 case "mark":
-                    marks.append(EpisodeMark(int(said["step"]), str(said.get("text", ""))))
+                    marks.append(EpisodeMark(int(fields["step"]), str(fields.get("text", ""))))
                 case "drop" | "keep":
-                    first, last = int(said["first"]), int(said["last"])
+                    first, last = int(fields["first"]), int(fields["last"])
                     drops.append(
-                        Drop(first, last, str(said.get("why", "")), said["kind"] == "keep")
+                        Drop(first, last, str(fields.get("why", "")), fields["kind"] == "keep")
                     )
-                case _:  # A step, or what a later version has to say.
+                case _:  # A step, or a kind that a later version added.
                     pass
         except (LookupError, TypeError, ValueError) as error:
-            raise _broken(path, f"a line says {said}") from error
+            raise _broken(path, f"it has the invalid line {fields}") from error
     return Episode(
         path=path,
         header=header,
@@ -304,23 +304,23 @@ def _put_together(
 
 def _broken(path: Path, why: str) -> BrokenEpisode:
     return BrokenEpisode(
-        f"{path} is not whole: {why}. `shapechanger demos repair {path}` keeps every step that is."
+        f"{path} is damaged: {why}. `shapechanger demos repair {path}` keeps all complete steps."
     )
 
 
 CUT_OFF: Final = "cut off"
-"""Outcome of an episode that nobody closed."""
+"""Outcome of an episode that was not closed before `repair`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """What was done.
+    """Result of a repair.
 
     Attributes:
-        kept: How many steps there are.
-        lost: Why each line that does not count any more does not, in words.
-        pictures: How many pictures belong to no step.
-        was_closed: Whether it had been closed.
+        kept: Number of valid steps.
+        lost: Why each removed line was invalid, as parts of sentences.
+        pictures: Number of pictures that belong to no step.
+        was_closed: Whether the episode had been closed before.
     """
 
     kept: int
@@ -330,21 +330,21 @@ class Repair:
 
     @property
     def changed(self) -> bool:
-        """Whether anything was wrong."""
+        """Whether the repair changed anything."""
         return bool(self.lost or self.pictures or not self.was_closed)
 
 
 def repair(path: Path) -> Repair:
-    """Keep every complete step of an episode, and close it.
+    """Keep every complete step of an episode, and close the episode.
 
-    What does not count is not deleted: lines and pictures are moved to the folder `lost`.
+    Invalid lines and unused pictures are moved to the folder `lost`, not deleted.
 
     Args:
         path: Folder of the episode.
 
     Raises:
-        DemosError: If it is no episode, or is being recorded now.
-        OutputError: If it cannot be written to; it is as it was then.
+        DemosError: If the folder is not an episode, or is being recorded now.
+        OutputError: If it cannot be written to; the episode is unchanged then.
     """
     header, closed = read_header(path)
     fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
@@ -372,13 +372,13 @@ def repair(path: Path) -> Repair:
 
 
 def _strays(path: Path, good: list[StepLine]) -> list[Path]:
-    """Pictures that no good step names."""
+    """Return the pictures that no valid step names."""
     named = {line.step.frame for line in good if line.step is not None}
     return sorted(p for p in (path / FRAMES).glob("*") if p.name not in named)
 
 
 def _move_lines(path: Path, good: list[StepLine], bad: list[StepLine]) -> None:
-    """Leave the good lines only; the bad ones are on the disk before they are taken out."""
+    """Remove the bad lines, after copying them to `lost`."""
     _write(_free_name(path / LOST, STEPS), b"".join(line.raw for line in bad))
     part = path / f".{STEPS}.part"
     _write(part, b"".join(line.raw for line in good))
@@ -393,7 +393,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def _free_name(folder: Path, name: str) -> Path:
-    """A name in a folder that nothing has yet."""
+    """Return a path in `folder` that does not exist yet, with a number appended where needed."""
     stem, dot, ending = name.partition(".")
     path, number = folder / name, 1
     while path.exists():
@@ -403,29 +403,40 @@ def _free_name(folder: Path, name: str) -> Path:
 
 
 def drop(path: Path, first: int, last: int, why: str) -> None:
-    """Let steps of an episode no longer count.
+    """Exclude steps of an episode.
 
     Args:
         path: Folder of the episode.
         first: Index of the first step.
-        last: Index of the last step, which is dropped, too.
+        last: Index of the last step, inclusive.
         why: Such as "cut" or "bad".
 
     Raises:
         DemosError: If there are no such steps, or the episode is being recorded.
-        BrokenEpisode: If it is not whole.
-        OutputError: If it cannot be written.
+        BrokenEpisode: If the episode is damaged.
+        OutputError: If it cannot be written to.
     """
     _append(path, {"kind": "drop", "first": first, "last": last, "why": why}, first, last)
 
 
 def keep(path: Path, first: int, last: int, why: str = "") -> None:
-    """Let steps of an episode count again; arguments and errors as those of `drop`."""
+    """Include steps of an episode again; arguments and errors are those of `drop`."""
     _append(path, {"kind": "keep", "first": first, "last": last, "why": why}, first, last)
 
 
 def mark(path: Path, step: int, text: str = "") -> None:
-    """Mark a step of an episode with a few words; errors as those of `drop`."""
+    """Mark a step of an episode.
+
+    Args:
+        path: Folder of the episode.
+        step: Index of the step.
+        text: Free text.
+
+    Raises:
+        DemosError: If there is no such step, or the episode is being recorded.
+        BrokenEpisode: If the episode is damaged.
+        OutputError: If it cannot be written to.
+    """
     _append(path, {"kind": "mark", "step": step, "text": text}, step, step)
 
 

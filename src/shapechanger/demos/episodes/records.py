@@ -1,4 +1,4 @@
-"""What was recorded: the file `episode.json`."""
+"""Records of an episode: the header in `episode.json` and the steps in `steps.jsonl`."""
 
 from __future__ import annotations
 
@@ -24,11 +24,10 @@ __all__ = [
 ]
 
 FORMAT: Final = 1
-"""Version of the format; a reader refuses another one."""
+"""Version of the format. Readers refuse any other version."""
 
 Clock = Literal["real", "twin", "none"]
-"""Where the nanoseconds of the steps come from: a robot's clock, that of a twin whose time moves in
-steps, or nowhere."""
+"""Source of the nanoseconds in steps: a robot's clock, the stepped clock of a twin, or none."""
 
 _CLOCKS: Final = ("real", "twin", "none")
 _IMAGE_SIZE: Final = 2
@@ -36,28 +35,28 @@ _IMAGE_SIZE: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeHeader:
-    """What an episode is of.
+    """Metadata of an episode.
 
     Attributes:
         action_layout: JSON of the `Layout` of the actions.
         state_layout: JSON of the `Layout` of the states; "" without states.
         image_size: Width and height of the pictures in pixels; None without pictures.
-        control_hz: Steps a second.
+        control_hz: Steps per second.
         robot: Name of the robot.
-        body: What it is, such as "car".
+        body: Kind of robot, such as "car".
         env: Id of the env; "" for a robot that was driven without one.
-        env_kwargs: Its arguments, as JSON can hold them.
-        driver: Who drives, for people to read.
-        clock: Where the nanoseconds of the steps come from.
-        seed: Seed of the first reset; None for none.
-        source: What made it: a command, or the format it was imported from.
-        notes: More, for people to read, as JSON can hold it.
-        created: When it began, ISO 8601 in UTC; the writer fills it in.
-        version: Version of Shapechanger that wrote it; the writer fills it in.
+        env_kwargs: Arguments of the env, as JSON can hold them.
+        driver: Free text for people to read: who drove.
+        clock: Source of the nanoseconds in the steps.
+        seed: Seed of the first reset; None if unseeded.
+        source: The command that recorded the episode, or the format it was imported from.
+        notes: Further metadata for people to read, as JSON can hold it.
+        created: Start time, ISO 8601 in UTC; set by the writer.
+        version: Version of Shapechanger that wrote the episode; set by the writer.
         format: Version of the format.
 
     Raises:
-        DemosError: If it contradicts itself.
+        DemosError: If a field is invalid.
     """
 
     action_layout: str
@@ -79,29 +78,31 @@ class EpisodeHeader:
 
     def __post_init__(self) -> None:
         if not (self.control_hz > 0.0 and math.isfinite(self.control_hz)):
-            raise DemosError(f"An episode has steps at more than 0 Hz, got {self.control_hz}.")
+            raise DemosError(f"control_hz must be positive and finite, got {self.control_hz}.")
         if self.clock not in _CLOCKS:
-            raise DemosError(f"The clock is one of {', '.join(_CLOCKS)}, got {self.clock!r}.")
+            raise DemosError(f"clock must be one of {', '.join(_CLOCKS)}, got {self.clock!r}.")
         if self.image_size is not None and (
             len(self.image_size) != _IMAGE_SIZE or min(self.image_size) < 1
         ):
-            raise DemosError(f"Pictures cannot have a size of {self.image_size}.")
+            raise DemosError(
+                f"image_size must be a width and a height in pixels, got {self.image_size}."
+            )
         if self.action_size < 1:
-            raise DemosError("An action has at least one number.")
-        _ = self.state_size
+            raise DemosError("action_layout must have at least one value.")
+        _ = self.state_size  # Raises if the layout is invalid.
 
     @property
     def action_size(self) -> int:
-        """How many numbers an action has."""
+        """Number of values in an action."""
         return _layout_size(self.action_layout)
 
     @property
     def state_size(self) -> int:
-        """How many numbers a state has."""
+        """Number of values in a state; 0 without states."""
         return _layout_size(self.state_layout) if self.state_layout else 0
 
     def to_json(self) -> dict[str, Any]:
-        """The header as JSON can hold it, with the layouts spelled out for people to read."""
+        """Return the header as JSON can hold it, with the layouts expanded for readability."""
         plain = asdict(self)
         for name in ("action_layout", "state_layout"):
             plain[name] = json.loads(plain[name]) if plain[name] else None
@@ -110,15 +111,15 @@ class EpisodeHeader:
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> EpisodeHeader:
-        """Read what `to_json` gave; what is not known is left out.
+        """Parse the output of `to_json`; unknown keys are ignored.
 
         Raises:
-            DemosError: If it is no header.
+            DemosError: If a field is missing or invalid, or the format has another version.
         """
         if plain.get("format") != FORMAT:
             raise DemosError(
-                f"the episode has format {plain.get('format')}, and this version of Shapechanger "
-                f"reads format {FORMAT}."
+                f"the episode has format {plain.get('format')}, but this version of Shapechanger "
+                f"reads format {FORMAT} only."
             )
         known = {name: plain[name] for name in (f.name for f in fields(cls)) if name in plain}
         try:
@@ -129,25 +130,25 @@ class EpisodeHeader:
                 known["image_size"] = (int(width), int(height))
             return cls(**known)
         except (KeyError, TypeError, ValueError) as error:
-            raise DemosError(f"the header is not whole ({error}).") from error
+            raise DemosError(f"the header is invalid ({error}).") from error
 
 
 def _compact(layout: dict[str, Any] | None) -> str:
-    """A layout as `Layout.to_json` writes it; "" for none."""
+    """Return a layout as `Layout.to_json` writes it; "" for none."""
     return json.dumps(layout, separators=(",", ":"), ensure_ascii=False) if layout else ""
 
 
 def _layout_size(layout: str) -> int:
-    """How many numbers a layout has, without what reading layouts loads."""
+    """Return the number of values of a layout, without importing NumPy."""
     try:
         features = cast("list[dict[str, Any]]", json.loads(layout)["features"])
         return sum(math.prod(feature.get("shape", ())) for feature in features)
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise DemosError(f"This is no layout: {layout[:80]!r}.") from error
+        raise DemosError(f"Invalid layout: {layout[:80]!r}.") from error
 
 
 Driver = Literal["person", "policy", "expert", "program"]
-"""Who decides: a person; a learned policy; an expert that knows the world; any other program."""
+"""Who decided: a person, a learned policy, an expert with full state, or another program."""
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 
@@ -160,23 +161,23 @@ class Step:
     """One step of an episode.
 
     Attributes:
-        action: What was decided on seeing this step's picture and state, in the order and units of
-            the action layout.
-        driver: Who decided it.
-        applied: What the outputs did then, after caps, slew and reflexes; None where nobody knows.
-        wanted: What a policy wanted to do while somebody else drove; None for nothing.
-        state: The numbers of the state layout; NaN where nothing measures one.
-        captured_ns: When the picture was taken, or the state read; monotonic clock of the robot.
+        action: The action decided for this step's observation, in the order and units of the action
+            layout.
+        driver: Who decided the action.
+        applied: What the outputs did, after caps, slew limits and reflexes; None if unknown.
+        wanted: What a policy would have done while somebody else drove; None without a policy.
+        state: Values of the state layout; NaN where nothing measured one.
+        captured_ns: When the picture was taken or the state was read; monotonic clock of the robot.
         decided_ns: When the action reached the robot; same clock.
-        wall_ns: When the step was recorded; Unix time of whoever recorded it.
-        reward: What the step was worth.
-        terms: The terms of that by name.
-        terminated: Whether the task was over then.
-        truncated: Whether the episode was cut off then.
-        stop_reason: Why the robot did not do what it was told, in words; empty when it did.
-        index: Its number in the episode, from 0; -1 before it is written.
-        frame: File name of its picture; "" for none.
-        frame_bytes: Size of that file.
+        wall_ns: When the step was recorded; Unix time of the recorder.
+        reward: Reward of the step; None if there is none.
+        terms: Terms of the reward, by name.
+        terminated: Whether the task ended with this step.
+        truncated: Whether the episode was cut short at this step.
+        stop_reason: Why the robot overrode the action; "" if it did not.
+        index: Position in the episode, from 0; -1 before the step is written.
+        frame: File name of the picture; "" for none.
+        frame_bytes: Size of that file, bytes.
         frame_crc: CRC-32 of that file.
     """
 
@@ -199,28 +200,29 @@ class Step:
     frame_crc: int = 0
 
     def refusal(self, action_size: int, state_size: int) -> str:
-        """What is wrong with it, in words; empty for nothing.
+        """Return why the step is invalid, as part of a sentence; "" if it is valid.
 
         Args:
-            action_size: How many numbers an action has.
-            state_size: How many numbers a state has.
+            action_size: Number of values in an action.
+            state_size: Number of values in a state.
         """
-        for name, size in (("action", action_size), ("applied", action_size)):
+        for name, size in (
+            ("action", action_size),
+            ("applied", action_size),
+            ("wanted", action_size),
+            ("state", state_size),
+        ):
             values = getattr(self, name)
             if values is not None and len(values) != size:
-                return f"its {name} has {len(values)} numbers, and the layout has {size}"
-        if self.wanted is not None and len(self.wanted) != action_size:
-            return f"its wanted has {len(self.wanted)} numbers, and the layout has {action_size}"
-        if len(self.state) != state_size:
-            return f"its state has {len(self.state)} numbers, and the layout has {state_size}"
+                return f"its {name} has {len(values)} values, but the layout has {size}"
         if not all(math.isfinite(value) for value in self.action):
             return f"its action is {list(self.action)}"
         if self.driver not in DRIVERS:
-            return f"its driver is {self.driver!r}, and not one of {', '.join(DRIVERS)}"
+            return f"its driver is {self.driver!r}, not one of {', '.join(DRIVERS)}"
         return ""
 
     def to_json(self) -> dict[str, Any]:
-        """The step as JSON can hold it; what is nothing is left out."""
+        """Return the step as JSON can hold it; empty fields are left out."""
         plain: dict[str, Any] = {"kind": "step", "step": self.index, "driver": self.driver}
         plain["action"] = _written(self.action)
         for name in ("applied", "wanted"):
@@ -245,10 +247,10 @@ class Step:
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
-        """Read what `to_json` gave.
+        """Parse the output of `to_json`.
 
         Raises:
-            ValueError: If it is no step.
+            ValueError: If a field is missing or invalid.
         """
         try:
             frame, size, crc = plain.get("frame", ("", 0, "0"))
@@ -272,11 +274,11 @@ class Step:
                 frame_crc=int(crc, 16),
             )
         except (LookupError, TypeError, AttributeError) as error:
-            raise ValueError(f"it is no step ({error})") from error
+            raise ValueError(f"it is not a valid step ({error})") from error
 
 
 def _written(values: Any) -> list[float | str | None]:
-    """Numbers as JSON can hold them: nothing for NaN, words for the infinite ones."""
+    """Return numbers as JSON can hold them: null for NaN, strings for infinities."""
     return [None if math.isnan(value) else _INFINITIES.get(value, float(value)) for value in values]
 
 
@@ -285,32 +287,32 @@ def _read(values: Any) -> tuple[float, ...]:
 
 
 MAX_LINE: Final = 1 << 20
-"""Bytes of the longest line; a longer one is no step."""
+"""Length limit of a line in bytes; longer lines are treated as damaged."""
 
 _CHECK: Final = b',"crc":"%08x"}\n'
 _CHECK_SIZE: Final = len(_CHECK % 0)
 
 
 def encode_line(fields: dict[str, Any]) -> bytes:
-    """One line, with the CRC-32 of everything before it as its last key.
+    """Encode one line of `steps.jsonl`, with the CRC-32 of what precedes it as its last key.
 
     Args:
-        fields: Values that JSON can hold, at least one.
+        fields: A non-empty object that JSON can hold.
     """
     text = json.dumps(fields, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    # Half of a surrogate pair has no bytes.
+    # A lone surrogate has no UTF-8 encoding.
     body = text.encode(errors="replace")[:-1]
     return body + _CHECK % binascii.crc32(body)
 
 
 def decode_line(line: bytes) -> dict[str, Any]:
-    r"""What `encode_line` was given.
+    r"""Decode what `encode_line` returned.
 
     Args:
         line: One line, with its `\n`.
 
     Raises:
-        ValueError: If it is not whole, and why.
+        ValueError: If the line is damaged; the message is part of a sentence.
     """
     if len(line) > MAX_LINE:
         raise ValueError(f"it has {len(line)} bytes")
@@ -319,17 +321,13 @@ def decode_line(line: bytes) -> dict[str, Any]:
         raise ValueError("it is cut off or was changed")
     fields = json.loads(body + b"}")
     if not isinstance(fields, dict):
-        raise ValueError("it is no JSON object")
+        raise ValueError("it is not a JSON object")
     return cast("dict[str, Any]", fields)
 
 
 def split_lines(content: bytes) -> list[bytes]:
-    r"""The lines of a file, each with its `\n`; only the last one may lack it."""
-    return content.splitlines(keepends=True) if b"\r" not in content else _by_newline(content)
-
-
-def _by_newline(content: bytes) -> list[bytes]:
-    r"""Like `splitlines`, which would also split at a `\r` that damage has put there."""
+    r"""Split the content of a file at each `\n`, which stays; only the last line may lack it."""
+    # Not `splitlines`, which also splits at a `\r` that damage may have put there.
     lines = [line + b"\n" for line in content.split(b"\n")]
     last = lines.pop()[:-1]
     return [*lines, last] if last else lines

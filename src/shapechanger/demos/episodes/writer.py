@@ -1,4 +1,4 @@
-"""Records an episode, so that a crash at any moment costs at most the step of that moment."""
+"""Episode writer: a crash at any time costs at most the step being written."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from shapechanger.errors import DemosError, OutputError
 
 __all__ = ["EpisodeWriter", "Syncer"]
 
-_EVERY_S: Final = 1.0
+_SYNC_PERIOD_S: Final = 1.0
 
 
 class Syncer:
-    """Once a second brings files to the disk, so that a power cut costs a second.
+    """Flush files to disk once a second, so that a power cut costs at most a second.
 
-    A crash of the program costs nothing in any case: the kernel has the bytes then. It works in a
-    thread, because a memory card may take longer for this than a control period.
+    A crash of the program alone costs nothing, because the kernel has the bytes by then. The work
+    is done in a thread, because a memory card may take longer than a control period.
 
     Args:
-        fd: A file that grows; it stays open until `close`.
+        fd: A growing file, which stays open until `close`.
     """
 
     def __init__(self, fd: int) -> None:
@@ -48,15 +48,15 @@ class Syncer:
         self._thread.start()
 
     def add(self, path: Path) -> None:
-        """A file that was written and will not change."""
+        """Schedule a finished file for the next flush."""
         with self._lock:
             self._waiting.append(path)
 
     def sync(self) -> None:
-        """Do it now."""
+        """Flush now."""
         with self._lock:
             waiting, self._waiting = self._waiting, []
-        # A disk that fails is told by the next write; here it would tell nobody.
+        # The next write reports a failing disk; an error here would have no recipient.
         with contextlib.suppress(OSError):
             for path in waiting:
                 fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -67,33 +67,33 @@ class Syncer:
             os.fsync(self._fd)
 
     def close(self) -> None:
-        """Do it for the last time."""
+        """Stop the thread, and flush one last time."""
         self._ended.set()
         self._thread.join()
         self.sync()
 
     def _run(self) -> None:
-        while not self._ended.wait(_EVERY_S):
+        while not self._ended.wait(_SYNC_PERIOD_S):
             self.sync()
 
 
 _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
-_LARGEST_PICTURE: Final = 16 << 20
+_MAX_PICTURE_BYTES: Final = 16 << 20
 _SPARE_BYTES: Final = 64 << 20
-_LOOK_EVERY: Final = 20  # Steps. How full the disk is does not change faster.
-_MOST_IN_ONE_SECOND: Final = 10_000
+_SPACE_CHECK_STEPS: Final = 20  # Free space changes slowly.
+_MAX_EPISODES_PER_SECOND: Final = 10_000
 _NS_PER_S: Final = 1e9
 
 
 class EpisodeWriter:
-    """Writes one episode; `create` makes one.
+    """Writer of one episode; use `create` to construct one.
 
     Attributes:
         path: Folder of the episode.
-        steps: How many steps were written.
-        dropped: How many of them were undone.
-        marks: How many marks were set.
+        steps: Number of steps written.
+        dropped: Number of those that were undone.
+        marks: Number of marks set.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class EpisodeWriter:
         self._lock, self._fd = locks
         self._spare_bytes = spare_bytes
         self._before: Step | None = None
-        # When each step that still counts was, s, to know how many an `undo` takes.
+        # Index and time, s, of each kept step, for `undo`.
         self._times: list[tuple[int, float]] = []
         self._syncer: Syncer | None = Syncer(self._fd)
 
@@ -121,17 +121,17 @@ class EpisodeWriter:
         spare_bytes: int = _SPARE_BYTES,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> EpisodeWriter:
-        """Begin an episode in a recording, which is made where it is missing.
+        """Begin an episode in a recording; create the recording if it is missing.
 
         Args:
             recording: Folder of the recording.
-            header: What the episode is of.
-            spare_bytes: How much of the disk stays free. A full disk would harm the robot.
-            now: Gives the time, UTC.
+            header: Metadata of the episode.
+            spare_bytes: Disk space to leave free. A full disk would harm the robot.
+            now: Returns the current time, UTC.
 
         Raises:
-            DemosError: If somebody else records there.
-            OutputError: If nothing can be written there, or the disk is full.
+            DemosError: If another process is recording there.
+            OutputError: If the folder cannot be written to, or the disk is full.
         """
         began = now()
         header = replace(
@@ -144,17 +144,19 @@ class EpisodeWriter:
         except OSError as error:
             raise cannot_write(recording, error) from error
         _require_space(recording, spare_bytes)
-        held = lock(recording / _LOCK, f"Somebody records in {recording} already: choose another.")
+        held = lock(
+            recording / _LOCK, f"{recording} is in use by another recorder: choose another folder."
+        )
         try:
             path = _new_folder(recording, header, f"{began:%Y%m%dT%H%M%SZ}")
-            fd = lock(path / STEPS, f"Somebody writes to {path} already.")
+            fd = lock(path / STEPS, f"{path} is in use by another recorder.")
         except BaseException:
             os.close(held)
             raise
         return cls(path, header, (held, fd), spare_bytes)
 
     def __enter__(self) -> Self:
-        """The writer itself."""
+        """Return the writer itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -163,28 +165,28 @@ class EpisodeWriter:
 
     @property
     def seconds(self) -> float:
-        """How long it is, s."""
+        """Duration of the kept steps, s."""
         return self._times[-1][1] - self._times[0][1] if self._times else 0.0
 
     def add(self, step: Step, jpeg: bytes | None = None) -> int:
-        """Write a step.
+        """Append a step.
 
         Args:
-            step: The step; what it says of its index and its frame is filled in here.
-            jpeg: Its picture; None for the picture of the step before, or without a camera.
+            step: The step; its index and frame fields are filled in here.
+            jpeg: Its picture; None to reuse the previous step's picture, or without a camera.
 
         Returns:
-            Its index.
+            Index of the step.
 
         Raises:
-            DemosError: If it does not fit the header, or time runs backwards.
-            OutputError: If it cannot be written. What was written before is there, whole.
+            DemosError: If the step does not fit the header, or time runs backwards.
+            OutputError: If it cannot be written; earlier steps are intact.
         """
         self._require_open()
         refusal = step.refusal(*self._sizes) or self._disorder(step) or _no_picture(jpeg)
         if refusal:
             raise DemosError(f"Step {self.steps} of {self.path} cannot be recorded: {refusal}.")
-        if self.steps % _LOOK_EVERY == 0:
+        if self.steps % _SPACE_CHECK_STEPS == 0:
             _require_space(self.path, self._spare_bytes)
         step = replace(step, index=self.steps, **self._frame(jpeg))
         self._append(step.to_json())
@@ -194,7 +196,7 @@ class EpisodeWriter:
         return step.index
 
     def mark(self, text: str = "") -> None:
-        """Remember the newest step for later, with a few words.
+        """Mark the newest step, with free text.
 
         Raises:
             DemosError: If there is no step yet.
@@ -207,21 +209,21 @@ class EpisodeWriter:
         self.marks += 1
 
     def undo(self, seconds: float = 5.0) -> int:
-        """Drop the newest steps, which stay in the file but do not count.
+        """Exclude the newest steps; they stay in the file.
 
         Args:
-            seconds: How far back from the newest step that counts, s.
+            seconds: How far to go back from the newest kept step, s; positive.
 
         Returns:
-            How many steps.
+            Number of excluded steps.
 
         Raises:
-            DemosError: If it is no time.
+            DemosError: If `seconds` is not positive.
             OutputError: If it cannot be written.
         """
         self._require_open()
         if not seconds > 0.0:
-            raise DemosError(f"The last {seconds} s cannot be undone.")
+            raise DemosError(f"seconds to undo must be positive, got {seconds}.")
         if not self._times:
             return 0
         since_s = self._times[-1][1] - seconds
@@ -232,13 +234,13 @@ class EpisodeWriter:
         return len(gone)
 
     def close(self, outcome: str = "") -> None:
-        """End the episode; once is enough.
+        """Close the episode; further calls do nothing.
 
         Args:
-            outcome: How it ended, such as "collision" or "time"; "" for just so.
+            outcome: How it ended, such as "collision" or "time"; "" if unspecified.
 
         Raises:
-            OutputError: If its header cannot be written; all steps are there all the same.
+            OutputError: If the header cannot be written; all steps are on disk all the same.
         """
         if self._syncer is None:
             return
@@ -260,7 +262,7 @@ class EpisodeWriter:
             raise cannot_write(self.path / STEPS, error) from error
 
     def _frame(self, jpeg: bytes | None) -> dict[str, object]:
-        """The fields of a step that name its picture, which is written first."""
+        """Write a picture, and return the fields of the step that name it."""
         before = self._before
         if jpeg is None:
             if before is None:
@@ -284,7 +286,7 @@ class EpisodeWriter:
         return {"frame": name, "frame_bytes": len(jpeg), "frame_crc": binascii.crc32(jpeg)}
 
     def _disorder(self, step: Step) -> str:
-        """Which of its times is before that of the last step, in words; empty for none."""
+        """Return which time runs backwards, as part of a sentence; "" for none."""
         if self._before is None:
             return ""
         for name in ("captured_ns", "decided_ns"):
@@ -303,41 +305,41 @@ class EpisodeWriter:
 
 
 def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
-    """Make the folder of an episode, which appears with everything that it needs.
+    """Create the folder of an episode with its empty files, atomically.
 
     Raises:
-        OutputError: If it cannot be made.
+        OutputError: If it cannot be created.
     """
     part = recording / f".{began}.{os.getpid()}"
     try:
         (part / FRAMES).mkdir(parents=True, exist_ok=True)
         (part / STEPS).touch()
         write_header(part, header.to_json() | {"closed": None})
-        for number in range(1, _MOST_IN_ONE_SECOND):
+        for number in range(1, _MAX_EPISODES_PER_SECOND):
             path = recording / f"{began}-{number:04d}"
-            if not path.exists():  # Nobody else makes one: the recording is locked.
+            if not path.exists():  # No race: the recording is locked.
                 return part.rename(path)
-    except OutputError:  # Which says it already, and is an OSError, too.
+    except OutputError:  # Already worded, and a subclass of OSError.
         raise
     except OSError as error:
         raise cannot_write(part, error) from error
-    raise OutputError(f"{recording} has too many episodes of {began}.")
+    raise OutputError(f"{recording} has too many episodes that began at {began}.")
 
 
 def _no_picture(jpeg: bytes | None) -> str:
-    """Why bytes are no picture, in words; empty if they may be one."""
+    """Return why `jpeg` cannot be a picture, as part of a sentence; "" if it may be one."""
     if jpeg is None:
         return ""
-    if len(jpeg) > _LARGEST_PICTURE:
-        return f"its picture has {len(jpeg)} bytes, and at most {_LARGEST_PICTURE} are allowed"
-    return "" if jpeg.startswith(_JPEG) else "its picture is no JPEG"
+    if len(jpeg) > _MAX_PICTURE_BYTES:
+        return f"its picture has {len(jpeg)} bytes, more than the limit of {_MAX_PICTURE_BYTES}"
+    return "" if jpeg.startswith(_JPEG) else "its picture is not a JPEG"
 
 
 def _require_space(folder: Path, spare_bytes: int) -> None:
-    """Refuse to fill a disk.
+    """Refuse to fill the disk.
 
     Raises:
-        OutputError: If less is free.
+        OutputError: If less than `spare_bytes` are free.
     """
     try:
         found = os.statvfs(folder)
@@ -346,6 +348,6 @@ def _require_space(folder: Path, spare_bytes: int) -> None:
     free = found.f_bavail * found.f_frsize
     if free < spare_bytes:
         raise OutputError(
-            f"Cannot write to {folder}: only {free >> 20} MB of the disk are free, and "
-            f"{spare_bytes >> 20} MB stay free."
+            f"Cannot write to {folder}: only {free >> 20} MB of the disk are free, and at least "
+            f"{spare_bytes >> 20} MB must stay free."
         )

@@ -1,4 +1,4 @@
-"""From episodes to the formats of others."""
+"""Import and export of recordings, and detection of formats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from shapechanger.demos.episodes import (
     EpisodeHeader,
@@ -17,28 +17,63 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.exchange.csv_files import read_csv, write_csv
-from shapechanger.demos.exchange.formats import FORMATS, Format, require_format
-from shapechanger.demos.exchange.keys_2017 import read_2017, write_2017
+from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
+from shapechanger.demos.exchange.files import cannot_read, new_folder
+from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
 from shapechanger.demos.exchange.minari_export import require_dataset_name, write_minari
+from shapechanger.demos.exchange.minari_format import METADATA, is_minari
 from shapechanger.demos.exchange.minari_import import read_minari
-from shapechanger.demos.exchange.places import new_folder
-from shapechanger.demos.exchange.recorded import Recorded, recorded_of, seen
-from shapechanger.demos.exchange.tub import read_tub, write_tub
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
+from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 
-__all__ = ["Exported", "Imported", "export_recording", "import_episodes", "import_recording"]
+__all__ = [
+    "FORMATS",
+    "Exported",
+    "Format",
+    "Imported",
+    "export_recording",
+    "find_format",
+    "import_episodes",
+    "import_recording",
+]
+
+Format = Literal["2017", "tub", "minari", "csv"]
+
+
+FORMATS: Final[tuple[Format, ...]] = ("2017", "tub", "minari", "csv")
+"""Names of the formats."""
+
+_DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
+    "2017": is_2017,
+    "tub": is_tub,
+    "minari": is_minari,
+    "csv": is_csv,
+}
+_READ: Final[dict[Format, Callable[[Path], Iterator[ExchangeEpisode]]]] = {
+    "2017": read_2017,
+    "tub": read_tub,
+    "minari": read_minari,
+    "csv": read_csv,
+}
+_MARKS_DROPPED: Final = ("minari", "csv")
+
+_EXPECTED: Final = (
+    f"{LABELS} beside JPEGs (2017), {MANIFEST} or record_0.json (tub), data/{METADATA} (minari), "
+    f"or {TABLE} (csv)"
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What was exported.
+    """Result of an export.
 
     Attributes:
-        format: The format that it has.
-        episodes: How many episodes there were.
-        steps: How many steps were written.
-        left_out: How many steps were not, because they do not count.
+        format: Name of the format.
+        episodes: Number of episodes.
+        steps: Number of steps written.
+        left_out: Number of excluded steps that were not written.
     """
 
     format: Format
@@ -47,37 +82,52 @@ class Exported:
     left_out: int
 
 
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """Result of an import.
+
+    Attributes:
+        format: Name of the format.
+        episodes: Number of episodes.
+        steps: Number of steps.
+        pictures: Number of pictures.
+    """
+
+    format: Format
+    episodes: int
+    steps: int
+    pictures: int
+
+
 def export_recording(data: Path, out: Path, format: str, *, dropped: bool = False) -> Exported:
-    """Write a recording in a format of others.
+    """Export a recording.
 
     Args:
-        data: A recording, or one episode; it stays as it is.
-        out: The folder to make. It appears whole, or not at all.
+        data: A recording, or one episode; it is not changed.
+        out: The folder to create, atomically.
         format: One of the `FORMATS`.
-        dropped: Whether the steps that do not count go with it, and why they do not; only minari
-            and csv can say so.
+        dropped: Whether to export excluded steps too, marked as such; minari and csv only.
 
     Raises:
-        DemosError: If the recording is not whole, does not fit the format, or `out` exists or lies
-            in it.
+        DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
+            in `data`.
         UnknownName: If there is no such format.
         OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
     if format not in FORMATS:
         raise UnknownName("format", format, FORMATS)
-    if dropped and format not in {"minari", "csv"}:
+    if dropped and format not in _MARKS_DROPPED:
         raise DemosError(
-            f"The format {format} cannot say that a step does not count: export to minari or csv, "
-            "or leave the dropped steps out."
+            f"The format {format} cannot mark excluded steps: export to minari or csv, or leave "
+            "the excluded steps out."
         )
     if format == "minari":
         require_dataset_name(out)
     read = [read_episode(path) for path in episodes_of(data)]
-    kept = sum(len(episode.steps if dropped else episode.kept) for episode in read)
-    if not kept:
-        raise DemosError(f"No step of {data} counts, so there is nothing to export.")
-    episodes = [recorded_of(episode, dropped=dropped) for episode in read]
+    if not any(episode.steps if dropped else episode.kept for episode in read):
+        raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
+    episodes = [exchange_episode(episode, dropped=dropped) for episode in read]
     with new_folder(out, data) as folder:
         try:
             match format:
@@ -87,7 +137,7 @@ def export_recording(data: Path, out: Path, format: str, *, dropped: bool = Fals
                     steps = write_tub(episodes, folder)
                 case "minari":
                     steps = write_minari(episodes, folder, out.name)
-                case _:
+                case "csv":
                     steps = write_csv(episodes, folder)
         except OutputError:
             raise
@@ -96,80 +146,51 @@ def export_recording(data: Path, out: Path, format: str, *, dropped: bool = Fals
         except OverflowError as error:
             raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
     total = sum(len(episode.steps) for episode in read)
-    return Exported(_named(format), len(read), steps, total - steps)
-
-
-def _named(name: str) -> Format:
-    return next(known for known in FORMATS if known == name)
-
-
-_READERS: Final[dict[Format, Callable[[Path], Iterator[Recorded]]]] = {
-    "2017": read_2017,
-    "tub": read_tub,
-    "minari": read_minari,
-    "csv": read_csv,
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Imported:
-    """What was imported.
-
-    Attributes:
-        format: The format it had.
-        episodes: How many episodes there are.
-        steps: How many steps they have.
-        pictures: How many pictures.
-    """
-
-    format: Format
-    episodes: int
-    steps: int
-    pictures: int
+    return Exported(format, len(read), steps, total - steps)
 
 
 def import_episodes(
     path: Path, format: str = "auto"
 ) -> Iterator[tuple[EpisodeHeader, Iterator[tuple[Step, bytes | None]]]]:
-    """Read what others recorded, without writing anything.
+    """Read a recording in another format, without writing anything.
 
     Args:
         path: A folder in one of the `FORMATS`.
-        format: One of them, or "auto".
+        format: One of them, or "auto" to detect it.
 
     Yields:
-        For each episode its header, and its steps, each with the JPEG of the picture that it saw
-        (None without pictures). The steps that share a picture share the object. They can be read
-        at any time, once.
+        For each episode its header, and an iterator over its steps, each with the JPEG of its
+        picture (None without pictures). Steps that share a picture share the object. The iterator
+        can be used once, at any time.
 
     Raises:
-        DemosError: If something is not whole, while it is read; the sentence says what to do.
+        DemosError: If something is damaged or missing, possibly not before it is read.
         UnknownName: If there is no such format.
         MissingExtra: If a package that the format needs is not installed.
     """
-    for episode in _READERS[require_format(format, path)](path):
+    for episode in _READ[_require_format(format, path)](path):
         yield episode.header, _numbered(episode)
 
 
 def import_recording(path: Path, out: Path, format: str = "auto") -> Imported:
-    """Make a recording of what others recorded.
+    """Import a recording.
 
     Args:
-        path: A folder in one of the `FORMATS`; it stays as it is.
-        out: The recording to make. It appears whole, or not at all.
-        format: One of the formats, or "auto".
+        path: A folder in one of the `FORMATS`; it is not changed.
+        out: The recording to create, atomically.
+        format: One of the formats, or "auto" to detect it.
 
     Raises:
-        DemosError: If `path` is not whole, or `out` exists or lies in it.
+        DemosError: If `path` is damaged, or `out` exists or lies in it.
         UnknownName: If there is no such format.
         OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
-    found = require_format(format, path)
+    found = _require_format(format, path)
     began = datetime.now(UTC)
     episodes = steps = pictures = 0
     with new_folder(out, path) as folder:
-        for episode in _READERS[found](path):
+        for episode in _READ[found](path):
             added, shown = _write(episode, folder, began)
             episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
         if not episodes:
@@ -177,16 +198,75 @@ def import_recording(path: Path, out: Path, format: str = "auto") -> Imported:
     return Imported(found, episodes, steps, pictures)
 
 
-def _numbered(episode: Recorded) -> Iterator[tuple[Step, bytes | None]]:
-    for index, (step, picture) in enumerate(seen(episode.rows)):
+def find_format(path: Path) -> Format:
+    """Detect the format of a folder.
+
+    Raises:
+        DemosError: If there is no such folder, or it has none or several of the formats; the error
+            names what was found.
+    """
+    _require_folder(path)
+    try:
+        if is_episode(path) or any(is_episode(child) for child in path.iterdir()):
+            raise DemosError(f"{path} is a recording already: use it as it is.")
+        children = sorted(path.iterdir())
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    found = _formats_of(path)
+    if len(found) > 1:
+        raise DemosError(
+            f"{path} looks like {' and '.join(found)}: choose with --format, such as --format "
+            f"{found[0]}."
+        )
+    if found:
+        return found[0]
+    for child in children:
+        if child.is_dir() and (formats := _formats_of(child)):
+            raise DemosError(
+                f"{path} has none of the formats, but {child} in it is {formats[0]}: import that."
+            )
+    what = "has nothing that can be imported" if children else "is empty"
+    raise DemosError(f"{path} {what}: expected {_EXPECTED}.")
+
+
+def _require_format(name: str, path: Path) -> Format:
+    """Return the named format, or the detected one for "auto".
+
+    Raises:
+        UnknownName: If there is no such format.
+        DemosError: If the folder does not have this format.
+    """
+    if name == "auto":
+        return find_format(path)
+    if name not in FORMATS:
+        raise UnknownName("format", name, ("auto", *FORMATS))
+    _require_folder(path)
+    if not _DETECT[name](path):
+        raise DemosError(f"{path} is not {name}: expected {_EXPECTED}; or omit --format.")
+    return name
+
+
+def _require_folder(path: Path) -> None:
+    if not path.exists():
+        raise DemosError(f"There is no {path}.")
+    if not path.is_dir():
+        raise DemosError(f"{path} is a file: give the folder that it is in, {path.parent}.")
+
+
+def _formats_of(path: Path) -> list[Format]:
+    return [name for name, detect in _DETECT.items() if detect(path)]
+
+
+def _numbered(episode: ExchangeEpisode) -> Iterator[tuple[Step, bytes | None]]:
+    for index, (step, picture) in enumerate(kept_steps(episode.rows)):
         yield replace(step, index=index), picture
 
 
-def _write(episode: Recorded, folder: Path, began: datetime) -> tuple[int, int]:
-    """Write one episode; how many steps and how many pictures it has."""
+def _write(episode: ExchangeEpisode, folder: Path, began: datetime) -> tuple[int, int]:
+    """Write one episode of a recording; return its numbers of steps and pictures."""
     pictures = 0
-    gone: list[tuple[int, str]] = []
-    # The folders of all episodes begin with the same time, so that their order stays.
+    excluded: list[tuple[int, str]] = []
+    # The folders of all episodes begin with the same time, so that their order is kept.
     with EpisodeWriter.create(folder, episode.header, now=lambda: began) as writer:
         for row in episode.rows:
             try:
@@ -197,10 +277,11 @@ def _write(episode: Recorded, folder: Path, began: datetime) -> tuple[int, int]:
             for mark in row.marks:
                 writer.mark(mark)
             if row.dropped is not None:
-                gone.append((index, row.dropped))
+                excluded.append((index, row.dropped))
         writer.close(episode.outcome)
-    # Steps in a row that were dropped for one reason are dropped in one line.
-    for why, group in groupby(enumerate(gone), key=lambda pair: (pair[1][1], pair[1][0] - pair[0])):
+    # Consecutive steps that were dropped for one reason become one line.
+    runs = groupby(enumerate(excluded), key=lambda pair: (pair[1][1], pair[1][0] - pair[0]))
+    for why, group in runs:
         indexes = [index for _, (index, _) in group]
         drop(writer.path, indexes[0], indexes[-1], why[0])
     return writer.steps, pictures

@@ -1,8 +1,8 @@
-"""The columns of `steps.csv`, and how their cells are written and read.
+"""CSV: a folder with `header.json`, `steps.csv` and `frames/` for each episode.
 
-Numbers are written so that reading gives the same number; an empty cell is nothing, `nan` is a
-number that nobody measured. Texts are written as JSON, in quotes of its own: then no text can be
-taken for a formula by a spreadsheet, and line ends and strange letters survive.
+Numbers are written so that they are read back exactly; an empty cell is a missing value, `nan` a
+value that nothing measured. Texts are written as JSON with its quotes, so that no spreadsheet takes
+one for a formula, and line ends and other special characters survive.
 """
 
 from __future__ import annotations
@@ -12,29 +12,31 @@ import io
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
-from shapechanger.demos.exchange.pictures import Pictures
-from shapechanger.demos.exchange.places import cannot_read, inside, read_text
-from shapechanger.demos.exchange.recorded import ExchangeStep, Recorded
+from shapechanger.demos.exchange.files import (
+    Pictures,
+    cannot_read,
+    parse_json,
+    parse_json_object,
+    read_text,
+    resolve_file,
+)
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Layout
 
-__all__ = [
-    "FRAMES",
-    "HEADER",
-    "TABLE",
-    "CsvColumns",
-    "ReadRow",
-    "read_csv",
-    "tables_of",
-    "write_csv",
-]
+__all__ = ["TABLE", "is_csv", "read_csv", "write_csv"]
+
+TABLE: Final = "steps.csv"
+_HEADER: Final = "header.json"
+_FRAMES: Final = "frames"
 
 _BEFORE: Final = ("step", "frame", "driver")
+_VECTORS: Final = ("action", "applied", "wanted", "state")
 _TIMES: Final = ("captured_ns", "decided_ns", "wall_ns")
 _AFTER: Final = (
     *_TIMES,
@@ -46,27 +48,125 @@ _AFTER: Final = (
     "marks",
     "dropped",
 )
-_VECTORS: Final = ("action", "applied", "wanted", "state")
-_MOST_NAMED: Final = 5
+_JSON_NAMES: Final = {dict: "object", list: "array", str: "string"}
+_MAX_NAMED: Final = 5
+_MAX_QUOTED: Final = 60
 
 
-@dataclass(frozen=True, slots=True)
-class ReadRow:
-    """One line that was read.
+def write_csv(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
+    """Write episodes into an existing folder; several episodes get a subfolder each.
 
-    Attributes:
-        row: The step, without its picture.
-        frame: File name of its picture; "" for none.
-        number: Its number in the file from which it was exported.
+    Args:
+        episodes: The episodes.
+        folder: Where to write.
+
+    Returns:
+        Number of steps written.
     """
+    if len(episodes) == 1:
+        return _write(episodes[0], folder)
+    steps = 0
+    for number, episode in enumerate(episodes, 1):
+        place = folder / f"episode-{number:04d}"
+        place.mkdir()
+        steps += _write(episode, place)
+    return steps
 
-    row: ExchangeStep
-    frame: str
-    number: int
+
+def is_csv(folder: Path) -> bool:
+    """Return whether a folder has the format.
+
+    Raises:
+        DemosError: If the folder cannot be read.
+    """
+    return bool(_tables_of(folder))
 
 
-class CsvColumns:
-    """The columns for the layouts of an episode.
+def read_csv(folder: Path) -> Iterator[ExchangeEpisode]:
+    """Yield the episodes of a folder.
+
+    Raises:
+        DemosError: If a file is missing or damaged.
+    """
+    for place in _tables_of(folder):
+        path = place / _HEADER
+        if not path.is_file():
+            raise DemosError(
+                f"There is no {_HEADER} beside {place / TABLE}, which defines its columns: restore "
+                "it."
+            )
+        fields = parse_json_object(read_text(path), str(path))
+        try:
+            header = EpisodeHeader.from_json(fields)
+            columns = _Columns(header)
+        except (DemosError, LayoutError) as error:
+            raise DemosError(f"{path}: {error}") from error
+        yield ExchangeEpisode(
+            header=header,
+            rows=_rows(place, header, columns),
+            name=str(place),
+            outcome=str(fields.get("outcome", "")),
+        )
+
+
+def _write(episode: ExchangeEpisode, folder: Path) -> int:
+    columns = _Columns(episode.header)
+    header = episode.header.to_json() | {"outcome": episode.outcome}
+    text = json.dumps(header, indent=1, ensure_ascii=False)
+    (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
+    (folder / _FRAMES).mkdir()
+    frame, number = "", 0
+    with (folder / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns.names)
+        for number, row in enumerate(episode.rows, 1):
+            if row.jpeg is not None:
+                frame = f"{number - 1:06d}.jpg"
+                (folder / _FRAMES / frame).write_bytes(row.jpeg)
+            writer.writerow(columns.cells(row, number - 1, frame))
+    return number
+
+
+def _tables_of(folder: Path) -> list[Path]:
+    """Return the folders with a `steps.csv`: the folder itself, or its subfolders.
+
+    Raises:
+        DemosError: If the folder cannot be read.
+    """
+    if (folder / TABLE).is_file():
+        return [folder]
+    try:
+        return sorted(path for path in folder.iterdir() if (path / TABLE).is_file())
+    except OSError as error:
+        raise cannot_read(folder, error) from error
+
+
+def _rows(folder: Path, header: EpisodeHeader, columns: _Columns) -> Iterator[ExchangeStep]:
+    path = folder / TABLE
+    pictures = Pictures(header.image_size)
+    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
+    shown, before = "", -1
+    try:
+        columns.require(next(reader, list[str]()), str(path))
+        for cells in reader:
+            where = f"{path}, line {reader.line_num}"
+            row, frame, number = columns.parse(cells, where)
+            if number <= before:
+                raise DemosError(f"{where}: step {number} comes after step {before}.")
+            before = number
+            jpeg = None
+            if frame != shown:
+                if header.image_size is None:
+                    raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
+                shown = frame
+                jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
+            yield replace(row, jpeg=jpeg)
+    except csv.Error as error:
+        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
+
+
+class _Columns:
+    """Columns of `steps.csv` for the layouts of an episode.
 
     Attributes:
         names: Their names in order.
@@ -83,11 +183,11 @@ class CsvColumns:
         )
 
     def cells(self, row: ExchangeStep, number: int, frame: str) -> list[str]:
-        """One line.
+        """Return the cells of one line.
 
         Args:
             row: The step.
-            number: Its number.
+            number: Number of the step in the file.
             frame: File name of its picture; "" for none.
         """
         step = row.step
@@ -110,35 +210,40 @@ class CsvColumns:
         return cells
 
     def require(self, found: Sequence[str], where: str) -> None:
-        """Refuse a file with other columns.
+        """Refuse a table with other columns.
+
+        Args:
+            found: Names of the columns that were found.
+            where: How to name the table in errors.
 
         Raises:
-            DemosError: If they are not these.
+            DemosError: If the columns differ.
         """
         if tuple(found) == self.names:
             return
         missing = [name for name in self.names if name not in found]
-        surplus = [name for name in found if name not in self.names]
-        if missing or surplus:
-            said = [f"lacks {', '.join(missing[:_MOST_NAMED])}"] if missing else []
-            said += (
-                [f"has {', '.join(map(repr, surplus[:_MOST_NAMED]))} too much"] if surplus else []
-            )
-            raise DemosError(f"{where} {' and '.join(said)}: the columns are those of header.json.")
-        raise DemosError(f"{where} has its columns in another order than header.json.")
+        surplus = [repr(name) for name in found if name not in self.names]
+        problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
+        problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
+        what = " and ".join(problems) or "has its columns in another order"
+        raise DemosError(f"{where} {what}: the columns must be those of {_HEADER}.")
 
-    def read(self, cells: Sequence[str], where: str) -> ReadRow:
-        """A line as a step.
+    def parse(self, cells: Sequence[str], where: str) -> tuple[ExchangeStep, str, int]:
+        """Parse the cells of one line.
 
         Args:
-            cells: As many as there are columns.
-            where: What to call the line.
+            cells: One cell per column.
+            where: How to name the line in errors.
+
+        Returns:
+            The step without its picture, the file name of the picture ("" for none), and the
+            number of the step in the file.
 
         Raises:
-            DemosError: If a cell is not what its column holds.
+            DemosError: If a cell is invalid.
         """
         if len(cells) != len(self.names):
-            raise DemosError(f"{where} has {len(cells)} cells, and there are {len(self.names)}.")
+            raise DemosError(f"{where} has {len(cells)} cells instead of {len(self.names)}.")
         left = list(zip(self.names, cells, strict=True))
 
         def number(kind: type[float] | type[int]) -> Any:
@@ -150,7 +255,7 @@ class CsvColumns:
             if values and all(value is None for value in values):
                 return None
             if None in values:
-                raise DemosError(f"{where}: some numbers of {name} are empty, and others are not.")
+                raise DemosError(f"{where}: some values of {name} are empty, but not all.")
             return tuple(values)
 
         def text(kind: type) -> Any:
@@ -185,13 +290,11 @@ class CsvColumns:
             stop_reason=text(str) or "",
         )
         marks = tuple(str(mark) for mark in text(list) or ())
-        return ReadRow(
-            ExchangeStep(step=step, jpeg=None, marks=marks, dropped=text(str)), frame, index
-        )
+        return ExchangeStep(step=step, jpeg=None, marks=marks, dropped=text(str)), frame, index
 
 
 def _places(layout: str) -> list[str]:
-    """A name for each number of a layout."""
+    """Return a name for each value of a layout."""
     return [
         feature.name if not feature.shape else f"{feature.name}[{place}]"
         for feature in Layout.from_json(layout)
@@ -203,136 +306,19 @@ def _number(cell: str, kind: type[float] | type[int], where: str) -> float | int
     try:
         return kind(cell)
     except ValueError as error:
-        what = "whole number" if kind is int else "number"
-        raise DemosError(f"{where} is {cell!r}, which is no {what}.") from error
+        what = "an integer" if kind is int else "a number"
+        raise DemosError(f"{where} must be {what}, got {cell!r}.") from error
 
 
 def _flag(cell: str, where: str) -> bool:
     word = cell.strip().lower()  # Spreadsheets write TRUE.
     if word not in {"true", "false", "1", "0"}:
-        raise DemosError(f"{where}: {cell!r} is neither true nor false.")
+        raise DemosError(f"{where}: expected true or false, got {cell!r}.")
     return word in {"true", "1"}
 
 
 def _text(cell: str, kind: type, where: str) -> Any:
-    try:
-        value = json.loads(cell)
-    except (ValueError, RecursionError) as error:
-        raise DemosError(f"{where} is no JSON: {cell[:60]!r}.") from error
+    value = parse_json(cell, f"{where}: {cell[:_MAX_QUOTED]!r}")
     if not isinstance(value, kind):
-        raise DemosError(f"{where} is {cell[:60]!r}, which is another kind of JSON.")
+        raise DemosError(f"{where} must be a JSON {_JSON_NAMES[kind]}, got {cell[:_MAX_QUOTED]!r}.")
     return value
-
-
-HEADER: Final = "header.json"
-TABLE: Final = "steps.csv"
-FRAMES: Final = "frames"
-
-
-def write_csv(episodes: Sequence[Recorded], folder: Path) -> int:
-    """Write episodes into a folder that is there.
-
-    Returns:
-        How many steps were written.
-    """
-    if len(episodes) == 1:
-        return _write(episodes[0], folder)
-    steps = 0
-    for number, episode in enumerate(episodes, 1):
-        place = folder / f"episode-{number:04d}"
-        place.mkdir()
-        steps += _write(episode, place)
-    return steps
-
-
-def _write(episode: Recorded, folder: Path) -> int:
-    columns = CsvColumns(episode.header)
-    header = episode.header.to_json() | {"outcome": episode.outcome}
-    text = json.dumps(header, indent=1, ensure_ascii=False)
-    (folder / HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
-    (folder / FRAMES).mkdir()
-    frame, number = "", 0
-    with (folder / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns.names)
-        for number, row in enumerate(episode.rows, 1):
-            if row.jpeg is not None:
-                frame = f"{number - 1:06d}.jpg"
-                (folder / FRAMES / frame).write_bytes(row.jpeg)
-            writer.writerow(columns.cells(row, number - 1, frame))
-    return number
-
-
-def tables_of(folder: Path) -> list[Path]:
-    """The folders with a `steps.csv`: the folder itself, or those in it.
-
-    Raises:
-        DemosError: If the folder cannot be read.
-    """
-    if (folder / TABLE).is_file():
-        return [folder]
-    try:
-        return sorted(path for path in folder.iterdir() if (path / TABLE).is_file())
-    except OSError as error:
-        raise cannot_read(folder, error) from error
-
-
-def read_csv(folder: Path) -> Iterator[Recorded]:
-    """The episodes of a folder.
-
-    Raises:
-        DemosError: If something in it is not whole; the sentence says what.
-    """
-    for place in tables_of(folder):
-        path = place / HEADER
-        if not path.is_file():
-            raise DemosError(
-                f"There is no {HEADER} beside {place / TABLE}, which says what the numbers mean: "
-                "put it back."
-            )
-        try:
-            plain = json.loads(read_text(path))
-        except (ValueError, RecursionError) as error:
-            raise DemosError(f"{path} is no JSON: {error}.") from error
-        if not isinstance(plain, dict):
-            raise DemosError(f"{path} is no header.")
-        fields = cast("dict[str, Any]", plain)
-        try:
-            header = EpisodeHeader.from_json(fields)
-            columns = CsvColumns(header)
-        except (DemosError, LayoutError) as error:
-            raise DemosError(f"{path}: {error}") from error
-        yield Recorded(
-            header=header,
-            rows=_rows(place, header, columns),
-            name=str(place),
-            outcome=str(fields.get("outcome", "")),
-        )
-
-
-def _rows(folder: Path, header: EpisodeHeader, columns: CsvColumns) -> Iterator[ExchangeStep]:
-    path = folder / TABLE
-    pictures = Pictures(header.image_size)
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
-    frame, before = "", -1
-    try:
-        columns.require(next(reader, list[str]()), str(path))
-        for cells in reader:
-            where = f"{path}, line {reader.line_num}"
-            read = columns.read(cells, where)
-            if read.number <= before:
-                raise DemosError(f"{where}: step {read.number} comes after step {before}.")
-            before = read.number
-            jpeg = None
-            if read.frame != frame:
-                if header.image_size is None:
-                    raise DemosError(f"{where} has a picture, and {HEADER} says there are none.")
-                frame = read.frame
-                jpeg = pictures.read(inside(folder / FRAMES, frame, where))
-            yield ExchangeStep(
-                step=read.row.step, jpeg=jpeg, marks=read.row.marks, dropped=read.row.dropped
-            )
-    except csv.Error as error:
-        raise DemosError(
-            f"{path}, line {reader.line_num}, is no line of a CSV: {error}."
-        ) from error

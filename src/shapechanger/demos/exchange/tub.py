@@ -1,21 +1,21 @@
-"""Donkeycar's tubs: the records of a drive, with their pictures.
+"""Tubs of Donkeycar: records of a drive, with their pictures.
 
 Version 2 is a folder with `manifest.json`, catalogs and `images/`. The manifest has five lines of
 JSON: inputs, types, metadata, more metadata, and an object with `paths` (the catalogs in order),
 `current_index`, `max_len` and `deleted_indexes`, which counts records over all catalogs. A catalog
-has one JSON object a line; `_timestamp_ms` is Unix time, `_session_id` says which start of the car
-it belongs to, and `cam/image_array` names a file in `images/`. Version 1 has a file
-`record_N.json` for each record, its picture beside it, perhaps `milliseconds` since the start, and
-`meta.json` with inputs, types and perhaps the Unix time of the start.
+has one JSON object per line; `_timestamp_ms` is Unix time, `_session_id` names the start of the car
+that it belongs to, and `cam/image_array` names a file in `images/`. Version 1 has a file
+`record_N.json` per record, its picture beside it, optionally `milliseconds` since the start, and
+`meta.json` with inputs, types and optionally the Unix time of the start.
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py (`Manifest`,
 `ManifestIterator`, `Tub.write_record`) for version 2, parts/datastore.py for version 1, read at
 the commits 1e831b81, 38a1c2db and b253cef6.
 
-`user/angle` is -1 at the left and 1 at the right, `user/throttle` 1 forward: as here. In the
-`user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In the other modes
-`pilot/...` drives, except that in "local_angle" the throttle is the person's. Other inputs of the
-types float, int and boolean become the state; a tub does not say in which unit.
+`user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
+Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In
+the other modes `pilot/...` drives, except that in "local_angle" the throttle is the person's. Other
+inputs of the types float, int and boolean become the state; tubs do not contain their units.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby, pairwise
@@ -31,61 +31,62 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.pictures import Pictures, size_of
-from shapechanger.demos.exchange.places import cannot_read, inside, read_text
+from shapechanger.demos.exchange.files import (
+    Pictures,
+    cannot_read,
+    parse_json,
+    parse_json_object,
+    read_text,
+    resolve_file,
+)
 from shapechanger.demos.exchange.recorded import (
+    ExchangeEpisode,
     ExchangeStep,
-    Recorded,
-    one_rate,
+    kept_steps,
     rate_hz,
+    require_one_rate,
     require_order,
-    seen,
     split_at_gaps,
 )
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
-__all__ = [
-    "ANGLE",
-    "IMAGE",
-    "IMAGES",
-    "MANIFEST",
-    "MODE",
-    "RECORD_NAME",
-    "THROTTLE",
-    "TUB_ACTIONS",
-    "USER",
-    "TubRecord",
-    "read_tub",
-    "read_v1",
-    "read_v2",
-    "state_layout",
-    "step_of",
-    "write_tub",
-]
+__all__ = ["MANIFEST", "is_tub", "read_tub", "write_tub"]
 
 MANIFEST: Final = "manifest.json"
-IMAGES: Final = "images"
-META: Final = "meta.json"
-RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 
+_IMAGES: Final = "images"
+_META: Final = "meta.json"
+_RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _MANIFEST_LINES: Final = 5
-_NS_PER_MS: Final = 1e6
-_NS_PER_S: Final = 1e9
 
-# Larger numbers are no time, in ms or in s.
-_NO_TIME: Final = 1e15
+_IMAGE: Final = "cam/image_array"
+_MODE: Final = "user/mode"
+_PERSON_DRIVES: Final = "user"
+_POLICY_STEERS: Final = "local_angle"
+_POLICY_DRIVES: Final = "local"
+_AXES: Final = ("angle", "throttle")
+_NUMBERS: Final = ("float", "int", "boolean")
+_UNIT_UNKNOWN: Final = "?"
+_ACTIONS: Final = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+
+_CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
+_MIN_RATE_RECORDS: Final = 10  # A shorter drive is not evidence of its rate.
+_MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
+_NS_PER_MS: Final = 1_000_000
+_NS_PER_S: Final = 1_000_000_000
+_MS_PER_S: Final = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
-class TubRecord:
+class _Record:
     """One record of a tub.
 
     Attributes:
-        fields: What it says.
-        where: What to call it.
-        time_ns: When it was made, ns; None where it does not say.
-        is_unix: Whether that is Unix time, and not time since some start.
+        fields: Its content.
+        where: How to name it in errors.
+        time_ns: When it was made, ns; None if unknown.
+        is_unix: Whether `time_ns` is Unix time, and not time since some start.
         session: Its session; "" for none.
     """
 
@@ -96,210 +97,50 @@ class TubRecord:
     session: str = ""
 
 
-def read_v2(folder: Path) -> tuple[dict[str, str], list[TubRecord]]:
-    """The inputs of a tub of version 2 with their types, and the records that are not deleted.
+def is_tub(folder: Path) -> bool:
+    """Return whether a folder is a tub.
 
     Raises:
-        DemosError: If something in it is not whole.
+        DemosError: If the folder cannot be read.
     """
-    path = folder / MANIFEST
-    lines = read_text(path).splitlines()
-    if len(lines) < _MANIFEST_LINES:
-        raise DemosError(
-            f"{path} has {len(lines)} lines, and the manifest of a tub has {_MANIFEST_LINES}."
-        )
-    inputs, types, *_, catalogs = (_json(line, f"{path}, line {n}") for n, line in _few(lines))
-    if not isinstance(catalogs, dict):
-        raise DemosError(f"{path}, line {_MANIFEST_LINES}, does not say which catalogs there are.")
-    fields = cast("dict[str, Any]", catalogs)
-    names = _list(fields.get("paths"), f"the paths in {path}")
-    deleted = set(_list(fields.get("deleted_indexes", []), f"the deleted_indexes in {path}"))
-    records: list[TubRecord] = []
-    index = 0
-    for name in names:
-        catalog = inside(folder, str(name), str(path))
-        for number, line in enumerate(read_text(catalog).splitlines(), 1):
-            if not line.strip():
-                continue
-            where = f"{catalog}, line {number}"
-            if index not in deleted:
-                records.append(_record_v2(_object(line, where), where))
-            index += 1
-    return _typed(inputs, types, path), records
-
-
-def read_v1(folder: Path) -> tuple[dict[str, str], list[TubRecord]]:
-    """The same for a tub of version 1."""
     try:
-        found = [(m, path) for path in folder.iterdir() if (m := RECORD_NAME.fullmatch(path.name))]
+        return (folder / MANIFEST).is_file() or any(
+            _RECORD_NAME.fullmatch(child.name) for child in folder.iterdir()
+        )
     except OSError as error:
         raise cannot_read(folder, error) from error
-    meta: dict[str, Any] = {}
-    if (folder / META).is_file():
-        meta = _object(read_text(folder / META), str(folder / META))
-    start = _number(meta.get("start"))
-    records: list[TubRecord] = []
-    for _, path in sorted(found, key=lambda pair: int(pair[0][1])):
-        where = str(path)
-        fields = _object(read_text(inside(folder, path.name, where)), where)
-        time_ms = _number(fields.get("milliseconds"))
-        since_ns = None if start is None else round(start * _NS_PER_S)
-        time_ns = None if time_ms is None else round(time_ms * _NS_PER_MS) + (since_ns or 0)
-        records.append(TubRecord(fields, where, time_ns, is_unix=since_ns is not None))
-    return _typed(meta.get("inputs", []), meta.get("types", []), folder / META), records
 
 
-def _record_v2(fields: dict[str, Any], where: str) -> TubRecord:
-    time_ms = _number(fields.get("_timestamp_ms"))
-    time_ns = None if time_ms is None else round(time_ms) * round(_NS_PER_MS)
-    session = fields.get("_session_id")
-    return TubRecord(fields, where, time_ns, session="" if session is None else str(session))
-
-
-def _few(lines: list[str]) -> list[tuple[int, str]]:
-    return list(enumerate(lines[:_MANIFEST_LINES], 1))
-
-
-def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
-    names, kinds = _list(inputs, f"the inputs in {path}"), _list(types, f"the types in {path}")
-    if len(names) != len(kinds):
-        raise DemosError(f"{path} has {len(names)} inputs and {len(kinds)} types.")
-    return {str(name): str(kind) for name, kind in zip(names, kinds, strict=True)}
-
-
-def _list(value: Any, what: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise DemosError(f"{what[0].upper()}{what[1:]} are no list.")
-    return cast("list[Any]", value)
-
-
-def _object(text: str, where: str) -> dict[str, Any]:
-    value = _json(text, where)
-    if not isinstance(value, dict):
-        raise DemosError(f"{where} is no JSON object: restore it, or take it out.")
-    return cast("dict[str, Any]", value)
-
-
-def _json(text: str, where: str) -> Any:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise DemosError(
-            f"{where} is not whole ({error}): restore it, or take it out of the tub."
-        ) from error
-
-
-def _number(value: Any) -> float | None:
-    """A number that can be a time; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    return float(value) if abs(value) < _NO_TIME else None
-
-
-IMAGE: Final = "cam/image_array"
-MODE: Final = "user/mode"
-ANGLE: Final = "angle"
-THROTTLE: Final = "throttle"
-USER: Final = "user"
-"""The mode in which a person drives."""
-
-TUB_ACTIONS: Final = Layout(
-    (Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0))
-)
-"""What the numbers of an action mean."""
-
-_ANGLE_BY_PILOT: Final = "local_angle"
-_NUMBERS: Final = ("float", "int", "boolean")
-_UNIT_UNKNOWN: Final = "?"
-
-
-def state_layout(inputs: Mapping[str, str]) -> Layout | None:
-    """The state in a tub with these inputs, by type; None where there is none."""
-    names = [
-        name
-        for name, kind in inputs.items()
-        if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
-    ]
-    return Layout(tuple(Feature(name, _UNIT_UNKNOWN) for name in names)) if names else None
-
-
-def step_of(record: TubRecord, state: Layout | None) -> Step:
-    """A record as a step.
-
-    Raises:
-        DemosError: If it does not say how the car was driven.
-    """
-    user = _pair(record, "user")
-    if user is None:
-        raise DemosError(f"{record.where} has no user/angle and user/throttle.")
-    pilot = _pair(record, "pilot")
-    mode = record.fields.get(MODE, USER)
-    action = user
-    if mode != USER and pilot is not None:
-        action = (pilot[0], user[1]) if mode == _ANGLE_BY_PILOT else pilot
-    return Step(
-        action=action,
-        driver="person" if mode == USER else "policy",
-        wanted=pilot if mode == USER else None,
-        state=tuple(_sensed(record.fields.get(name)) for name in state.names) if state else (),
-        wall_ns=record.time_ns if record.is_unix else None,
-    )
-
-
-def _pair(record: TubRecord, who: str) -> tuple[float, float] | None:
-    """Angle and throttle; None where one of them is missing."""
-    values = [record.fields.get(f"{who}/{what}") for what in (ANGLE, THROTTLE)]
-    if None in values:
-        return None
-    for what, value in zip((ANGLE, THROTTLE), values, strict=True):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1.0:
-            raise DemosError(
-                f"{record.where}: {who}/{what} is {value!r}, and it is a number from -1 to 1: mend "
-                "or delete the record."
-            )
-    return float(values[0]), float(values[1])  # pyright: ignore[reportArgumentType]
-
-
-def _sensed(value: Any) -> float:
-    """A number that a sensor gave; NaN for none."""
-    try:
-        return float(value) if isinstance(value, bool | int | float) else math.nan
-    except OverflowError:  # A whole number of hundreds of digits.
-        return math.nan
-
-
-# A drive of a few records says nothing about its rate.
-_LONG_ENOUGH = 10
-
-
-def read_tub(folder: Path) -> Iterator[Recorded]:
-    """The episodes of a tub: its sessions, or its drives where it has no sessions.
+def read_tub(folder: Path) -> Iterator[ExchangeEpisode]:
+    """Yield the episodes of a tub: its sessions, or its drives where it has no sessions.
 
     Records that are marked as deleted are left out.
 
     Raises:
-        DemosError: If the tub is not whole; the sentence says what to do.
+        DemosError: If something is damaged, missing or contradictory.
     """
     newer = (folder / MANIFEST).is_file()
-    inputs, records = (read_v2 if newer else read_v1)(folder)
-    images = folder / IMAGES if newer else folder
+    inputs, records = (_read_v2 if newer else _read_v1)(folder)
+    images = folder / _IMAGES if newer else folder
     if not records:
         raise DemosError(f"The tub {folder} has no records that are not deleted.")
-    state = state_layout(inputs)
-    size = _size(images, records[0])
+    state = _state_layout(inputs)
+    pictures = Pictures()
+    if _IMAGE in records[0].fields:
+        pictures = Pictures.like(_picture(images, records[0]))
+    size = pictures.size
     drives = list(_drives(records, in_order=newer))
     rates = [rate_hz(_times_ns(drive)) for drive in drives]
-    long = [n for n, drive in enumerate(drives) if len(_times_ns(drive)) >= _LONG_ENOUGH]
-    one_rate(
+    long = [n for n, drive in enumerate(drives) if len(_times_ns(drive)) >= _MIN_RATE_RECORDS]
+    require_one_rate(
         [rates[n] for n in long],
         [f"The drive from {drives[n][0].where}" for n in long],
         "put the records of each rate into a tub of their own",
     )
-    pictures = Pictures(size)
     for drive, hz in zip(drives, rates, strict=True):
         session = drive[0].session
         header = EpisodeHeader(
-            action_layout=TUB_ACTIONS.to_json(),
+            action_layout=_ACTIONS.to_json(),
             state_layout="" if state is None else state.to_json(),
             image_size=size,
             control_hz=hz,
@@ -308,34 +149,225 @@ def read_tub(folder: Path) -> Iterator[Recorded]:
             source="tub",
             notes={"session": session} if session else {},
         )
-        yield Recorded(
-            header=header, rows=_rows(images, drive, state, pictures), name=drive[0].where
+        rows = _rows(images, drive, state, pictures)
+        yield ExchangeEpisode(header=header, rows=rows, name=drive[0].where)
+
+
+def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
+    """Write episodes into an existing folder, as the sessions of one tub of version 2.
+
+    Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
+    without a time get one from the rate of the episode.
+
+    Args:
+        episodes: The episodes.
+        folder: Where to write.
+
+    Returns:
+        Number of steps written.
+
+    Raises:
+        DemosError: If the actions are not steering and throttle, or a step has no picture.
+    """
+    states = [_state_names(episode) for episode in episodes]
+    if any(state != states[0] for state in states):
+        raise DemosError("The episodes have different states: export each kind to its own tub.")
+    (folder / _IMAGES).mkdir()
+    records: list[dict[str, Any]] = []
+    sessions: list[str] = []
+    for number, episode in enumerate(episodes):
+        sessions.append(f"{_created(episode.header):%y-%m-%d}_{number}")
+        for step, jpeg in kept_steps(episode.rows):
+            if jpeg is None:
+                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
+            name = f"{len(records)}_cam_image_array_.jpg"
+            (folder / _IMAGES / name).write_bytes(jpeg)
+            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
+            records.append(
+                fields
+                | {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
+                | {"_timestamp_ms": _time_ms(step, episode.header, len(records))}
+            )
+    created_s = _created(episodes[0].header).timestamp()
+    paths = _write_catalogs(folder, records, created_s)
+    inputs = {_IMAGE: "image_array", "user/angle": "float", "user/throttle": "float", _MODE: "str"}
+    inputs |= {"pilot/angle": "float", "pilot/throttle": "float"}
+    inputs |= dict.fromkeys(states[0], "float")
+    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    lines: tuple[object, ...] = (
+        list(inputs),
+        list(inputs.values()),
+        {},
+        {"created_at": created_s, "sessions": named},
+        {
+            "paths": paths,
+            "current_index": len(records),
+            "max_len": _CATALOG_LENGTH,
+            "deleted_indexes": [],
+        },
+    )
+    _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
+    return len(records)
+
+
+def _read_v2(folder: Path) -> tuple[dict[str, str], list[_Record]]:
+    """Return the inputs with their types, and the records that are not deleted."""
+    path = folder / MANIFEST
+    lines = read_text(path).splitlines()
+    if len(lines) < _MANIFEST_LINES:
+        raise DemosError(
+            f"{path} has {len(lines)} lines, but the manifest of a tub has {_MANIFEST_LINES}."
         )
+    inputs, types, *_ = (
+        parse_json(line, f"{path}, line {n}") for n, line in enumerate(lines[:4], 1)
+    )
+    catalogs = parse_json_object(lines[4], f"{path}, line {_MANIFEST_LINES}")
+    deleted = set(_list(catalogs.get("deleted_indexes", []), f"deleted_indexes in {path}"))
+    records: list[_Record] = []
+    index = 0
+    for name in _list(catalogs.get("paths"), f"paths in {path}"):
+        catalog = resolve_file(folder, str(name), str(path))
+        for number, line in enumerate(read_text(catalog).splitlines(), 1):
+            if not line.strip():
+                continue
+            where = f"{catalog}, line {number}"
+            if index not in deleted:
+                records.append(_record_v2(parse_json_object(line, where), where))
+            index += 1
+    return _typed(inputs, types, path), records
+
+
+def _record_v2(fields: dict[str, Any], where: str) -> _Record:
+    time_ms = _time(fields.get("_timestamp_ms"))
+    time_ns = None if time_ms is None else round(time_ms) * _NS_PER_MS
+    session = fields.get("_session_id")
+    return _Record(fields, where, time_ns, session="" if session is None else str(session))
+
+
+def _read_v1(folder: Path) -> tuple[dict[str, str], list[_Record]]:
+    """Return the inputs with their types, and the records."""
+    try:
+        found = [(m, path) for path in folder.iterdir() if (m := _RECORD_NAME.fullmatch(path.name))]
+    except OSError as error:
+        raise cannot_read(folder, error) from error
+    meta: dict[str, Any] = {}
+    if (folder / _META).is_file():
+        meta = parse_json_object(read_text(folder / _META), str(folder / _META))
+    start = _time(meta.get("start"))
+    start_ns = None if start is None else round(start * _NS_PER_S)
+    records: list[_Record] = []
+    for _, path in sorted(found, key=lambda pair: int(pair[0][1])):
+        where = str(path)
+        fields = parse_json_object(read_text(resolve_file(folder, path.name, where)), where)
+        time_ms = _time(fields.get("milliseconds"))
+        time_ns = None if time_ms is None else round(time_ms * _NS_PER_MS) + (start_ns or 0)
+        records.append(_Record(fields, where, time_ns, is_unix=start_ns is not None))
+    return _typed(meta.get("inputs", []), meta.get("types", []), folder / _META), records
+
+
+def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
+    names, kinds = _list(inputs, f"inputs in {path}"), _list(types, f"types in {path}")
+    if len(names) != len(kinds):
+        raise DemosError(f"{path} has {len(names)} inputs, but {len(kinds)} types.")
+    return {str(name): str(kind) for name, kind in zip(names, kinds, strict=True)}
+
+
+def _list(value: Any, what: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise DemosError(f"The {what} must be a list.")
+    return cast("list[Any]", value)
+
+
+def _time(value: Any) -> float | None:
+    """Return a number that can be a time; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if abs(value) < _MAX_TIME else None
+
+
+def _state_layout(inputs: Mapping[str, str]) -> Layout | None:
+    """Return the layout of the state in a tub with these inputs, by type; None without a state."""
+    names = [
+        name
+        for name, kind in inputs.items()
+        if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
+    ]
+    return Layout(tuple(Feature(name, _UNIT_UNKNOWN) for name in names)) if names else None
 
 
 def _rows(
-    images: Path, drive: Sequence[TubRecord], state: Layout | None, pictures: Pictures
+    images: Path, drive: Sequence[_Record], state: Layout | None, pictures: Pictures
 ) -> Iterator[ExchangeStep]:
-    pictured = IMAGE in drive[0].fields
+    pictured = _IMAGE in drive[0].fields
     for record in drive:
-        name = record.fields.get(IMAGE)
-        if (name is not None) != pictured:
+        if (record.fields.get(_IMAGE) is not None) != pictured:
             raise DemosError(
-                f"{record.where} has {'no' if pictured else 'a'} picture ({IMAGE}), and "
+                f"{record.where} has {'no' if pictured else 'a'} picture ({_IMAGE}), but "
                 f"{drive[0].where} has {'one' if pictured else 'none'}: delete the records "
                 "without one."
             )
-        jpeg = pictures.read(inside(images, str(name), record.where)) if pictured else None
-        yield ExchangeStep(step=step_of(record, state), jpeg=jpeg)
+        jpeg = pictures.read(_picture(images, record)) if pictured else None
+        yield ExchangeStep(step=_step(record, state), jpeg=jpeg)
 
 
-def _drives(records: Sequence[TubRecord], *, in_order: bool) -> Iterator[Sequence[TubRecord]]:
-    """The records of each episode.
+def _picture(images: Path, record: _Record) -> Path:
+    return resolve_file(images, str(record.fields[_IMAGE]), record.where)
+
+
+def _step(record: _Record, state: Layout | None) -> Step:
+    """Return a record as a step.
+
+    Raises:
+        DemosError: If it lacks the user's action, or a value is out of range.
+    """
+    user = _pair(record, "user")
+    if user is None:
+        raise DemosError(f"{record.where} has no user/angle and user/throttle.")
+    pilot = _pair(record, "pilot")
+    mode = record.fields.get(_MODE, _PERSON_DRIVES)
+    action = user
+    if mode != _PERSON_DRIVES and pilot is not None:
+        action = (pilot[0], user[1]) if mode == _POLICY_STEERS else pilot
+    return Step(
+        action=action,
+        driver="person" if mode == _PERSON_DRIVES else "policy",
+        wanted=pilot if mode == _PERSON_DRIVES else None,
+        state=tuple(_sensed(record.fields.get(name)) for name in state.names) if state else (),
+        wall_ns=record.time_ns if record.is_unix else None,
+    )
+
+
+def _pair(record: _Record, actor: str) -> tuple[float, float] | None:
+    """Return the angle and the throttle of "user" or "pilot"; None if either is missing."""
+    values: list[float] = []
+    for axis in _AXES:
+        value = record.fields.get(f"{actor}/{axis}")
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1.0:
+            raise DemosError(
+                f"{record.where}: {actor}/{axis} is {value!r}, but must be a number from -1 to 1: "
+                "correct or delete the record."
+            )
+        values.append(float(value))
+    return values[0], values[1]
+
+
+def _sensed(value: Any) -> float:
+    """Return a sensor value; NaN for anything that is not a number."""
+    try:
+        return float(value) if isinstance(value, bool | int | float) else math.nan
+    except OverflowError:  # An integer of hundreds of digits.
+        return math.nan
+
+
+def _drives(records: Sequence[_Record], *, in_order: bool) -> Iterator[Sequence[_Record]]:
+    """Yield the records of each episode.
 
     Args:
-        records: All of them, in order.
-        in_order: Whether the time must not run backwards. The milliseconds of version 1 begin anew
-            with each start of the car, which is a new drive then.
+        records: All records, in order.
+        in_order: Whether time must not run backwards. The milliseconds of version 1 restart at
+            each start of the car, which begins a new drive then.
     """
     for session, group in groupby(records, key=lambda record: record.session):
         drive = list(group)
@@ -355,101 +387,34 @@ def _drives(records: Sequence[TubRecord], *, in_order: bool) -> Iterator[Sequenc
             require_order(
                 _times_ns(drive[part]),
                 [record.where for record in drive[part]],
-                "put the records after that into a tub of their own",
+                "move the records after that to a tub of their own",
             )
             yield drive[part]
 
 
-def _times_ns(drive: Sequence[TubRecord]) -> list[int]:
-    """When each record was made, ns; nothing if one of them does not say."""
+def _times_ns(drive: Sequence[_Record]) -> list[int]:
+    """Return the time of each record, ns; an empty list if one is unknown."""
     times = [record.time_ns for record in drive if record.time_ns is not None]
     return times if len(times) == len(drive) else []
 
 
-def _size(images: Path, record: TubRecord) -> tuple[int, int] | None:
-    """Width and height of the first picture; None where there is none."""
-    if IMAGE not in record.fields:
-        return None
-    path = inside(images, str(record.fields[IMAGE]), record.where)
-    try:
-        return size_of(path.read_bytes(), str(path))
-    except OSError as error:
-        raise cannot_read(path, error) from error
-
-
-_CATALOG_LENGTH: Final = 1000  # Records, as Donkeycar has it.
-_PILOT: Final = "local"
-_TUB_OUT_NS_PER_MS: Final = 1_000_000
-_MS_PER_S: Final = 1000.0
-
-
-def write_tub(episodes: Sequence[Recorded], folder: Path) -> int:
-    """Write episodes into a folder that is there, as the sessions of one tub.
-
-    What people, experts and programs did is the user's in a tub, and what policies did the
-    pilot's. Steps whose time nobody knows get times from the rate of the episode.
-
-    Returns:
-        How many steps were written.
+def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
+    """Return the names of the values of the state.
 
     Raises:
-        DemosError: If an episode has other actions than steering and throttle, or a step has no
-            picture.
+        DemosError: If a tub cannot hold the actions or the state of the episode.
     """
-    states = [_require(episode) for episode in episodes]
-    if any(state != states[0] for state in states):
-        raise DemosError("The episodes have different states: export each kind to its own tub.")
-    (folder / IMAGES).mkdir()
-    records: list[dict[str, Any]] = []
-    sessions: list[str] = []
-    for number, episode in enumerate(episodes):
-        sessions.append(f"{_created(episode.header):%y-%m-%d}_{number}")
-        for step, jpeg in seen(episode.rows):
-            if jpeg is None:
-                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
-            name = f"{len(records)}_cam_image_array_.jpg"
-            (folder / IMAGES / name).write_bytes(jpeg)
-            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
-            records.append(
-                fields
-                | {IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
-                | {"_timestamp_ms": _time_ms(step, episode.header, len(records))}
-            )
-    created_s = _created(episodes[0].header).timestamp()
-    paths = _write_catalogs(folder, records, created_s)
-    inputs = {IMAGE: "image_array", "user/angle": "float", "user/throttle": "float", MODE: "str"}
-    inputs |= {"pilot/angle": "float", "pilot/throttle": "float"}
-    inputs |= dict.fromkeys(states[0], "float")
-    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
-    lines: Iterable[object] = (
-        list(inputs),
-        list(inputs.values()),
-        {},
-        {"created_at": created_s, "sessions": named},
-        {
-            "paths": paths,
-            "current_index": len(records),
-            "max_len": _CATALOG_LENGTH,
-            "deleted_indexes": [],
-        },
-    )
-    _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
-    return len(records)
-
-
-def _require(episode: Recorded) -> tuple[str, ...]:
-    """The names of the state of an episode that a tub can hold."""
     names = Layout.from_json(episode.header.action_layout).names
-    if names != TUB_ACTIONS.names:
+    if names != _ACTIONS.names:
         raise DemosError(
-            f"The actions of {episode.name} are {', '.join(names)}, and those of a tub "
-            f"{', '.join(TUB_ACTIONS.names)}: export it to minari or csv."
+            f"The actions of {episode.name} are {', '.join(names)}, but those of a tub are "
+            f"{', '.join(_ACTIONS.names)}: export it to minari or csv."
         )
     if not episode.header.state_layout:
         return ()
     state = Layout.from_json(episode.header.state_layout)
     if state.size != len(state):
-        raise DemosError(f"The state of {episode.name} has blocks of numbers: export it to csv.")
+        raise DemosError(f"The state of {episode.name} has array features: export it to csv.")
     return state.names
 
 
@@ -457,29 +422,26 @@ def _fields(step: Step, state: Sequence[str], where: str) -> dict[str, Any]:
     by_policy = step.driver == "policy"
     if any(abs(value) > 1.0 for value in step.action):
         raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
-    fields: dict[str, Any] = {MODE: _PILOT if by_policy else USER}
-    # A tub always says what the user held; while a policy drives, that is nothing.
-    fields |= _tub_out_pair("user", (0.0, 0.0) if by_policy else step.action)
+    fields: dict[str, Any] = {_MODE: _POLICY_DRIVES if by_policy else _PERSON_DRIVES}
+    # A tub always contains the user's action; while a policy drives, it is 0.
+    user = (0.0, 0.0) if by_policy else step.action
+    fields |= {f"user/{axis}": value for axis, value in zip(_AXES, user, strict=True)}
     pilot = step.action if by_policy else step.wanted
     if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
-        fields |= _tub_out_pair("pilot", pilot)
+        fields |= {f"pilot/{axis}": value for axis, value in zip(_AXES, pilot, strict=True)}
     known = zip(state, step.state, strict=True)
     return fields | {name: value for name, value in known if math.isfinite(value)}
 
 
-def _tub_out_pair(who: str, values: Sequence[float]) -> dict[str, float]:
-    return {f"{who}/angle": values[0], f"{who}/throttle": values[1]}
-
-
 def _time_ms(step: Step, header: EpisodeHeader, number: int) -> int:
-    """Unix time of a step, ms."""
+    """Return the Unix time of a step, ms."""
     if step.wall_ns is not None:
-        return step.wall_ns // _TUB_OUT_NS_PER_MS
+        return step.wall_ns // _NS_PER_MS
     return round((_created(header).timestamp() + number / header.control_hz) * _MS_PER_S)
 
 
 def _created(header: EpisodeHeader) -> datetime:
-    """When an episode began; the beginning of Unix time where it does not say."""
+    """Return when an episode began; the Unix epoch if unknown."""
     try:
         return datetime.fromisoformat(header.created)
     except ValueError:
@@ -487,7 +449,7 @@ def _created(header: EpisodeHeader) -> datetime:
 
 
 def _write_catalogs(folder: Path, records: Sequence[dict[str, Any]], created_s: float) -> list[str]:
-    """Write the records, and beside each catalog what Donkeycar keeps of its lines."""
+    """Write the catalogs, each with its manifest; return the names of the catalogs."""
     paths: list[str] = []
     for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
         part = records[start : start + _CATALOG_LENGTH]

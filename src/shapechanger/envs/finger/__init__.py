@@ -1,4 +1,4 @@
-"""The finger as Gymnasium envs."""
+"""Gymnasium envs of the simulated finger: reach a point, or follow a path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all envs of the finger share: the plant, the spaces, and pictures."""
+"""Base class of the finger envs: the plant, the spaces and rendering."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TEN
 from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.gap import Gap, resolve_gap
-from shapechanger.envs.finger.identification import identified
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
@@ -35,7 +34,7 @@ from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
-__all__ = ["FingerEnv", "numbers", "posture_of"]
+__all__ = ["FingerEnv", "as_numbers", "check_posture"]
 
 _MODES: Final = ("human", "rgb_array", "depth_array")
 # From the thumb's side, with the workspace and the end of the hand in view.
@@ -49,34 +48,32 @@ _PICTURE: Final = 480
 
 
 class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
-    """An index finger that seven tendons pull.
-
-    What the fingertip should do belongs to the classes derived from this one.
+    """An index finger moved by seven tendons; derived classes define the task.
 
     Args:
         actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
-        parameters: Of the finger, as `FingerParameters`, their JSON, or some by name; the nominal
-            finger if not given.
-        gap: Name of the distribution, or the distribution, that the finger is drawn from in place
-            of `parameters`; see `shapechanger.envs.finger.gap`.
-        finger_seed: Which finger of the gap this is; None draws another at each reset, as domain
-            randomisation does.
+        parameters: Parameters of the finger, as `FingerParameters`, their JSON, or some by name; by
+            default the nominal finger.
+        gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
+            `shapechanger.envs.finger.gap`.
+        finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
+            (domain randomisation).
         reward: Weights that replace the default ones, by name.
         render_mode: "human", "rgb_array" or "depth_array".
-        width: Of frames, pixels.
-        height: Of frames, pixels.
+        width: Width of frames, pixels.
+        height: Height of frames, pixels.
 
     Attributes:
-        plant: The finger itself, for whoever may know the truth.
-        observation_layout: What each number of the observation means.
-        action_layout: What each number of the action means.
+        plant: The simulated finger, with its ground truth.
+        observation_layout: Name, unit and range of each number of the observation.
+        action_layout: Name, unit and range of each number of the action.
 
     Raises:
         UnknownName: If there is no such mode of action, gap, parameter, weight or render mode.
         FingerError: If the parameters contradict themselves, or come with a gap.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own is no ClassVar.
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
         "render_modes": [*_MODES],
         "render_fps": round(1.0 / CONTROL_DT),
     }
@@ -104,9 +101,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         elif render_mode is not None:
             choose_gl()
         if gap is not None and parameters is not None:
-            raise FingerError("A finger has its own parameters or is drawn from a gap: give one.")
+            raise FingerError("Give either parameters or a gap to draw them from, not both.")
         if gap is None and finger_seed is not None:
-            raise FingerError("finger_seed says which finger of a gap it is: give a gap, too.")
+            raise FingerError("finger_seed selects a finger of a gap, so it needs a gap.")
         self.render_mode = render_mode
         self.width, self.height = width, height
         self._actions = actions
@@ -116,9 +113,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self._figure: FingerFigure | None = None
         self._renderer: Renderer | None = None
         if self._gap is None:
-            self._have(_parameters(parameters))
+            self._use(_parameters(parameters))
         else:
-            self._have(self._gap.draw(np.random.default_rng(finger_seed or 0)))
+            self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
         self._senses: FingerSenses | None = None
         self.action_layout = Layout(
             tuple(
@@ -128,34 +125,34 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (len(TENDONS),), np.float32)
 
-    def _have(self, parameters: FingerParameters) -> None:
-        """Be another finger from here on."""
+    def _use(self, parameters: FingerParameters) -> None:
+        """Simulate a finger with these parameters from here on."""
         self.parameters = parameters
         self.drive = drive_of(self._actions, NOMINAL)
         self.plant = FingerPlant(parameters, self.drive, CONTROL_DT)
         self._most = np.array(parameters.most_tension)
-        self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until it is put at a start.
+        self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until the first reset.
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
-        """Draw the finger if it is drawn anew, and put it at a start."""
+        """Draw the finger if each episode has another, and put it at a start."""
         known = self._options
         for name in options or {}:
             if name not in known:
                 raise UnknownName("option of reset", name, known)
         if self._is_drawn_anew and self._gap is not None:
-            self._have(self._gap.draw(self.np_random))
+            self._use(self._gap.draw(self.np_random))
         given = (options or {}).get("posture")
-        angles = draw_start(self.np_random) if given is None else posture_of(given)
+        angles = draw_start(self.np_random) if given is None else check_posture(given)
         self._senses = self.plant.place(angles, self.np_random)
         return self._senses
 
     _options: tuple[str, ...] = ("posture",)
 
     def _act(self, action: Any) -> FingerSenses:
-        """Let an action act.
+        """Apply an action, and return the measurements after it.
 
         Raises:
-            BadAction: If it is none; nothing has moved then.
+            BadAction: If it has another shape or is not finite; nothing has moved then.
             ResetNeeded: If `reset` was never called.
         """
         if self._senses is None:
@@ -165,13 +162,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return self._senses
 
     def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
-        """How far the fingertip is from where it should be, m, and the terms of the reward."""
+        """Return the distance of the fingertip from its target, m, and the terms of the reward."""
         distance = float(np.linalg.norm(self.plant.fingertip - place))
         tension = np.abs(self.plant.data.actuator_force) / self._most
         return distance, self._reward.terms(distance, float(np.mean(tension**2)), CONTROL_DT)
 
     def render(self) -> Any:
-        """A frame as `render_mode` asks; None without one.
+        """Return a frame of `render_mode`; None without one.
 
         Raises:
             RenderError: If nothing can be drawn here.
@@ -186,7 +183,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return self._renderer.render(self.render_mode)
 
     def _shown(self) -> FingerFigure:
-        """The finger as it is now, to be drawn; what is simulated has nothing to be seen."""
+        """Return a figure of the present finger; the simulated model has no visible geoms."""
         if self._figure is None:
             self._figure = FingerFigure()
         data = self.plant.data
@@ -195,13 +192,12 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return self._figure
 
     def close(self) -> None:
-        """Free what draws."""
+        """Free the renderer."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
 
-    # The spec is what `gym.make`, Minari and a vector env build the env from again; it is written
-    # down as JSON.
+    # `gym.make`, Minari and vector envs build the env again from its spec, which is stored as JSON.
 
     @property
     def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -216,18 +212,18 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             if isinstance(kwargs.get(name), msgspec.Struct):
                 kwargs[name] = msgspec.to_builtins(kwargs[name])
 
-    # What a transfer study asks of an env, whichever kind it is.
+    # Interface of transfer studies; see `shapechanger.transfer`.
 
     @property
     def reach(self) -> float:
-        """How far from the middle of the finger its farthest point is, m."""
+        """Distance from the middle of the finger to its farthest point, m."""
         figure = self._shown()
         return body_reach(figure.model, figure.data.qpos)
 
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """The finger as it is, shape (height, width, 3).
+        """Return an image of the present finger, shape (height, width, 3).
 
         Args:
             width: Width in pixels.
@@ -250,16 +246,19 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return {"gap": "wide"}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
-        """Arguments with which an env of the finger has this one, as ten seconds of motion show it.
+        """Identify this finger, and return env arguments that reproduce it.
 
         Args:
-            seed: Of the motions.
+            seed: Seed of the motions, which take ten seconds.
 
         Raises:
-            FingerError: If the motions are not enough, or observations are no list of numbers.
-            MissingExtra: If `mujoco.sysid` is not there.
+            FingerError: If the motions do not suffice, or observations are not a vector.
+            MissingExtra: If `mujoco.sysid` is not installed.
         """
-        return {"parameters": msgspec.to_builtins(identified(self, self._actions, seed))}
+        # An optimiser, which an env that only steps does not need.
+        from shapechanger.envs.finger.identification import identify_env
+
+        return {"parameters": msgspec.to_builtins(identify_env(self, self._actions, seed))}
 
     def _sense_features(self) -> list[Feature]:
         return features_of_senses(
@@ -274,9 +273,9 @@ def _parameters(value: FingerParameters | Mapping[str, Any] | str | None) -> Fin
         return value
     if isinstance(value, str):
         return FingerParameters.from_json(value)
-    given: Any = value  # What a type checker knows, a notebook may not.
+    given: Any = value  # May be anything where nothing checks types.
     if not isinstance(given, Mapping):
-        raise FingerError(f"Parameters of a finger are numbers by name or JSON, got {given!r}.")
+        raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")
     known = FingerParameters.__struct_fields__
     for name in value:
         if name not in known:
@@ -284,24 +283,24 @@ def _parameters(value: FingerParameters | Mapping[str, Any] | str | None) -> Fin
     return NOMINAL.replace(**value)
 
 
-def posture_of(value: Any) -> NDArray[np.float64]:
-    """The posture that a user means, rad, (4,).
+def check_posture(value: Any) -> NDArray[np.float64]:
+    """Return a posture as an array, rad, (4,).
 
     Raises:
-        FingerError: If it is none, or beyond the ranges of the joints.
+        FingerError: If it is not four angles within the ranges of the joints.
     """
-    angles = numbers(value)
+    angles = as_numbers(value)
     low, high = JOINT_RANGE.T
     if angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
         raise FingerError(
-            f"A posture is four angles in rad, {', '.join(JOINTS)}, within "
+            f"A posture must be four angles in rad, {', '.join(JOINTS)}, within "
             f"{_rounded(low)} and {_rounded(high)}; got {value}."
         )
     return angles
 
 
-def numbers(value: Any) -> NDArray[np.float64]:
-    """What a user gives as an array; an empty one if it is none."""
+def as_numbers(value: Any) -> NDArray[np.float64]:
+    """Return a value as an array of floats; an empty one if it cannot be converted."""
     try:
         return np.asarray(value, np.float64)
     except (TypeError, ValueError):

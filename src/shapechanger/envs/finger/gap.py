@@ -1,4 +1,4 @@
-"""What a real finger may have and the nominal one has not, as distributions to draw from."""
+"""Distributions of real fingers around the nominal one (the reality gap)."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from shapechanger.errors import FingerError, UnknownName
 
 __all__ = ["GAPS", "Gap", "geared_around", "resolve_gap", "with_gears"]
 
-# How often draws whose tendons cannot balance one another are thrown away before giving up. With
-# arms off by 25 % about one in two hundred is.
+# Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
+# two hundred with arm errors of 25 %.
 _TRIES: Final = 1000
 
-# Whose logarithms are drawn.
+# Parameters whose logarithm is drawn.
 _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
 
-# What identified arms and stretch, and identified joints, are off by: `benchmarks.finger_identify`.
+# Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
 
@@ -32,28 +32,28 @@ Range = tuple[float, float]
 
 
 class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Ranges that the parameters of a finger are drawn from, uniformly where nothing else is said.
+    """Ranges that the parameters of a finger are drawn from, uniformly unless noted otherwise.
 
     Attributes:
-        arm_error: Relative error of each moment arm, at most this on either side.
-        joint_factor: Of the stiffness, damping and friction of each joint; their logarithm is drawn
-            uniformly.
-        strength: Of the largest tensions.
+        arm_error: Largest relative error of each moment arm, in either direction.
+        joint_factor: Factor of the stiffness, damping and friction of each joint, drawn
+            log-uniformly.
+        strength: Factor of the largest tensions.
         tendon_friction: N.
-        tendon_stiffness: N/m; its logarithm is drawn uniformly.
+        tendon_stiffness: N/m, drawn log-uniformly.
         backlash: m.
-        motor_kg: kg; its logarithm is drawn uniformly.
+        motor_kg: kg, drawn log-uniformly.
         motor_lag: s.
         command_delay: s.
         joint_noise: Standard deviation of measured angles, rad.
-        tension_noise: The same of tensions, N.
+        tension_noise: Standard deviation of measured tensions, N.
         tendon_damping: N·s/m.
         least_tension: N.
-        around: The finger that errors and factors are of.
+        around: The finger that errors and factors refer to.
 
     Raises:
-        FingerError: If a range has its ends swapped, is not finite, or begins at 0 where logarithms
-            are drawn; or an error is not from 0 to below 1.
+        FingerError: If a range is empty, not finite or negative, begins at 0 where logarithms are
+            drawn, or `arm_error` is not in [0, 1).
     """
 
     arm_error: float
@@ -83,10 +83,10 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise FingerError(f"{name}: the range {value} must begin above zero.")
 
     def draw(self, rng: np.random.Generator) -> FingerParameters:
-        """A finger; one whose tendons could not hold it is drawn again.
+        """Draw a finger whose tendons can hold it.
 
         Raises:
-            FingerError: If hardly any could.
+            FingerError: If hardly any finger of the gap qualifies.
         """
         arms = self._arms(rng)
 
@@ -133,9 +133,9 @@ _DEGREE: Final = math.radians(1.0)
 
 GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     {
-        # What a tendon-driven finger on a bench is like. The arms, delay, noise and friction are
-        # those that the study of the gap is asked for; the others are chosen: cords of some
-        # decimetres give 5 to 20 N/mm, servos lag by tens of milliseconds.
+        # A tendon-driven finger on a bench. Arms, delay, noise and friction are those of the study
+        # of the gap; the others are chosen: cords of some decimetres have 5 to 20 N/mm, servos lag
+        # by tens of milliseconds.
         "real-like": Gap(
             arm_error=0.2,
             joint_factor=(0.7, 1.4),
@@ -149,8 +149,8 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
             joint_noise=(_DEGREE, _DEGREE),
             tension_noise=(0.2, 0.5),
         ),
-        # What a learner sees that is to cope with all of them: from hardly anything to somewhat
-        # more than the above.
+        # For policies that must cope with all of them: from almost no gap to slightly more than
+        # the one above.
         "wide": Gap(
             arm_error=0.25,
             joint_factor=(0.6, 1.6),
@@ -164,13 +164,12 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
             joint_noise=(0.0, 1.5 * _DEGREE),
             tension_noise=(0.0, 0.6),
         ),
-        # The same for a finger whose servos have gears and spools of a centimetre, as the profile
-        # "finger" has: what turns weighs 1.4 kg at the tendon, drags with 4 N·s/m and rubs with
-        # 0.5 N (the motor's numbers, `shapechanger.twin.servos.models`, by the spool's radius); the
-        # force is there within a millisecond, but a rig changes it by no more than all of it in
-        # 50 ms, which a lag stands for, and what it senses is late as well: policies did there as
-        # they do here with 40 to 60 ms. They pull 15 of 25 N at most, and 1 N at least.
-        # How far the ranges reach around these is chosen.
+        # The same for geared servos with spools of 1 cm, as in the profile "finger": the rotors
+        # have 1.4 kg, 4 N·s/m of damping and 0.5 N of friction at the tendon (the motor's numbers,
+        # `shapechanger.twin.servos.motor`, divided by the spool's radius). The motor's force takes
+        # 1 ms, but a rig needs 50 ms to change it over its whole range, and measurements are late:
+        # a lag represents both, as policies did there as they do here with 40 to 60 ms. Tensions
+        # are 1 to 15 of 25 N. The width of the ranges around these numbers is chosen.
         "geared": Gap(
             arm_error=0.25,
             joint_factor=(0.6, 1.6),
@@ -192,9 +191,9 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
 
 
 def with_gears(parameters: FingerParameters) -> FingerParameters:
-    """The same finger on servos with gears: what turns is as heavy as the gap "geared" has it.
+    """Return the same finger on geared servos.
 
-    It also drags and rubs as much, and the force comes as soon; each is the middle of its range.
+    Mass, damping, friction and lag of the motors are the middle of their ranges in "geared".
     """
     geared = GAPS["geared"]
     return parameters.replace(
@@ -206,13 +205,13 @@ def with_gears(parameters: FingerParameters) -> FingerParameters:
 
 
 def geared_around(found: FingerParameters) -> Gap:
-    """What a finger on servos with gears may be, after it was identified.
+    """Return the gap of a finger on geared servos after identification.
 
-    Arms, joints and stretch are near those that were found; what a log hardly tells of motors with
-    gears is as wide as in the gap "geared".
+    Arms, joints and stretch are close to the identified ones; parameters of the motors, which a log
+    hardly reveals, keep their ranges in "geared".
 
     Args:
-        found: What was identified.
+        found: The identified parameters.
     """
     stiffness = found.tendon_stiffness or GAPS["geared"].tendon_stiffness[1]
     return msgspec.structs.replace(
@@ -229,11 +228,11 @@ def geared_around(found: FingerParameters) -> Gap:
 
 
 def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
-    """The gap that a user means: its name, its ranges, or a gap.
+    """Return a gap, given itself, its name or its ranges.
 
     Raises:
-        UnknownName: If it is the name of none.
-        FingerError: If the ranges are none.
+        UnknownName: If there is no gap of this name.
+        FingerError: If the ranges are malformed.
     """
     if isinstance(value, Gap):
         return value
@@ -245,4 +244,4 @@ def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
         return msgspec.convert(value, Gap)
     except msgspec.ValidationError as error:
         said = str(error).rstrip(".")
-        raise FingerError(f"This is no gap between fingers: {said}.") from error
+        raise FingerError(f"The ranges of a gap are malformed: {said}.") from error

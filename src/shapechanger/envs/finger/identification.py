@@ -1,8 +1,8 @@
-"""What a finger is like, found out by moving it."""
+"""Identify a finger by moving all its joints and recording a log."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import gymnasium as gym
 import mujoco
@@ -10,74 +10,55 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, build_finger, drive_of
+from shapechanger.bodies.finger import (
+    JOINTS,
+    NOMINAL,
+    TENDONS,
+    FingerParameters,
+    build_finger,
+    drive_of,
+)
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, MOMENT_ARMS, MOST_TENSION_N
 from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import joint_torque
 from shapechanger.errors import FingerError, LayoutError
-from shapechanger.identify import FingerLog
+from shapechanger.identify import FingerLog, identify
 from shapechanger.layout import Layout
 
-if TYPE_CHECKING:
-    import gymnasium as gym
+__all__ = ["FingerBabble", "identify_env", "record_babble"]
 
-    from shapechanger.bodies.finger import FingerParameters
-
-__all__ = ["FingerBabble", "identified", "record_babble"]
-
+# Duration of a recording, s.
 _SECONDS: Final = 10.0
-
-
-def identified(
-    env: gym.Env[Any, Any], actions: str, seed: int, known: FingerParameters | None = None
-) -> FingerParameters:
-    """Let a finger move all its joints for ten seconds, and identify it.
-
-    Args:
-        env: Of the finger; without a longest episode.
-        actions: What its actions command.
-        seed: Of the motions.
-        known: A finger whose motors are those of this one; None where nothing is known of them.
-
-    Raises:
-        FingerError: If the motions are not enough, or observations are no list of numbers.
-        MissingExtra: If `mujoco.sysid` is not there.
-    """
-    # An optimiser, which an env that only steps does not need.
-    from shapechanger.identify import identify
-
-    return identify(record_babble(env, _SECONDS, seed, actions), known=known).parameters
-
-
-# Hz. Ten seconds hold several turns of each; faster ones would be smeared by delay and lag.
+# Frequencies of the motions, Hz. Ten seconds contain several periods of each; delay and lag would
+# blur faster ones.
 _SLOWEST_HZ, _FASTEST_HZ = 0.15, 0.9
 _WAVES: Final = 4
-# More than 1, so that the ends of a range are met more often than its middle: what a joint's arms
-# are shows where it is far from there.
+# Above 1, so that signals are near the ends of a range more often than in its middle: moment arms
+# show most where a joint is far from the middle.
 _SPREAD: Final = 1.5
-# Of its range, how far from either end a joint is led; it may be carried farther.
+# Distance of the commanded posture from either end of a joint's range, as a fraction of it.
 _MARGIN: Final = 0.05
-# N. What each tendon is pulled with at least, which varies with the time: a tendon that hangs slack
-# tells nothing about its arms, and one whose tension never changes nothing about how it gives.
+# Range of the lowest tension, which varies over time, N: a slack tendon reveals nothing about its
+# arms, and a constant tension nothing about its stretch.
 _LEAST_N: Final = (2.0, 4.5)
-# s. A joint that is off is brought back so slowly that even a late command does not make it swing.
+# Time constant of the correction of joint errors, s: long enough not to oscillate with delay.
 _BACK_S: Final = 0.25
-# rad. A joint that hangs on its limit is not pulled back harder than this.
+# Largest joint error that is corrected, rad, as for a joint that is stuck at its limit.
 _MOST_OFF: Final = 0.4
 
 
 class FingerBabble:
-    """Leads the joints along smooth random motions, each on its own, under changing tension.
+    """Controller that moves the joints along independent smooth random motions.
 
-    It takes the finger for the nominal one and makes up for what it is not by the angles that it
-    sees. What it needs is in the layout, so that it moves a finger on a bench as well.
+    It assumes the nominal finger and corrects errors by the measured angles, under tensions that
+    vary over time. It finds the angles by the layout, so it also moves a finger on a bench.
 
     Args:
-        layout: Of the observations, with a feature `JOINT/angle` for each joint.
+        layout: Layout of the observations, with a feature `JOINT/angle` for each joint.
         actions: What an action commands.
-        seed: Of the motions.
-        control_dt: How long an action acts, s.
+        seed: Seed of the motions.
+        control_dt: Duration of an action, s.
 
     Raises:
         UnknownName: If the layout lacks an angle, or there is no such mode of action.
@@ -105,7 +86,7 @@ class FingerBabble:
         self._steps = 0
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
-        """The action, (7,), for an observation, (n,); each call is a step later."""
+        """Return the action, (7,), for an observation, (n,), and advance by one step."""
         angles = np.asarray(observation, np.float64)[self._angles]
         t, dt = self._steps * self._dt, self._dt
         self._steps += 1
@@ -116,53 +97,52 @@ class FingerBabble:
         torque = joint_torque(self._model, self._data, wanted, speed, still) + self._back * off
         least = _LEAST_N[0] + (_LEAST_N[1] - _LEAST_N[0]) * self._tendons.at(t)
         tensions, _ = tensions_for_torque(MOMENT_ARMS, torque, least, MOST_TENSION_N)
-        # Where the drive resists a change of length, lengths lead the joints as well.
+        # Drives that resist a change of length need the lengths of the motion too.
         command = self._drive.command(tensions, -MOMENT_ARMS @ wanted, -MOMENT_ARMS @ speed)
         return np.clip(command, -1.0, 1.0).astype(np.float32)
 
     def posture(self, t: float) -> NDArray[np.float64]:
-        """Where the joints are led to at a time, s: angles, rad, (4,)."""
+        """Return the commanded posture at a time, s: angles, rad, (4,)."""
         low, high = JOINT_RANGE.T
         inner = _MARGIN * (high - low)
         return low + inner + (high - low - 2.0 * inner) * self._joints.at(t)
 
 
 class _Waves:
-    """Several smooth random signals, most often near either end."""
+    """Smooth random signals that are near their ends most of the time."""
 
     def __init__(self, rng: np.random.Generator, signals: int) -> None:
-        # One wave in each part of the range of frequencies, so that no signal is slow only.
+        # One wave per part of the frequency range, so that no signal has slow waves only.
         edges = np.geomspace(_SLOWEST_HZ, _FASTEST_HZ, _WAVES + 1)
         self._hz = rng.uniform(edges[:-1], edges[1:], (signals, _WAVES))
         self._phase = rng.uniform(0.0, 2.0 * np.pi, (signals, _WAVES))
 
     def at(self, t: float) -> NDArray[np.float64]:
-        """The signals, 0 to 1, (signals,)."""
+        """Return the signals at a time, s: 0 to 1, (signals,)."""
         waves = np.sin(2.0 * np.pi * self._hz * t + self._phase)
-        # The sum is nearly normal, of variance one half a wave: its own distribution would make
-        # all values as frequent.
+        # The sum is nearly normal with a variance of one half per wave, so its cumulative
+        # distribution makes the values nearly uniform.
         return np.asarray(ndtr(_SPREAD * waves.sum(axis=1) / np.sqrt(0.5 * _WAVES)), np.float64)
 
 
 def record_babble(
     env: gym.Env[Any, Any], seconds: float, seed: int = 0, actions: str = "impedance"
 ) -> FingerLog:
-    """Let a finger babble for a while.
+    """Record a log of a finger that `FingerBabble` moves.
 
     Args:
-        env: Any env with the layout of a finger, simulated or on a bench, made without a longest
-            episode.
-        seconds: How long, s.
-        seed: Of the motions, and of the env.
+        env: Any env with the layout of a finger, simulated or on a bench, without a time limit.
+        seconds: Duration, s.
+        seed: Seed of the motions and of the env.
         actions: What an action of the env commands.
 
     Raises:
-        LayoutError: If the env does not say what its observations mean.
+        LayoutError: If the env has no `observation_layout`.
         UnknownName: If its layout is not that of a finger.
-        FingerError: If its observations are no list of numbers, or it ends too early.
+        FingerError: If its observations are not a vector, or it ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
-        raise FingerError("A finger is recorded by a Box observation: leave `goal` out.")
+        raise FingerError("Recording a finger needs Box observations: omit `goal`.")
     layout = _layout_of(env)
     control_dt = 1.0 / float(env.metadata.get("render_fps") or 1.0 / CONTROL_DT)
     babble = FingerBabble(layout, actions, seed, control_dt)
@@ -202,7 +182,7 @@ def _layout_of(env: gym.Env[Any, Any]) -> Layout:
     if not isinstance(layout, Layout):
         name = env.spec.id if env.spec else type(env.unwrapped).__name__
         raise LayoutError(
-            f"{name} publishes no observation_layout, so nothing says what it senses."
+            f"{name} publishes no observation_layout, so its observations have no names."
         )
     return layout
 
@@ -212,3 +192,21 @@ def _places(layout: Layout, names: tuple[str, ...], kind: str) -> list[int]:
     for name in names:
         _ = layout[f"{name}/{kind}"]
     return [slices[f"{name}/{kind}"].start for name in names]
+
+
+def identify_env(
+    env: gym.Env[Any, Any], actions: str, seed: int, known: FingerParameters | None = None
+) -> FingerParameters:
+    """Move a finger for ten seconds, and identify its parameters.
+
+    Args:
+        env: Env of the finger, without a time limit.
+        actions: What its actions command.
+        seed: Seed of the motions.
+        known: A finger with the same motors; None if nothing is known about them.
+
+    Raises:
+        FingerError: If the motions do not suffice, or observations are not a vector.
+        MissingExtra: If `mujoco.sysid` is not installed.
+    """
+    return identify(record_babble(env, _SECONDS, seed, actions), known=known).parameters

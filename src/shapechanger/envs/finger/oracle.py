@@ -1,4 +1,4 @@
-"""A controller that knows the nominal finger: the upper reference for reaching and following."""
+"""Model-based controller of the finger: the upper reference for reaching and tracking."""
 
 from __future__ import annotations
 
@@ -26,31 +26,28 @@ from shapechanger.layout import Layout
 
 __all__ = ["FingerOracle"]
 
-# 1/s. Of what a joint is off, the share that it makes up for in a second: most of it in two steps.
+# Gain on joint errors, 1/s: most of an error is corrected in two steps.
 _GAIN: Final = 25.0
-# rad/s. Faster than this no joint is asked to move.
+# Largest commanded joint speed, rad/s.
 _MOST_SPEED: Final = 12.0
 _ENDS: Final = (-np.ones(len(TENDONS)), np.ones(len(TENDONS)))
 
 
 class FingerOracle:
-    """Brings the fingertip of a finger to where its observation says that it should be.
+    """Moves the fingertip to the target in its observation.
 
-    Each step it takes the angles that the fingertip needs at the end of the step (inverse
-    kinematics), the speeds that lead there, the torques that those take by the finger's model
-    (inertia, weight, passive tissue), the tensions that give these torques with the least co-
-    contraction (bounded least squares), and the commands that give those tensions, with the motors'
-    lag made up for.
+    Each step computes the angles for the target at the end of the step (inverse kinematics), the
+    speeds that lead there, the torques that they need by the finger's model (inertia, weight,
+    passive tissue), the tensions that give these torques with the least co-contraction (bounded
+    least squares), and the commands that give those tensions, compensating the motors' lag.
 
-    It sees only observations, so that it drives a finger on a bench as well; what it takes for
-    granted are the parameters that it is given.
+    It uses only observations, so it also drives a finger on a bench; the parameters are assumed.
 
     Args:
-        layout: Of the observations.
+        layout: Layout of the observations.
         actions: What an action commands.
-        parameters: What the finger is taken to be.
-        gain: Of what a joint is off, the share made up for in a second, 1/s; lower for a finger
-            whose commands come late.
+        parameters: Assumed parameters of the finger.
+        gain: Gain on joint errors, 1/s; lower for a finger with delayed commands.
     """
 
     def __init__(
@@ -64,28 +61,28 @@ class FingerOracle:
         self._gain = gain
         self._arms = parameters.arms
         self._most = np.array(parameters.most_tension)
-        # Whatever its tendons are like, the bones' motion follows from the tensions.
+        # The motion of the bones depends on the tensions only, not on how tendons stretch.
         stiff = parameters.replace(tendon_stiffness=None, backlash=0.0, command_delay=0.0)
         self._model = build_finger(stiff, drive_of("tension", stiff)).compile()
         self._data = mujoco.MjData(self._model)
-        # Of the way to a new tension, what a motor goes in one step.
+        # Fraction of a change of tension that a motor completes in one step.
         self._follows = 1.0 - math.exp(-CONTROL_DT / parameters.motor_lag)
         self._places = _Places(layout)
         self._wanted: NDArray[np.float64] | None = None
 
     def reset(self) -> None:
-        """Begin with another episode."""
+        """Start another episode."""
         self._wanted = None
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
-        """The action, (7,), for an observation, (n,)."""
+        """Return the action, (7,), for an observation, (n,)."""
         seen = self._places.read(np.asarray(observation, np.float64))
         wanted, _ = angles_for(
             seen.next_place, seen.angles if self._wanted is None else self._wanted
         )
         self._wanted = wanted
         speed = np.clip(self._gain * (wanted - seen.angles), -_MOST_SPEED, _MOST_SPEED)
-        # The command acts on lengths that change meanwhile: what counts is the middle of the step.
+        # Lengths change while the command acts, so use those in the middle of the step.
         length = -self._arms @ (seen.angles + 0.5 * CONTROL_DT * speed)
         pulling = -self._arms @ speed
         low, high = (self._drive.tension(end, length, pulling) for end in _ENDS)
@@ -97,13 +94,13 @@ class FingerOracle:
         return np.clip(command, -1.0, 1.0).astype(np.float32)
 
     def _torque(self, seen: _Seen, speed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What moves the joints at this speed by the end of the step, N·m, (4,)."""
+        """Return the torque that gives the joints this speed by the end of the step, N·m, (4,)."""
         acceleration = (speed - seen.velocities) / CONTROL_DT
         return joint_torque(self._model, self._data, seen.angles, speed, acceleration)
 
 
 class _Seen(NamedTuple):
-    """What the controller takes from an observation."""
+    """The parts of an observation that the controller uses."""
 
     angles: NDArray[np.float64]
     velocities: NDArray[np.float64]
@@ -112,7 +109,7 @@ class _Seen(NamedTuple):
 
 
 class _Places:
-    """Where those numbers are."""
+    """Reads these parts from an observation."""
 
     def __init__(self, layout: Layout) -> None:
         names = layout.names

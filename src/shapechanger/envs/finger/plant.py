@@ -1,4 +1,4 @@
-"""A finger in simulation: commands in, what its senses say out."""
+"""The simulated finger: takes commands and returns measurements."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from shapechanger.tasks.finger import FingerSenses, fingertip
 
 __all__ = ["CONTROL_DT", "FingerPlant", "JointVelocities"]
 
-# Time constant, s, with which noisy angles become velocities: two periods of control.
+# Time constant of the smoothing of velocities, s: two control periods.
 _LAG_S: Final = 0.040
 
 
 class JointVelocities:
-    """Differences of what was measured, smoothed.
+    """Estimates joint velocities from measured angles by smoothed differences.
 
     Args:
-        period_s: Time from one measurement to the next, s.
+        period_s: Time between two measurements, s.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -34,11 +34,11 @@ class JointVelocities:
         self._velocities = np.zeros(0)
 
     def forget(self) -> None:
-        """Begin anew: what is measured next is at rest."""
+        """Start over: the next measurement is at rest."""
         self._angles = None
 
     def of(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The velocities, rad/s, after these angles, rad, of the same shape."""
+        """Return the velocities, rad/s, after new angles, rad, of the same shape."""
         if self._angles is None:
             self._velocities = np.zeros_like(angles)
         else:
@@ -56,12 +56,12 @@ _N_TENDONS: Final = len(TENDONS)
 
 
 class FingerPlant:
-    """A finger that is driven and sensed.
+    """MuJoCo simulation of a finger with its drive and its sensors.
 
     Args:
-        parameters: Of the finger.
-        drive: What its commands mean.
-        control_dt: How long a command acts, s; a whole number of steps of the simulation.
+        parameters: Parameters of the finger.
+        drive: Meaning of its commands.
+        control_dt: Duration of a command, s; a whole number of simulation steps.
 
     Attributes:
         model: The compiled model.
@@ -72,7 +72,7 @@ class FingerPlant:
         self.parameters = parameters
         self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
         self.data = mujoco.MjData(self.model)
-        # A view; to go through the warnings one by one takes longer than a step.
+        # A view, because reading the warnings one by one takes longer than a step.
         self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
         self._drive = drive
         self._frame_skip = round(control_dt / self.model.opt.timestep)
@@ -85,25 +85,30 @@ class FingerPlant:
 
     @property
     def fingertip(self) -> NDArray[np.float64]:
-        """Where the fingertip is, m, (3,)."""
+        """True place of the fingertip, m, (3,)."""
         return self._tip.copy()
 
     @property
     def angles(self) -> NDArray[np.float64]:
-        """What the angles are, rad, (4,)."""
+        """True joint angles, rad, (4,)."""
         return self.data.qpos[:_N_JOINTS].copy()
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo has found a number bad since the last `place`."""
+        """Whether MuJoCo has found the state huge or not finite since the last `place`."""
         return bool(self._warnings.any())
 
     def mark(self, place: NDArray[np.float64]) -> None:
-        """Show in pictures where the fingertip should be, m, (3,)."""
+        """Show the target of the fingertip, m, (3,), in rendered frames."""
         self.data.mocap_pos[self.model.body(TARGET).mocapid[0]] = place
 
     def place(self, angles: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
-        """Begin at rest with these angles, rad, (4,), and every tendon just taut."""
+        """Start at rest with these angles, rad, (4,), and every tendon just taut.
+
+        Args:
+            angles: Joint angles, rad, (4,).
+            rng: Source of measurement noise.
+        """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.qpos[:_N_JOINTS] = angles
@@ -117,7 +122,7 @@ class FingerPlant:
         data.ctrl[:] = self._command
         data.act[:] = self._command
         if self.parameters.command_delay > 0.0:
-            # What acts until the first command arrives; a new history holds zeros.
+            # A new history holds zeros; this command acts until the first one arrives.
             for i, held in enumerate(self._command):
                 samples = np.full((model.actuator_history[i, 0], 1), held)
                 mujoco.mj_initCtrlHistory(model, data, i, None, samples)
@@ -128,11 +133,16 @@ class FingerPlant:
         return self._senses(rng)
 
     def act(self, command: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
-        """Let a command, -1 to 1, (7,), act for one period of control."""
+        """Apply a command for one control period.
+
+        Args:
+            command: -1 to 1, (7,).
+            rng: Source of measurement noise.
+        """
         self._command = np.clip(np.asarray(command, np.float64), -1.0, 1.0)
         self.data.ctrl[:] = self._command
         mujoco.mj_step(self.model, self.data, self._frame_skip)
-        mujoco.mj_kinematics(self.model, self.data)  # The tip belongs to the angles after it.
+        mujoco.mj_kinematics(self.model, self.data)  # Move the fingertip to the new angles.
         self._angles = self._measured(rng)
         if self.parameters.joint_noise > 0.0:
             self._velocities = self._differences.of(self._angles)
@@ -160,6 +170,6 @@ class FingerPlant:
         )
 
     def _lengths(self) -> NDArray[np.float64]:
-        if self.parameters.gives:  # Winding up by a metre makes it a metre shorter.
+        if self.parameters.gives:  # Winding up by 1 m shortens the tendon by 1 m.
             return -self.data.qpos[_N_JOINTS:]
         return -self._arms @ self.angles

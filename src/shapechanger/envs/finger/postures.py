@@ -1,4 +1,4 @@
-"""Postures that a finger can hold, and the points that it reaches with them."""
+"""Postures of the nominal finger: sampling, inverse kinematics and the torques they need."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 
 __all__ = ["angles_for", "can_hold", "draw_posture", "draw_start", "joint_torque", "moving_torque"]
 
-# Of its range, how far a joint stays from either end.
+# Distance of a joint from either end, as a fraction of its range.
 _MARGIN: Final = 0.1
-# The end joint follows the middle one to within this, rad. Chosen.
+# The end joint follows the middle one within this, rad. Chosen.
 _COUPLING_SPREAD: Final = math.radians(8.0)
-# A flexed finger hardly spreads: of the range of abduction, what is left at full flexion. Chosen.
+# A flexed finger hardly spreads: fraction of the abduction range left at full flexion. Chosen.
 _SPREAD_LEFT: Final = 0.3
-# rad/s. Friction turns over with the motion rather than jumping.
+# Friction changes its sign smoothly around this speed, rad/s.
 _STICKS_BELOW: Final = 0.1
-# Of the rest posture, how far starts are, rad.
+# Largest distance of starts from the rest posture, rad.
 _START_SPREAD: Final = 0.1
-# Data of each thread: envs in other threads ask, too, and to make it takes longer than to use it.
+# Data per thread, because envs run in threads, and creating it takes longer than using it.
 _own: Final = threading.local()
 
 
 def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Angles, rad, (4,), away from every limit, that the nominal finger can hold."""
+    """Sample angles, rad, (4,), away from every limit, that the nominal finger can hold."""
     low, high = _inner_range()
     while True:
         flexion, abduction, middle = rng.uniform(low[:3], high[:3])
@@ -54,13 +54,13 @@ def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def draw_start(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Angles, rad, (4,), near those of a finger at rest."""
+    """Sample angles, rad, (4,), near those of a finger at rest."""
     low, high = _inner_range()
     return np.clip(JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, 4), low, high)
 
 
 def can_hold(angles: NDArray[np.float64]) -> bool:
-    """Whether tensions in their range hold the nominal finger at these angles, rad, (4,)."""
+    """Return whether feasible tensions hold the nominal finger at these angles, rad, (4,)."""
     torque = moving_torque(angles, np.zeros(4), np.zeros(4))
     return tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
 
@@ -68,9 +68,9 @@ def can_hold(angles: NDArray[np.float64]) -> bool:
 def moving_torque(
     angles: NDArray[np.float64], speed: NDArray[np.float64], acceleration: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What the tendons must give about each joint for a motion, N·m, (4,).
+    """Return the joint torques that a motion of the nominal finger needs, N·m, (4,).
 
-    Against inertia, weight, passive tissue and friction.
+    They overcome inertia, weight, passive tissue and friction.
 
     Args:
         angles: rad, (4,).
@@ -90,7 +90,15 @@ def joint_torque(
     speed: NDArray[np.float64],
     acceleration: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The same for another finger whose tendons do not stretch; `data` is overwritten."""
+    """Return the same for any finger whose tendons do not stretch.
+
+    Args:
+        model: Model of the finger.
+        data: Overwritten.
+        angles: rad, (4,).
+        speed: rad/s, (4,).
+        acceleration: rad/s², (4,).
+    """
     data.qpos[:] = angles
     data.qvel[:] = speed
     mujoco.mj_forward(model, data)
@@ -112,17 +120,17 @@ def _nominal() -> mujoco.MjModel:
 
 
 _STEPS: Final = 60
-# m. Well below what any finger is asked for.
+# Well below any tolerance of a task, m.
 _CLOSE_ENOUGH_M: Final = 1e-6
-# Weight of the wish that the end joint follows the middle one, and of being near to where the
-# search began, m/rad, beside being at the point.
-_WISH: Final = 1e-3
+# Weight of the preference that the end joint follows the middle one, m/rad, relative to reaching
+# the point.
+_PREFERENCE: Final = 1e-3
 _DAMPING: Final = 1e-3
 _MOST_STEP_RAD: Final = 0.5
-# How the damping grows after a step that led away, and falls after one that led nearer.
+# Factors by which the damping grows after a worse step, and falls after a better one.
 _GROWS: Final = 4.0
 _FALLS: Final = 16.0
-# Farther off than this, m, other beginnings are tried, too: hyperextended, half and fully flexed.
+# With a larger error, m, the search is repeated from hyperextended, half and fully flexed.
 _FAR_M: Final = 1e-5
 _STARTS: Final = tuple(
     np.array([low + share * (high - low), 0.0, *(share * JOINT_RANGE[2:, 1])])
@@ -134,21 +142,21 @@ _STARTS: Final = tuple(
 def angles_for(
     place: NDArray[np.float64], near: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], float]:
-    """Angles within the ranges of the joints whose fingertip is nearest to a point.
+    """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Gauss-Newton steps with damping, kept within the ranges.
+    Damped Gauss-Newton steps, kept within the joints' ranges.
 
     Args:
-        place: m, (3,).
-        near: Angles to stay near to, rad, (4,); if not given, those are preferred whose end joint
+        place: The point, m, (3,).
+        near: Angles to start from, rad, (4,); by default, angles are preferred whose end joint
             bends about 0.6 times as far as the middle one.
 
     Returns:
-        The angles, rad, (4,), and how far their fingertip is from the point, m.
+        The angles, rad, (4,), and the distance of their fingertip from the point, m.
     """
     best = _search(place, JOINT_REST if near is None else near, near is None)
     if best[1] > _FAR_M:
-        # No angles reach it, or the search ended where it only seems nearest from.
+        # The point is out of reach, or the search ended in a local minimum.
         others = (_search(place, start, False) for start in _STARTS)
         best = min((best, *others), key=lambda found: found[1])
     return best
@@ -157,23 +165,23 @@ def angles_for(
 def _search(
     place: NDArray[np.float64], start: NDArray[np.float64], coupled: bool
 ) -> tuple[NDArray[np.float64], float]:
-    """Angles near to a start whose fingertip is nearest, rad, (4,), and how far off it is, m."""
+    """Return the angles, rad, (4,), that a search from `start` ends with, and their error, m."""
     low, high = JOINT_RANGE.T
     q = np.clip(start, low, high)
     coupling = np.array([[0.0, 0.0, -DIP_BY_PIP, 1.0]])
-    wish = _WISH if coupled else 0.0
+    preference = _PREFERENCE if coupled else 0.0
     error = place - fingertip(q, PHALANX_LENGTH_M)
     damping = _DAMPING
     for step in range(_STEPS):
         if step == _STEPS // 3:
-            wish = 0.0  # It has led the way, and must not keep the fingertip off the point.
-        if wish == 0.0 and float(np.linalg.norm(error)) < _CLOSE_ENOUGH_M:
+            preference = 0.0  # A preference must not keep the fingertip off the point.
+        if preference == 0.0 and float(np.linalg.norm(error)) < _CLOSE_ENOUGH_M:
             break
-        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), wish * coupling, damping * np.eye(4)]
-        goal = [error, -wish * (coupling @ q), np.zeros(4)]
+        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), preference * coupling, damping * np.eye(4)]
+        goal = [error, -preference * (coupling @ q), np.zeros(4)]
         free = np.ones(4, bool)
         change = np.zeros(4)
-        # A joint at its limit that would go beyond stays, and the others make up for it.
+        # A joint that would leave its range stays at its limit, and the others compensate.
         for _ in range(4):
             matrix = np.concatenate(rows)[:, free]
             change[:] = 0.0
@@ -184,15 +192,15 @@ def _search(
             free &= ~stuck
         next_q = np.clip(q + np.clip(change, -_MOST_STEP_RAD, _MOST_STEP_RAD), low, high)
         next_error = place - fingertip(next_q, PHALANX_LENGTH_M)
-        # Where no angles reach the point, full steps jump to and fro around the nearest ones.
-        if wish == 0.0 and next_error @ next_error > error @ error:
+        # Out of reach, full steps oscillate around the closest angles.
+        if preference == 0.0 and next_error @ next_error > error @ error:
             damping *= _GROWS
             continue
         gained = float(np.linalg.norm(error) - np.linalg.norm(next_error))
         damping = max(damping / _FALLS, _DAMPING)
         q, error = next_q, next_error
         if (
-            wish == 0.0
+            preference == 0.0
             and gained < _CLOSE_ENOUGH_M * 1e-2
             and damping <= _GROWS * _FALLS * _DAMPING
         ):

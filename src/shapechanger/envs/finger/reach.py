@@ -10,7 +10,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
-from shapechanger.envs.finger.env import FingerEnv, numbers
+from shapechanger.envs.finger.env import FingerEnv, as_numbers
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
@@ -20,7 +20,7 @@ from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
 __all__ = ["FingerReachEnv"]
 
 _TARGET: Final = Element("task", "target")
-# How near the fingertip has to be, m, and for how long without a break, s.
+# Distance within which the fingertip must stay, m, and for how long without a break, s.
 _TOLERANCE_M: Final = 0.005
 _HELD_S: Final = 0.2
 
@@ -29,21 +29,21 @@ class FingerReachEnv(FingerEnv):
     """Bring the fingertip to a random point that it can reach, and keep it there.
 
     ## Action space
-    `Box(-1, 1, (7,), float32)`, one number a tendon: FDP, FDS, EIP, EDC, LUM, DI, PI. What it
-    commands is the argument `actions`: "impedance", a muscle whose pull grows with its length;
-    "tension"; or "length". It acts for 0.02 s.
+    `Box(-1, 1, (7,), float32)`, one number per tendon: FDP, FDS, EIP, EDC, LUM, DI, PI. The
+    argument `actions` sets what they command: "impedance", a muscle whose pull grows with its
+    length; "tension"; or "length". An action lasts 0.02 s.
 
     ## Observation space
     `Box(-inf, inf, (38,), float64)`: angles (4), rad, and velocities (4), rad/s, of the joints;
     tensions (7), N, lengths (7), m, and newest commands (7) of the tendons; fingertip (3) by those
-    angles, target (3), and the way from one to the other (3), m. `observation_layout` names each.
-    With `goal=True` a Dict of `observation` (32, the same without the target), `achieved_goal` (3)
-    and `desired_goal` (3), as learners with hindsight take it.
+    angles, target (3), and the vector from fingertip to target (3), m. `observation_layout` names
+    each. With `goal=True` a Dict of `observation` (32, the same without the target),
+    `achieved_goal` (3) and `desired_goal` (3), for learners with hindsight.
 
     ## Reward
-    `FingertipReward`: for nearness to the target, minus effort. With `goal=True` it is -1 where the
-    fingertip, as it is sensed, is farther than 5 mm from the target and 0 elsewhere, as
-    `compute_reward` gives it.
+    `FingertipReward`: nearness to the target minus effort. With `goal=True` it is -1 where the
+    measured fingertip is farther than 5 mm from the target and 0 elsewhere, as in
+    `compute_reward`.
 
     ## Start
     At rest, near the posture of a hand at rest. The target is the fingertip of a random posture
@@ -55,11 +55,11 @@ class FingerReachEnv(FingerEnv):
     ## Info
     `is_success`, whether the fingertip has been within 5 mm for the last 0.2 s; `distance`, m, of
     the true fingertip; `target`, m; `reward_nearness` and `reward_effort` (with `goal=True`
-    `reward_goal`); `diverged` where MuJoCo found a bad number.
+    `reward_goal`); `diverged` where the simulation diverged.
 
     Args:
         goal: Whether observations are Dicts with goals.
-        **arguments: Those of `FingerEnv`.
+        **arguments: Arguments of `FingerEnv`.
     """
 
     _options = ("posture", "target")
@@ -95,13 +95,13 @@ class FingerReachEnv(FingerEnv):
         """Start an episode.
 
         Args:
-            seed: Seed of all randomness from here on; None goes on with the present state.
+            seed: Seed of all randomness from here on; None keeps the present generator.
             options: `posture`, four angles, rad, to start at; `target`, m, (3,), or four angles
-                whose fingertip it is. What is left out is drawn.
+                whose fingertip it is. Omitted ones are drawn.
 
         Raises:
             UnknownName: If there is no such option.
-            FingerError: If a posture or a target is none.
+            FingerError: If a posture or a target is malformed or out of range.
         """
         super().reset(seed=seed)
         given = (options or {}).get("target")
@@ -114,10 +114,10 @@ class FingerReachEnv(FingerEnv):
         return self._observation(senses), self._info(distance)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Act for one step.
+        """Take one step.
 
         Raises:
-            BadAction: If the action is none; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
             ResetNeeded: If `reset` was never called.
         """
         senses = self._act(action)
@@ -135,12 +135,12 @@ class FingerReachEnv(FingerEnv):
     def compute_reward(
         self, achieved_goal: NDArray[np.float64], desired_goal: NDArray[np.float64], info: object
     ) -> NDArray[np.float64]:
-        """The reward of `goal=True`: 0 within 5 mm, -1 elsewhere, of the shape of the goals' rows.
+        """Return the reward of `goal=True`: 0 within 5 mm, -1 elsewhere; shape (...).
 
         Args:
             achieved_goal: Fingertips, m, (..., 3).
             desired_goal: Targets, m, (..., 3).
-            info: Not needed.
+            info: Ignored.
         """
         distance = np.linalg.norm(np.asarray(achieved_goal) - np.asarray(desired_goal), axis=-1)
         return -(distance > _TOLERANCE_M).astype(np.float64)
@@ -167,9 +167,9 @@ def _unbounded(size: int) -> gym.spaces.Box:
 
 
 def _target(value: Any) -> NDArray[np.float64]:
-    given = numbers(value)
+    given = as_numbers(value)
     if given.shape == (4,):
         given = fingertip(given, PHALANX_LENGTH_M)
     if given.shape != (3,) or not np.isfinite(given).all():
-        raise FingerError(f"A target is three finite numbers, m, or four angles; got {value}.")
+        raise FingerError(f"A target must be three finite numbers, m, or four angles; got {value}.")
     return given

@@ -43,19 +43,19 @@ __all__ = [
 ]
 
 _CHECK_HZ: Final = 50.0
-# A path that goes on for ever is looked at for so long, s.
+# Checked time of an endless path, s.
 _LOOK_S: Final = 60.0
-# How far off a point may be that counts as reached, m: a tenth of what counts as success.
+# Largest error of a reachable point, m: a sixth of the tolerance of the task.
 _OFF_M: Final = 0.0005
 _LOOKS: Final = 20
 
 
 def beginning_if_reachable(path: FingertipPath, looks: int) -> NDArray[np.float64] | None:
-    """Angles that begin a path, rad, (4,); None for one that the nominal finger cannot follow.
+    """Return the first angles of a path, rad, (4,); None if the nominal finger cannot follow it.
 
     Args:
-        path: In the finger's axes, m.
-        looks: At how many points it is looked at, about.
+        path: The path in the finger's frame, m.
+        looks: Approximate number of points to check.
     """
     times, points = sample(path, looks / path.duration_s)
     angles, left = _angles_along(points)
@@ -63,26 +63,26 @@ def beginning_if_reachable(path: FingertipPath, looks: int) -> NDArray[np.float6
 
 
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
-    """Let pass a path that the nominal finger can follow.
+    """Require that the nominal finger can follow a path.
 
     Args:
-        path: In the finger's axes, m.
+        path: The path in the finger's frame, m.
 
     Returns:
-        Angles that begin it, rad, (4,).
+        Its first angles, rad, (4,).
 
     Raises:
-        PathError: If a point is out of reach, and where and by how much; or if the tendons cannot
-            move the finger as fast, and what is missing.
+        PathError: If a point is out of reach, or the tendons are too weak for the motion; the
+            message names the time and what is missing.
     """
     times, points = sample(path, _CHECK_HZ, min(path.duration_s, _LOOK_S))
     angles, left = _angles_along(points)
     if left is not None:
-        # Where it is farthest off says more than where it leaves.
+        # The farthest point says more than the first one out of reach.
         later = range(left, len(points), max(1, len(points) // _LOOKS))
         worst, k = max((angles_for(points[k])[1], k) for k in later)
         raise PathError(
-            f"The path leaves what the finger reaches: at {times[k]:.2f} s it is at "
+            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at "
             f"{_in_mm(points[k])} mm, {worst * 1e3:.1f} mm beyond. "
             "The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
         )
@@ -96,7 +96,7 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
 
 
 def _angles_along(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], int | None]:
-    """Angles for each point, rad, (n, 4), and which point is the first out of reach, if any is."""
+    """Return angles for each point, rad, (n, 4), and the index of the first one out of reach."""
     angles = np.empty((len(points), 4))
     near: NDArray[np.float64] | None = None
     for i, point in enumerate(points):
@@ -110,7 +110,7 @@ def _angles_along(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], int
 def _weakness(
     times: NDArray[np.float64], angles: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """When the tendons are too weak, s, and what a joint lacks, N·m; None if never."""
+    """Return when the tendons are too weak, s, and the missing torque, N·m; None if never."""
     speeds: NDArray[np.float64] = np.asarray(np.gradient(angles, times, axis=0))
     accelerations: NDArray[np.float64] = np.asarray(np.gradient(speeds, times, axis=0))
     for t, q, speed, acceleration in zip(times, angles, speeds, accelerations, strict=True):
@@ -127,17 +127,17 @@ def _in_mm(point: NDArray[np.float64]) -> str:
     return "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * point))
 
 
-# m, and m/s: up to a circle of 15 mm, and up to the speed of one of 12 mm once a second.
+# Ranges of random paths: radius, m, and speed, m/s, up to a circle of 12 mm once a second.
 _SIZE: Final = (0.003, 0.015)
 _SPEED: Final = (0.01, 0.08)
 _SLOWEST_HZ: Final = 0.1
 _FASTEST_HZ: Final = 2.0
-# Points of a path at which it is checked.
+# Number of points at which a random path is checked.
 _RANDOM_PATHS_LOOKS: Final = 32
 
 
 def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float64]]:
-    """A circle, an eight or a line that the finger can follow, and angles that begin it, rad."""
+    """Sample a circle, figure eight or line in the finger's reach, and its first angles, rad."""
     while True:
         centre = fingertip(draw_posture(rng), PHALANX_LENGTH_M)
         size = rng.uniform(*_SIZE)
@@ -151,8 +151,8 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
             path = figure_eight(size, tuple(centre), hz, tuple(normal))
         else:
             path = line(tuple(centre - size * normal), tuple(centre + size * normal), hz)
-        # At as many points of a slow one as of a fast one: they are smooth, and each reset draws
-        # one.
+        # The number of points does not depend on the speed: paths are smooth, and each reset
+        # draws one.
         begin = beginning_if_reachable(path, _RANDOM_PATHS_LOOKS)
         if begin is not None:
             return path, begin
@@ -164,52 +164,53 @@ def _direction(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 PREVIEW_S: Final = (0.06, 0.12, 0.20)
-"""How far ahead the observation sees besides the end of the next step, s."""
+"""Lookahead of the observation besides the end of the next step, s."""
 RANDOM: Final = "random"
-"""What to give for a path to have another one at each reset."""
+"""Value of `path` for another path at each reset."""
 
 _TARGET: Final = Element("task", "target")
-# What the fingertip takes to come from rest to the path's speed is not counted, s.
+# Time in which the fingertip reaches the path's speed, not counted in the error, s.
 _SETTLES_S: Final = 0.5
 _TOLERANCE_M: Final = 0.003
 _SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
 
 
 class FingerTrackEnv(FingerEnv):
-    """Follow a path that is given beforehand, as a point that moves along it.
+    """Follow a point that moves along a known path.
 
     ## Action space
-    As `Finger-v1`: `Box(-1, 1, (7,), float32)`.
+    As in `Finger-v1`: `Box(-1, 1, (7,), float32)`.
 
     ## Observation space
-    `Box(-inf, inf, (47,), float64)`: what the finger senses (32) as in `Finger-v1`; where the point
-    will be at the end of the step (3) and how far that is from the fingertip (3), m; and how far
-    from the fingertip it will be 0.06, 0.12 and 0.20 s from now (9), m.
+    `Box(-inf, inf, (47,), float64)`: the measurements of `Finger-v1` (32); the place of the point
+    at the end of the step (3) and the vector from the fingertip to it (3), m; and the vectors from
+    the fingertip to its places 0.06, 0.12 and 0.20 s from now (9), m.
 
     ## Reward
-    As `Finger-v1`, with the moving point as target.
+    As in `Finger-v1`, with the moving point as target.
 
     ## Start
-    At rest, with the fingertip at a point of the path; where a closed path begins is drawn.
+    At rest, with the fingertip at a point of the path: a random one of a closed path, else its
+    beginning.
 
     ## End
     Never terminated; truncated after 250 steps, 5 s.
 
     ## Info
-    `distance`, m, of the true fingertip from the point; `rms`, m, the root mean square of it since
-    0.5 s after the start; `is_success`, whether that is below 3 mm; `target`, m;
-    `reward_nearness` and `reward_effort`; `diverged` where MuJoCo found a bad number.
+    `distance`, m, of the true fingertip from the point; `rms`, m, its root mean square since 0.5 s
+    after the start; `is_success`, whether that is below 3 mm; `target`, m;
+    `reward_nearness` and `reward_effort`; `diverged` where the simulation diverged.
 
     Args:
         path: A path of `shapechanger.tasks.paths`; its name, "circle", "figure-eight", "line" or
-            "curve", also with settings; a function of time; a CSV file of t, x, y and z; or
+            "curve", optionally with settings; a function of time; a CSV file of t, x, y and z; or
             "random" for another one at each reset.
-        **arguments: Those of `FingerEnv`.
+        **arguments: Arguments of `FingerEnv`.
 
     Raises:
-        PathError: If it is no path, or the nominal finger cannot follow it; the message says where
-            and by how much.
-        UnknownName: If there is no such path, or as `FingerEnv`.
+        PathError: If it is not a path, or the nominal finger cannot follow it; the message names
+            the place and the distance.
+        UnknownName: If there is no such path, or as in `FingerEnv`.
     """
 
     _options = ("posture", "path")
@@ -241,7 +242,7 @@ class FingerTrackEnv(FingerEnv):
 
     @property
     def path(self) -> FingertipPath:
-        """The path that is followed now."""
+        """The present path."""
         return self._path
 
     def reset(
@@ -250,14 +251,14 @@ class FingerTrackEnv(FingerEnv):
         """Start an episode.
 
         Args:
-            seed: Seed of all randomness from here on; None goes on with the present state.
-            options: `path`, another path from here on; `posture`, four angles, rad, to start at in
-                place of those at the path.
+            seed: Seed of all randomness from here on; None keeps the present generator.
+            options: `path`, the path from here on; `posture`, four angles, rad, to start at
+                instead of those at the path.
 
         Raises:
             UnknownName: If there is no such option or path.
-            PathError: If it is no path, or the finger cannot follow it; the present one stays.
-            FingerError: If the posture is none.
+            PathError: If it is not a path, or the finger cannot follow it; the present one stays.
+            FingerError: If the posture is malformed or out of range.
         """
         super().reset(seed=seed)
         given = (options or {}).get("path")
@@ -268,7 +269,7 @@ class FingerTrackEnv(FingerEnv):
         elif given is not None or self._is_random:
             self._is_random = True
             self._path, self._begin = draw_path(self.np_random)
-        # A path that ends is followed from its beginning.
+        # An open path is followed from its beginning.
         self._t = self.np_random.uniform(0.0, self._path.duration_s) if self._path.closed else 0.0
         start, _ = angles_for(self._path.at(self._t), self._begin)
         senses = self._place({"posture": start, **(options or {})})
@@ -281,10 +282,10 @@ class FingerTrackEnv(FingerEnv):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
-        """Act for one step.
+        """Take one step.
 
         Raises:
-            BadAction: If the action is none; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
             ResetNeeded: If `reset` was never called.
         """
         senses = self._act(action)
@@ -303,7 +304,7 @@ class FingerTrackEnv(FingerEnv):
         return self._observation(senses), sum(terms.values()), False, False, info
 
     def _look(self) -> None:
-        """Where the path is now, and where it will be."""
+        """Compute the present and coming points of the path."""
         self._points = self._path.at(self._t + _SEEN_S)
 
     def _observation(self, senses: FingerSenses) -> NDArray[np.float64]:

@@ -1,10 +1,11 @@
-"""A twin of a rig that an env serves for itself."""
+"""`RemoteFinger-v1`: the task of `Finger-v1` on a rig of servos, or on its twin."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import gymnasium as gym
 import msgspec
@@ -16,9 +17,8 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.envs.actions import check_action
-from shapechanger.envs.finger.env import posture_of
+from shapechanger.envs.finger.env import check_posture
 from shapechanger.envs.finger.gap import GAPS, geared_around, with_gears
-from shapechanger.envs.finger.identification import identified
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
@@ -26,116 +26,88 @@ from shapechanger.envs.remote.finger_rig import RigSenses, StartApproach
 from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
+from shapechanger.robot.profile.load import find_profile
 from shapechanger.tasks.finger import FingerSenses
-from shapechanger.twin.robot import Operator, RunningRobot
-
-if TYPE_CHECKING:
-    from shapechanger.twin.robot import RunningRobot
+from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 
 __all__ = ["NOMINAL_TWIN", "RemoteFingerEnv", "serve_twin"]
 
 NOMINAL_TWIN: Final = "nominal"
-"""The twin whose bones, joints and tendons are those of the nominal finger."""
+"""Name of the twin with the parameters of the nominal finger."""
 
 _PROFILE: Final = "finger"
 
 
-def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
-    """Serve the shipped profile of a rig on a twin's own clock, as `shapechanger robot serve` does.
-
-    Args:
-        twin: "nominal", or the name of the gap that its finger is drawn from.
-        finger_seed: Which finger of the gap; the first one if not given.
-
-    Raises:
-        UnknownName: If there is no such gap.
-        FingerError: If a finger is asked for of what is no gap.
-        RobotError: If it does not start.
-    """
-    from shapechanger.robot.profile.load import find_profile
-    from shapechanger.twin.robot import run_robot
-
-    if twin not in ("", NOMINAL_TWIN, *GAPS):
-        raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
-    if twin not in GAPS and finger_seed is not None:
-        raise FingerError("finger_seed says which finger of a gap it is: give a gap as twin, too.")
-    drawn = ("--gap", twin, "--finger-seed", str(finger_seed or 0))
-    return run_robot(
-        find_profile(_PROFILE), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
-    )
-
-
-# How near to the start is near enough, rad, and how long it may take, s. Gears that stick may hold
-# a finger off; from there an episode begins all the same.
+# Tolerance of the start posture, rad, and time limit, s. If gears stick, the episode begins where
+# the finger is.
 _START_OFF_RAD: Final = 0.03
 _START_S: Final = 1.0
-# How long the pretension may take to wind in what hung slack while nothing pulled, s.
+# Time for the pretension to wind in slack, s.
 _SLACK_S: Final = 0.6
-# What of the rig's info is about driving.
-_NOT_OURS: Final = ("reward", "frame", "captured_ns")
+# Prefixes of infos that concern driving only.
+_DRIVING: Final = ("reward", "frame", "captured_ns")
 
 
 class RemoteFingerEnv(FingerReachEnv):
-    """Bring the fingertip of a finger that is somewhere else to a point that it can reach.
+    """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
     ## Action and observation space, reward
-    Those of `Finger-v1`, whose layouts these are: a script runs on both by changing the id. What
-    an action commands is turned into tensions here, by the newest lengths and speeds of the tendons
-    at the servos. Where the rig has encoders at its joints, as the shipped one, the angles are
-    theirs, as noisy as they are, and velocities are differences of them over 20 ms, smoothed over
-    40 ms. Otherwise angles and velocities follow from lengths and speeds with the nominal moment
-    arms, and are as true as these. The fingertip follows from the angles; so do the distance, the
-    reward and `info["is_success"]`. With a twin of its own (`twin`) these three are what the twin
-    knows, as in `Finger-v1`, and what is observed stays what is sensed.
+    Those of `Finger-v1`, with the same layouts, so a script runs on both by changing the id.
+    Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
+    servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
+    included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
+    and velocities follow from lengths and speeds with the nominal moment arms, and are as accurate
+    as these. The fingertip follows from the angles; so do the distance, the reward and
+    `info["is_success"]`. With its own twin (`twin`) these three use the true state, as in
+    `Finger-v1`, while observations remain measurements.
 
     ## Start
-    The rig is armed by its operator, on a twin by the env. The finger is then brought near to the
-    start of `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of
-    a radian as it is sensed, or farther off where gears stick; the target is the same. The servos
-    of a twin of its own are cool then; those of a rig need pauses, or switch off by themselves.
+    The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
+    `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
+    as measured, or farther off where gears stick; the target is the same. The servos of its own
+    twin are cool at the start; those of a rig need pauses, or switch off by themselves.
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
     link. `info["truncated_because"]` says why.
 
     ## Info
-    As `Finger-v1`, and what `RemoteVehicleEnv` says of the robot: `action_applied`, `stop_reason`,
+    As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
     `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
-    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), which the twin
-    tells.
+    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
 
     Args:
-        robot: Name of a rig that is remembered, or its address as HOST or HOST:PORT. A twin of the
-            profile "finger" that is served here is remembered under that name.
+        robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
+            "finger" that is served on this machine is known under that name.
         key: The rig's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-        pace: As for `RemoteVehicleEnv`; None for "lockstep" where time is the twin's, else
+        pace: As for `RemoteVehicleEnv`; None for "lockstep" with a twin's own clock, else
             "realtime".
-        twin: A twin that this env serves for itself, in place of a robot: "nominal", or the name of
-            the gap that its finger is drawn from; "" for none.
-        finger_seed: Which finger of that gap; the first one if not given.
-        tendon_stiffness: Of the rig's tendons, N/m: what they stretch is no angle. Chosen, as the
-            twin's.
-        twin_folder: Folder of a twin on this machine, for the truth; "" for none.
+        twin: A twin that this env serves itself instead of connecting to `robot`: "nominal", or the
+            name of the gap that its finger is drawn from; "" for none.
+        finger_seed: Seed of the finger drawn from that gap; 0 if not given.
+        tendon_stiffness: Stiffness of the rig's tendons, N/m, to correct lengths for their stretch.
+            The default is the twin's.
+        twin_folder: Folder of a twin on this machine, for its true state; "" for none.
         on_reset: As for `RemoteVehicleEnv`.
         on_waiting: As for `RemoteVehicleEnv`.
-        reset_timeout_s: How long a reset may wait, s.
-        timeout_s: How long the rig may be silent until the link is lost, s.
+        reset_timeout_s: Time limit of a reset, s.
+        timeout_s: Silence of the rig after which the link is lost, s.
         actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
         goal: Whether observations are Dicts with goals.
         reward: Weights that replace the default ones, by name.
-        render_mode: "human", "rgb_array" or "depth_array": the finger as it is sensed.
-        width: Of frames, pixels.
-        height: Of frames, pixels.
+        render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
+        width: Width of frames, pixels.
+        height: Height of frames, pixels.
 
     Raises:
         UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
         LinkError: If the rig cannot be reached, or is not trusted.
-        RobotRefused: If it does not want us, or is no rig with the tendons of a finger.
+        RobotRefused: If it refuses the connection, or is not a finger rig.
     """
 
     side_by_side: ClassVar[bool] = False
-    """Of a rig there is but one, and a twin is many processes."""
+    """Whether several may run at once: a rig is a single one, and a twin takes many processes."""
 
     def __init__(
         self,
@@ -160,7 +132,7 @@ class RemoteFingerEnv(FingerReachEnv):
         height: int = 480,
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
-        # What is simulated never moves by itself here: it mirrors the rig, and is what is drawn.
+        # The simulation is never stepped: it mirrors the rig, for rendering and rewards.
         super().__init__(
             goal=goal,
             actions=actions,
@@ -221,35 +193,35 @@ class RemoteFingerEnv(FingerReachEnv):
 
         Raises:
             UnknownName: If there is no such option.
-            FingerError: If a posture or a target is none.
-            RobotRefused: If the rig was not armed in time, does not want us, stops on the way to
-                the start, or its lengths are those of no finger.
+            FingerError: If a posture or a target is malformed or out of range.
+            RobotRefused: If the rig was not armed in time, refuses the connection, stops on the way
+                to the start, or its lengths fit no posture.
             LinkError: If it cannot be reached in time.
         """
         self._seed = seed
         self._rest()
         observation, info = super().reset(seed=seed, options=options)
-        return observation, self._ours() | info | self._truth()
+        return observation, self._finger_info() | info | self._truth()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Act for one step.
+        """Take one step.
 
         Raises:
-            BadAction: If the action is none; nothing has been sent then.
+            BadAction: If the action has another shape or is not finite; nothing was sent then.
             ResetNeeded: If `reset` was never called, or the link was lost.
         """
         observation, reward, terminated, _, info = super().step(action)
-        info = self._ours() | info | self._truth()
+        info = self._finger_info() | info | self._truth()
         return observation, reward, terminated, bool(info["truncated_because"]), info
 
     def _rest(self) -> None:
-        """Let the servos of a twin of its own cool, as a person lets those of a rig."""
+        """Cool the servos of its own twin; those of a rig cool in pauses."""
         if self._own is not None and self._operator is not None:
             for name in TENDONS:
                 self._operator.break_servo(name, "")
 
     def close(self) -> None:
-        """Stop the rig, give it back, and free what draws."""
+        """Stop and release the rig, and free the renderer."""
         super().close()
         self._rig.close()
         if self._operator is not None:
@@ -264,31 +236,31 @@ class RemoteFingerEnv(FingerReachEnv):
 
     @property
     def exclusive(self) -> bool:
-        """Whether whoever has it keeps others from having it: not so a twin of its own."""
+        """Whether it blocks others from using the same robot; its own twin does not."""
         return self._own is None
 
     @property
     def individual(self) -> str:
-        """The argument that says which finger this is, where the gap has many; else empty."""
+        """Name of the argument that selects one finger of a gap; empty if there is only one."""
         many = bool(self._twin) and self._twin != NOMINAL_TWIN
         return "finger_seed" if many and self._finger_seed is None else ""
 
     def randomised_source(self) -> dict[str, Any]:
-        """Arguments with which `Finger-v1` has other fingers whose servos have gears, as here."""
+        """Return arguments of `Finger-v1` for random fingers with geared servos."""
         return {"gap": "geared"}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
-        """Arguments with which `Finger-v1` is like this one, as ten seconds of motion show it.
+        """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
 
-        What a log hardly tells of servos with gears is drawn at each episode, as in the gap
-        "geared"; what they pull at least and at most is the rig's.
+        Parameters of geared servos that a log hardly reveals are drawn for each episode, as in the
+        gap "geared"; the range of tensions is the rig's.
 
         Args:
-            seed: Of the motions.
+            seed: Seed of the motions, which take ten seconds.
 
         Raises:
-            FingerError: If the motions are not enough, or observations are no list of numbers.
-            MissingExtra: If `mujoco.sysid` is not there.
+            FingerError: If the motions do not suffice, or observations are not a vector.
+            MissingExtra: If `mujoco.sysid` is not installed.
         """
         rig = self._rig_senses
         pulls = {
@@ -296,16 +268,19 @@ class RemoteFingerEnv(FingerReachEnv):
             "least_tension": float(rig.least.max()),
         }
         known = with_gears(NOMINAL.replace(**pulls))
-        found = identified(self, self._actions, seed, known)
+        # An optimiser, which an env that only steps does not need.
+        from shapechanger.envs.finger.identification import identify_env
+
+        found = identify_env(self, self._actions, seed, known)
         return {"gap": msgspec.to_builtins(geared_around(found))}
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
-        """Arm the rig, and bring the finger to a start."""
+        """Arm the rig, and bring the finger to its start."""
         for name in options or {}:
             if name not in self._options:
                 raise UnknownName("option of reset", name, self._options)
         given = (options or {}).get("posture")
-        start = draw_start(self.np_random) if given is None else posture_of(given)
+        start = draw_start(self.np_random) if given is None else check_posture(given)
         state, self._rig_info = self._rig.reset(seed=self._seed)
         self._command = np.zeros(len(MOMENT_ARMS))
         self._rig_senses.forget()
@@ -320,11 +295,11 @@ class RemoteFingerEnv(FingerReachEnv):
             if way.off(senses) < _START_OFF_RAD:
                 break
             senses = self._pull_on_the_way(way.tensions(senses))
-        # The command that asks for what is pulled now, as in simulation.
+        # The command for the present tensions, as in simulation.
         least = np.clip(senses.tensions, self._rig_senses.least, self._rig_senses.most)
         command = self.drive.command(least, senses.lengths, self._rig_senses.speeds)
         self._command = np.clip(command, -1.0, 1.0)
-        self._senses = self._sense_again(senses)
+        self._senses = dataclasses.replace(senses, commands=self._command)
         return self._senses
 
     def _act(self, action: Any) -> FingerSenses:
@@ -337,12 +312,12 @@ class RemoteFingerEnv(FingerReachEnv):
         return self._senses
 
     def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
-        """Ask for tensions, N, (7,), for one period of control."""
+        """Command tensions, N, (7,), for one control period."""
         state, _, _, _, self._rig_info = self._rig.step(self._rig_senses.values(tensions))
         return self._sense(state)
 
     def _pull_on_the_way(self, tensions: NDArray[np.float64]) -> FingerSenses:
-        """The same before an episode.
+        """Do the same before an episode.
 
         Raises:
             RobotRefused: If the rig stops.
@@ -356,7 +331,7 @@ class RemoteFingerEnv(FingerReachEnv):
         absent: tuple[str, ...] = self._rig_info["absent"]
         senses = self._rig_senses.read(state, absent, self._command)
         data = self.plant.data
-        self._look()
+        self._read_truth()
         judged = self._own is not None and self._true_angles is not None
         data.qpos[:] = self._true_angles if judged else senses.angles
         data.qvel[:] = senses.velocities
@@ -364,24 +339,13 @@ class RemoteFingerEnv(FingerReachEnv):
         data.actuator_force[:] = -senses.tensions
         return senses
 
-    def _sense_again(self, senses: FingerSenses) -> FingerSenses:
-        """The same moment with the newest command."""
-        return FingerSenses(
-            angles=senses.angles,
-            velocities=senses.velocities,
-            tensions=senses.tensions,
-            lengths=senses.lengths,
-            commands=self._command,
-            fingertip=senses.fingertip,
-        )
-
-    def _ours(self) -> dict[str, Any]:
-        """What of the rig's info is about a finger."""
-        info = {n: v for n, v in self._rig_info.items() if not n.startswith(_NOT_OURS)}
+    def _finger_info(self) -> dict[str, Any]:
+        """Return the entries of the rig's info that concern a finger."""
+        info = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
         return {"truncated_because": ""} | info
 
-    def _look(self) -> None:
-        """Ask the twin how the finger really stands."""
+    def _read_truth(self) -> None:
+        """Read the true state from the twin."""
         if self._operator is None:
             return
         truth = self._operator.where().truth
@@ -389,7 +353,7 @@ class RemoteFingerEnv(FingerReachEnv):
         self._true_angles = np.array([truth[f"{name}/angle"] for name in JOINTS])
 
     def _truth(self) -> dict[str, Any]:
-        """What the twin has told of the finger itself."""
+        """Return the info of the true state."""
         if self._true_tip is None or self._true_angles is None:
             return {}
         return {
@@ -399,9 +363,31 @@ class RemoteFingerEnv(FingerReachEnv):
 
 
 def _connected(access: dict[str, Any], pace: Pace | None) -> RemoteVehicleEnv:
-    """The rig, at the pace of its clock where none is given."""
+    """Connect to the rig, by default at the pace of its clock."""
     rig = RemoteVehicleEnv(**access, pace=pace or "lockstep")
     if pace is None and rig.welcome.clock == "real":
         rig.close()
         rig = RemoteVehicleEnv(**access, pace="realtime")
     return rig
+
+
+def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
+    """Serve the shipped profile of a rig on a twin with its own clock.
+
+    Args:
+        twin: "nominal", or the name of the gap that its finger is drawn from.
+        finger_seed: Seed of the finger drawn from the gap; 0 if not given.
+
+    Raises:
+        UnknownName: If there is no such gap.
+        FingerError: If a seed is given without a gap.
+        RobotError: If the twin does not start.
+    """
+    if twin not in ("", NOMINAL_TWIN, *GAPS):
+        raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
+    if twin not in GAPS and finger_seed is not None:
+        raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
+    drawn = ("--gap", twin, "--finger-seed", str(finger_seed or 0))
+    return run_robot(
+        find_profile(_PROFILE), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+    )

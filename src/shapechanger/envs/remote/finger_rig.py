@@ -1,4 +1,4 @@
-"""What a finger on a rig senses, and what its servos are told, in the terms of `Finger-v1`."""
+"""Convert measurements and commands of a finger rig to those of `Finger-v1`."""
 
 from __future__ import annotations
 
@@ -18,31 +18,30 @@ from shapechanger.tasks.finger import FingerSenses, fingertip
 
 __all__ = ["RigSenses", "StartApproach"]
 
-# m. What no error of arms and no friction makes of lengths; one turn of a small spool is 30 mm.
+# Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
 _MISFIT_M: Final = 0.012
 _QUANTITIES: Final = ("length", "speed", "tension")
 
 
 class RigSenses:
-    """Reads the state of a rig, and writes its commands.
+    """Reads the state of a rig, and converts tensions to its commands.
 
-    Where a rig has encoders at its joints, the angles are theirs, and velocities the differences
-    from one period of control to the next, smoothed as those of `FingerPlant` with noisy joints.
-    Other rigs sense at their servos alone: the angles are those, within the ranges of the joints,
-    that fit the seven lengths best with the nominal moment arms, after what the tensions stretch
-    the tendons by, and velocities follow from the speeds of the tendons.
+    With encoders at the joints, angles are theirs, and velocities are differences over one control
+    period, smoothed as in `FingerPlant` with noisy joints. Otherwise angles are the least-squares
+    fit of the seven lengths, corrected for the stretch of the tendons, with the nominal moment arms
+    and within the joints' ranges, and velocities follow from the speeds of the tendons.
 
     Args:
         robot: Name of the rig.
-        action_layout: Of the rig's commands.
-        state_layout: Of its state.
-        tendon_stiffness: Of its tendons, N/m.
+        action_layout: Layout of the rig's commands.
+        state_layout: Layout of its state.
+        tendon_stiffness: Stiffness of its tendons, N/m.
         control_dt: Time between two readings, s.
 
     Attributes:
         has_encoders: Whether it has encoders at all four joints.
-        most: What each tendon may pull, N, (7,).
-        least: What each tendon pulls at 0, N, (7,).
+        most: Largest tension of each tendon, N, (7,).
+        least: Tension of each tendon at command 0, N, (7,).
 
     Raises:
         RobotRefused: If it has other tendons, or does not measure them.
@@ -66,8 +65,8 @@ class RigSenses:
         ]
         if lacks or len(actions) != len(TENDONS):
             raise RobotRefused(
-                f"{robot} is no finger on a rig of servos: that has the commands "
-                f"{', '.join(TENDONS)} and the length, speed and tension of each"
+                f"{robot} is not a finger rig, which has the commands {', '.join(TENDONS)} and "
+                "measures the length, speed and tension of each"
                 + (f"; this one lacks {', '.join(lacks[:3])}." if lacks else ".")
             )
         slices = state_layout.slices
@@ -80,12 +79,12 @@ class RigSenses:
         spans = [(actions[name].gain, actions[name].gain_unit) for name in TENDONS]
         if any(unit != "N" for _, unit in spans) or not np.isfinite(self.most).all():
             raise RobotRefused(
-                f"The profile of {robot} does not say what its commands pull: each action must "
-                "pull one tendon alone, with a weight of 1."
+                f"The profile of {robot} does not define the tension of its commands: each action "
+                "must pull a single tendon, with a weight of 1."
             )
         self.least = self.most - np.array([span for span, _ in spans])
         self._compliance = 1.0 / tendon_stiffness
-        # Least squares; the lengths shorten with the arms.
+        # Least squares; positive arms shorten the tendons.
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
         self._state = np.zeros(state_layout.size)
         encoders = [f"{name}/angle" for name in JOINTS]
@@ -94,35 +93,35 @@ class RigSenses:
         self._differences = JointVelocities(control_dt)
 
     def forget(self) -> None:
-        """Begin anew, at rest: what was read before was long ago."""
+        """Start over at rest, without earlier measurements."""
         self._differences.forget()
 
     def fits(self, senses: FingerSenses) -> bool:
-        """Whether the lengths are those of a finger; slack that is not wound in is of none."""
+        """Return whether the lengths fit a posture; with slack tendons they do not."""
         return bool(np.abs(self._misfit(senses)).max() <= _MISFIT_M)
 
     def require_fit(self, senses: FingerSenses) -> None:
-        """Refuse lengths that are those of no finger: a servo without power forgets its turns.
+        """Refuse lengths that fit no posture, as after a servo has lost power and its turns.
 
         Raises:
-            RobotRefused: If they fit no angles, and which is off.
+            RobotRefused: If they fit no posture; the message names the worst tendon.
         """
         off = self._misfit(senses)
         worst = int(np.argmax(np.abs(off)))
         if not self.fits(senses):
             raise RobotRefused(
                 f"The lengths of the tendons fit no posture of a finger; {TENDONS[worst]} is off "
-                f"by {1e3 * abs(off[worst]):.0f} mm. Servos that were without power forget their "
-                "turns: find the zeros with `shapechanger robot home`."
+                f"by {1e3 * abs(off[worst]):.0f} mm. Servos lose count of their turns without "
+                "power: find the zeros with `shapechanger robot home`."
             )
 
     def _misfit(self, senses: FingerSenses) -> NDArray[np.float64]:
-        """How much longer each tendon is than at those angles, m, (7,)."""
+        """Return how much longer each tendon is than its angles require, m, (7,)."""
         wound = -MOMENT_ARMS @ senses.angles
         return senses.lengths + self._compliance * senses.tensions - wound
 
     def values(self, tensions: NDArray[np.float64]) -> NDArray[np.float32]:
-        """The rig's command for some tensions, N, (7,), kept in what its tendons may pull."""
+        """Return the rig's command for tensions, N, (7,), clipped to their range."""
         kept = np.clip(tensions, self.least, self.most)
         shares = (kept - self.least) / (self.most - self.least)
         return shares[self._order].astype(np.float32)
@@ -130,11 +129,11 @@ class RigSenses:
     def read(
         self, state: NDArray[Any], absent: tuple[str, ...], commands: NDArray[np.float64]
     ) -> FingerSenses:
-        """One moment of the finger.
+        """Convert one state of the rig.
 
         Args:
             state: The rig's state, in the order of its layout.
-            absent: Names of the numbers that nothing measured now: they keep their last value.
+            absent: Names of the numbers that were not measured now; they keep their last value.
             commands: The newest command, -1 to 1, (7,).
         """
         fresh = np.asarray(state, np.float64)
@@ -160,29 +159,28 @@ class RigSenses:
         )
 
 
-# All tried out on a twin with geared servos, XL330-M077 on spools of 10 mm. As fast as it may go,
-# 1/s of what is left and rad/s; and how it is held to that speed, 1/s.
+# Tuned on a twin with geared servos, XL330-M077 on spools of 10 mm. Approach rate, 1/s, and speed
+# limit, rad/s; and gain of the speed controller, 1/s.
 _RATE: Final = 8.0
 _MOST_SPEED: Final = 3.0
 _GAIN: Final = 30.0
-# What rotor and gears weigh at the tendon, kg: with spools of 10 mm tens of times the finger.
+# Mass of rotor and gears at the tendon, kg: with spools of 10 mm tens of times the finger's.
 _GEARED_KG: Final = 1.44
-# What gears hold against, N, and the speed of a tendon, m/s, below which they are not told to.
+# Friction of the gears, N, and the tendon speed below which it is compensated partly, m/s.
 _GEAR_FRICTION_N: Final = 0.55
 _CREEP_M_PER_S: Final = 0.004
-# A finger that does not move as it should is pulled more and more: friction and arms differ. N·m
-# for a radian that it lags behind, of at most so many rad/s.
+# Integral gain, N·m per rad of lag, because friction and arms differ; and limit of the lag, rad/s.
 _MORE_NM: Final = 0.08
 _MOST_LAG: Final = 0.8
 
 
 class StartApproach:
-    """The way to one posture.
+    """Controller that brings the finger to a start posture.
 
     Args:
-        posture: rad, (4,).
-        least: What each tendon pulls at least, N, (7,).
-        most: What it pulls at most, N, (7,).
+        posture: The posture, rad, (4,).
+        least: Smallest tension of each tendon, N, (7,).
+        most: Largest tension of each tendon, N, (7,).
     """
 
     def __init__(
@@ -195,18 +193,17 @@ class StartApproach:
         self._inertia = _GEARED_KG * MOMENT_ARMS.T @ MOMENT_ARMS
 
     def off(self, senses: FingerSenses) -> float:
-        """How far the farthest joint is from the posture, rad."""
+        """Return the largest joint error, rad."""
         return float(np.abs(senses.angles - self._posture).max())
 
     def tensions(self, senses: FingerSenses) -> NDArray[np.float64]:
-        """What to pull with for the next period of control, N, (7,)."""
+        """Return the tensions for the next control period, N, (7,)."""
         left = self._posture - senses.angles
         speed = np.clip(_RATE * left, -_MOST_SPEED, _MOST_SPEED)
         lag = speed - senses.velocities
         self._more += _MORE_NM * CONTROL_DT * np.clip(lag, -_MOST_LAG, _MOST_LAG)
         torque = self._held + self._inertia @ (_GAIN * lag) + self._more
-        # Whoever winds in pulls against its gears; whoever lets out is held by them. There is room
-        # for both.
+        # Gears resist winding in and hold when letting out: leave room for both.
         least, most = self._least + _GEAR_FRICTION_N, self._most - _GEAR_FRICTION_N
         pull, _ = tensions_for_torque(MOMENT_ARMS, torque, least, most)
         return pull + _GEAR_FRICTION_N * np.tanh(MOMENT_ARMS @ speed / _CREEP_M_PER_S)

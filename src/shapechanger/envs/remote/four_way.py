@@ -1,4 +1,4 @@
-"""The action of 2017: one of four keys."""
+"""Action wrapper with the four keys of 2017."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from shapechanger.errors import SpaceMismatch
 __all__ = ["FOUR_WAYS", "FourWay"]
 
 FOUR_WAYS: Final = ("forward", "backward", "right", "left")
-"""What the numbers 0 to 3 mean, in the order of the columns of 2017's `labels.csv`."""
+"""Meanings of the actions 0 to 3, in the order of the columns of 2017's `labels.csv`."""
 
 _STEERING_THROTTLE: Final = 2
 
 
 class FourWay(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
-    """Drive with one of four keys, as the car of 2017 was driven.
+    """Wrapper for driving with one of four keys, as with the car of 2017.
 
-    In 2017 an action was four numbers of which one was 1. A key that steers did not drive.
+    In 2017 an action was a one-hot vector of four numbers. A steering key did not drive.
 
     Args:
         env: An env whose action is [steering, throttle], in [-1, 1].
-        throttle: How much forward and backward are, 0 to 1.
-        steering: How much right and left are, 0 to 1.
-        throttle_in_turns: How much right and left drive, -1 to 1; 0 as in 2017.
+        throttle: Throttle of forward and backward, 0 to 1.
+        steering: Steering of right and left, 0 to 1.
+        throttle_in_turns: Throttle of right and left, -1 to 1; 0 as in 2017.
 
     Raises:
         SpaceMismatch: If the env has other actions.
@@ -44,7 +44,7 @@ class FourWay(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
     ) -> None:
         if env.action_space.shape != (_STEERING_THROTTLE,):
             raise SpaceMismatch(
-                f"Four keys drive what has [steering, throttle]; this env has {env.action_space}."
+                f"FourWay needs an env with [steering, throttle], got {env.action_space}."
             )
         super().__init__(env)
         self.action_space = gym.spaces.Discrete(len(FOUR_WAYS))
@@ -59,13 +59,13 @@ class FourWay(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
         )
 
     def action(self, action: np.int64 | int) -> NDArray[np.float32]:
-        """[steering, throttle] of a key, see `FOUR_WAYS`.
+        """Return [steering, throttle] of a key, see `FOUR_WAYS`.
 
         Raises:
-            SpaceMismatch: If it is the number of no key.
+            SpaceMismatch: If the action is not 0, 1, 2 or 3.
         """
         key = -1
-        with suppress(TypeError):  # Neither 1.5 nor a list nor text is a whole number.
+        with suppress(TypeError):  # For 1.5, a list or text.
             key = operator.index(action)
         if not 0 <= key < len(FOUR_WAYS):
             keys = ", ".join(f"{number} ({way})" for number, way in enumerate(FOUR_WAYS))

@@ -1,4 +1,4 @@
-"""What happens before an episode: the robot is ours, is armed, and stands at the start."""
+"""Reset and takeover: how a remote env waits for the operator of its robot."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ from shapechanger.remote.inbox import Received
 
 __all__ = ["Preparation", "Takeover"]
 
-# s. How often to look whether a person has done something.
-_LOOK_EVERY_S: Final = 0.05
-# s. A wait that nobody is told of is said in the log when it is no short one any more.
-_TOLD_AFTER_S: Final = 2.0
+_POLL_S: Final = 0.05  # Period of checks for what a person does.
+_LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 _NS_PER_S: Final = 1e9
 
 _HAND_OVER: Final = "P in `shapechanger robot drive` lets a waiting program drive."
@@ -27,14 +25,14 @@ _log = logging.getLogger(__name__)
 
 
 class Preparation:
-    """The steps of one reset, which together may take so long and no longer.
+    """Steps of one reset, with one time limit for all of them.
 
     Args:
-        timeout_s: How long, s.
-        on_waiting: Is told in a sentence what is waited for, once for each thing; None for a
-            warning in the log of each thing that is waited for after 2 s.
-        clock: The time, s; never runs backwards.
-        called: Name under which the robot is known here; empty for none.
+        timeout_s: Time limit, s.
+        on_waiting: Called once with a sentence for each thing that is waited for; None for a
+            warning in the log after 2 s.
+        clock: Monotonic clock, s.
+        known_as: Name under which the robot is known on this machine; "" for none.
     """
 
     def __init__(
@@ -42,21 +40,21 @@ class Preparation:
         timeout_s: float,
         on_waiting: Callable[[str], object] | None,
         clock: Callable[[], float],
-        called: str = "",
+        known_as: str = "",
     ) -> None:
         self._timeout_s = timeout_s
         self._on_waiting = on_waiting
         self._clock = clock
-        self._called = called
+        self._known_as = known_as
         self._since = clock()
         self._until = self._since + timeout_s
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
-        """Connect, however often it takes.
+        """Connect, with retries.
 
         Raises:
-            RobotRefused: If the robot does not want us.
+            RobotRefused: If the robot refuses the client.
             LinkError: If it does not answer in time.
         """
         while True:
@@ -66,15 +64,13 @@ class Preparation:
                 raise
             except LinkError as error:
                 if not self._wait("The robot does not answer."):
-                    raise LinkError(
-                        f"{error} This was tried for {self._timeout_s:.0f} s."
-                    ) from None
+                    raise LinkError(f"{error} Gave up after {self._timeout_s:.0f} s.") from None
 
     def take(self, robot: RobotClient) -> None:
-        """Become the one who commands, when whoever does it now is done.
+        """Take control, once no other client has it.
 
         Raises:
-            RobotRefused: If they are not in time.
+            RobotRefused: If another client keeps control for too long.
         """
         while True:
             try:
@@ -86,7 +82,7 @@ class Preparation:
                 return
 
     def disarm(self, robot: RobotClient) -> None:
-        """Let the robot stand, so that a person can put it back.
+        """Disarm the robot, so that a person can put it back.
 
         Raises:
             RobotRefused: If it stays armed.
@@ -97,15 +93,15 @@ class Preparation:
                 raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
 
     def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
-        """Arm the robot where we may, or wait until a person has; then it is still ours.
+        """Arm the robot where that is allowed, or wait for a person; we then have control.
 
         Args:
             robot: The robot.
-            role: Who we are.
-            by_person: Whether to leave it to a person, even where we may.
+            role: Our role.
+            by_person: Whether to wait for a person in any case.
 
         Raises:
-            RobotRefused: If nobody does in time.
+            RobotRefused: If it is not armed in time.
         """
         name = robot.welcome.robot
         because = "It waits for a person"
@@ -114,7 +110,7 @@ class Preparation:
         while True:
             seen = robot.ask().message
             if not seen.mine and self._clock() <= self._until:
-                # A person has it, who gives it back to arm it for us.
+                # A person has control, and gives it back to arm the robot for us.
                 self.take(robot)
                 continue
             if seen.mine and seen.armed and not seen.emergency:
@@ -135,15 +131,15 @@ class Preparation:
                 )
 
     def _how_to_arm(self, name: str) -> str:
-        """What a person does to arm the robot for a program."""
-        first = "" if self._called else f"`shapechanger robot remember {name} …` once, then "
+        """Return instructions to arm the robot for a program."""
+        first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
         return (
-            f"{first}`shapechanger robot drive {self._called or name}` in another terminal, and "
+            f"{first}`shapechanger robot drive {self._known_as or name}` in another terminal, and "
             "there P, which arms it for the program"
         )
 
     def require_routine(self, robot: RobotClient) -> None:
-        """Refuse a robot without a reset routine before anything moves.
+        """Check that the robot has a reset routine, before it moves.
 
         Raises:
             RobotRefused: If its profile has none.
@@ -158,7 +154,7 @@ class Preparation:
         """Run the reset routine of the robot's profile.
 
         Raises:
-            RobotRefused: If it is disarmed meanwhile.
+            RobotRefused: If the robot is disarmed meanwhile.
         """
         for values, seconds in robot.welcome.reset:
             seen = robot.ask()
@@ -173,38 +169,39 @@ class Preparation:
     def first(
         self, robot: RobotClient, rest: tuple[float, ...], is_new: Callable[[Received, int], bool]
     ) -> Received:
-        """An observation of the time after all this.
+        """Wait for the first observation after the reset.
 
-        Where the robot waits for us, it is moved on by commands that move nothing.
+        In lockstep, commands at rest advance the robot's time.
 
         Args:
             robot: The robot.
-            rest: Such a command.
-            is_new: Whether an observation was made after a time of the robot.
+            rest: Command at rest.
+            is_new: Returns True if an observation was made after a time of the robot, ns.
 
         Raises:
-            LinkError: If none comes in time.
+            LinkError: If none arrives in time.
         """
         _, now_ns = robot.ping()
         seen = robot.ask()
         while not is_new(seen, now_ns):
             if self._clock() > self._until:
                 raise LinkError(
-                    f"{robot.welcome.robot} gives no new observation: does its camera still work?"
+                    f"{robot.welcome.robot} sends no new observation. Does its camera still work?"
                 )
             seen = robot.exchange(rest, seen) if robot.pace == "lockstep" else robot.ask()
         return seen
 
     def _wait(self, sentence: str, hint: str = "") -> bool:
-        """Wait a moment; whether there is still time.
+        """Wait a moment. Return False after the time limit.
 
         Args:
-            sentence: What is waited for.
-            hint: What a person may do about it, for the log.
+            sentence: What is waited for, a sentence.
+            hint: What a person can do, for the log.
         """
         now = self._clock()
-        if sentence not in self._told and (self._on_waiting or now - self._since > _TOLD_AFTER_S):
-            self._told.add(sentence)
+        is_due = self._on_waiting is not None or now - self._since > _LOG_AFTER_S
+        if is_due and sentence not in self._reported:
+            self._reported.add(sentence)
             if self._on_waiting is not None:
                 self._on_waiting(sentence)
             else:
@@ -213,21 +210,18 @@ class Preparation:
                 _log.warning("%s (Waiting for up to %.0f s more.)", words, left_s)
         if self._clock() > self._until:
             return False
-        time.sleep(_LOOK_EVERY_S)
+        time.sleep(_POLL_S)
         return True
 
 
-_PERSON: Final = "person"
-
-
 class Takeover:
-    """Lets an episode go on while a person drives.
+    """Continues an episode while a person has control.
 
-    A person who is done gives the robot back and arms it for the program; until both have
-    happened, the program waits and moves nothing.
+    Afterwards the person gives control back and arms the robot for the program. Until both have
+    happened, the program only sends suggestions.
 
     Args:
-        allowed: Whether an episode goes on at all when a person takes the robot.
+        allowed: Whether an episode goes on when a person takes control.
     """
 
     def __init__(self, *, allowed: bool) -> None:
@@ -235,11 +229,16 @@ class Takeover:
         self._waits = False
 
     def start(self) -> None:
-        """An episode begins: the robot is ours and armed."""
+        """Begin an episode with control of an armed robot."""
         self._waits = False
 
     def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
-        """Command, or say what we would do while somebody else commands.
+        """Send a command, or a suggestion while another client has control.
+
+        Args:
+            robot: The robot.
+            values: Values of the command.
+            last: The observation that it answers.
 
         Returns:
             Number of the command or suggestion.
@@ -250,25 +249,25 @@ class Takeover:
         if not self._allowed or last.mine:
             return robot.command(values, answers=last.seq)
         if not last.holder:
-            # The person may have changed their mind meanwhile; then they go on driving.
+            # A person who takes control again meanwhile keeps it.
             with contextlib.suppress(RobotRefused):
                 robot.take()
         return robot.suggest(values, answers=last.seq)
 
     def goes_on(self, seen: Observation) -> bool:
-        """Whether the episode goes on though the robot is not ours, or not armed.
+        """Return True if the episode goes on without control of an armed robot.
 
-        It does where a person drives, or is about to give it back.
+        It does while a person drives, or is about to give control back.
         """
         if not self._allowed or seen.emergency:
             return False
         if seen.mine and seen.armed:
             self._waits = False
-        elif seen.holder_role == _PERSON or not seen.holder:
+        elif seen.holder_role == "person" or not seen.holder:
             self._waits = True
-        return self._waits and (seen.mine or seen.holder_role == _PERSON or not seen.holder)
+        return self._waits and (seen.mine or seen.holder_role == "person" or not seen.holder)
 
     @staticmethod
     def action(seen: Observation) -> tuple[float, ...] | None:
-        """What a person commands; None where nobody but a program commands anything."""
-        return seen.commanded if seen.commanded and seen.holder_role == _PERSON else None
+        """Return the command of a person, or None if no person has control."""
+        return seen.commanded if seen.commanded and seen.holder_role == "person" else None

@@ -1,13 +1,12 @@
-"""The fastest exact way to step a body: a tuned step, and a model that moves equally for less.
+"""The fast step of ants and pendulums, bit-equal to Gymnasium's.
 
-`tuned.TunedStep` is mixed into an env; `ModelWatch` notices when a user edits the model;
-`find_fast_model` looks for a model that moves to the last bit like another and costs less.
+`tuned.TunedStep` is the mixin; `ModelWatch` detects edits to a model; `find_fast_model` finds a
+model that moves equally to the last bit and costs less.
 """
 
 from __future__ import annotations
 
-from shapechanger.envs.actions import check_action
 from shapechanger.envs.stepping.fast_model import find_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 
-__all__ = ["ModelWatch", "check_action", "find_fast_model"]
+__all__ = ["ModelWatch", "find_fast_model"]

@@ -1,4 +1,19 @@
-"""Running two models side by side, to the last bit."""
+"""Models that move like another to the last bit and cost less.
+
+Four parts of MuJoCo's step take time without changing any number of an ant or a pendulum:
+
+- **Islands.** The solver splits the constraints into islands that do not touch. One tree of bodies
+  has at most one island, so not looking for it gives the same sums in the same order.
+- **Contact search.** The possible contacts of one floor and a few geoms are known beforehand. Given
+  as explicit pairs, in the order in which the search would find them and with the parameters that
+  it would mix, they make the same contacts. Margins are *summed*.
+- **Collisions** of models in which nothing can collide, such as a pendulum.
+- **Springs, joint friction, sensors and equalities** of a model that has none.
+
+Two checks decide which of these may be left out: rules on the model, which keep every pair that the
+original could ever generate, and then a test that steps both models side by side. A model for which
+either fails keeps its contact search, or has no fast model at all.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +40,241 @@ __all__ = [
     "moves_equally",
 ]
 
-# What the two data must agree on after every step; all that a step leaves for the next is in it.
+_Ints = NDArray[np.int64]
+
+_BIT: Final = mujoco.mjtDisableBit
+_NO_ISLANDS: Final = int(_BIT.mjDSBL_ISLAND)
+_NO_SEARCH: Final = int(_BIT.mjDSBL_MIDPHASE)
+_NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
+# Elements that could split one tree into islands, or that the rules do not cover.
+_UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
+# Size of the cache; fast models of envs in use stay alive without it.
+_REMEMBERED: Final = 32
+_SMALLEST_MIX: Final = float(cast("Any", mujoco).mjMINVAL)
+
+_fast_models: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()
+_demands: WeakValueDictionary[bytes, Demand] = WeakValueDictionary()
+_lock = threading.Lock()
+
+
+def find_fast_model(
+    watch: ModelWatch, make_spec: Callable[[], mujoco.MjSpec]
+) -> mujoco.MjModel | None:
+    """Return a cheaper model that steps the data of a watched model and moves equally.
+
+    The result is cached, and all envs of a body share it: do not write to it.
+
+    Args:
+        watch: Watch of the compiled, unedited model.
+        make_spec: Returns the spec that the model was compiled from.
+
+    Returns:
+        The fast model; None if none is known to move equally.
+    """
+    if not watch.sees:
+        return None
+    name = watch.digest
+    with _lock:  # Of several threads with the same body, one searches.
+        if name not in _fast_models:
+            _fast_models[name] = next(
+                (
+                    candidate
+                    for candidate in _candidates(watch.model, make_spec)
+                    if moves_equally(watch.model, candidate)
+                ),
+                None,
+            )
+            while len(_fast_models) > _REMEMBERED:
+                _fast_models.popitem(last=False)
+        return _fast_models[name]
+
+
+def forget_fast_models() -> None:
+    """Clear the cache, to measure the time of a search."""
+    with _lock:
+        _fast_models.clear()
+
+
+class Demand:
+    """Demand for the fast model of a body.
+
+    Attributes:
+        steps: Steps that all envs with the body have taken without it.
+    """
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+
+def demand_for(watch: ModelWatch) -> Demand:
+    """Return the demand for the fast model of a watched model, shared by all envs of its body."""
+    name = watch.digest
+    with _lock:
+        demand = _demands.get(name)
+        if demand is None:
+            demand = _demands[name] = Demand()
+        return demand
+
+
+def known_fast_model(watch: ModelWatch) -> mujoco.MjModel | None:
+    """Return the fast model of the watched model, if it has been found."""
+    name = watch.digest
+    with _lock:
+        if name in _fast_models:
+            _fast_models.move_to_end(name)
+        return _fast_models.get(name)
+
+
+def _candidates(
+    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
+) -> Iterator[mujoco.MjModel]:
+    """Yield the models that the rules allow, the cheapest first."""
+    if _is_one_tree(model):
+        without_search = _without_search(model, make_spec)
+        if without_search is not None:
+            yield without_search
+        yield _in_one_piece(model)
+
+
+def _is_one_tree(model: mujoco.MjModel) -> bool:
+    """Return whether all constraints are in one tree, and the rules cover all elements."""
+    return (
+        model.ntree == 1
+        and not model.opt.enableflags
+        and not any(getattr(model, size) for size in _UNKNOWN)
+        and mujoco.get_mjcb_contactfilter() is None
+    )
+
+
+def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return the model without the search for islands."""
+    result = copy.copy(model)
+    result.opt.disableflags |= _NO_ISLANDS | _idle(model)
+    return result
+
+
+def _idle(model: mujoco.MjModel) -> int:
+    """Return the disable flags of what a model, without elements such as tendons, has none of."""
+    # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
+    # those of a fluid.
+    has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
+    has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
+    idle = int(_BIT.mjDSBL_EQUALITY)
+    if has_dampers and not has_springs:
+        idle |= int(_BIT.mjDSBL_SPRING)
+    if not model.dof_frictionloss.any():
+        idle |= int(_BIT.mjDSBL_FRICTIONLOSS)
+    if not model.nsensor:
+        idle |= int(_BIT.mjDSBL_SENSOR)
+    return idle
+
+
+def _without_search(
+    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
+) -> mujoco.MjModel | None:
+    """Return the model without islands and with all possible contacts as explicit pairs."""
+    if model.npair:
+        return None
+    _, pairs = colliding_pairs(model)
+    if not pairs.size:
+        result = copy.copy(model)
+        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS | _idle(model)
+        return result
+    names = [model.geom(geom).name for geom in range(model.ngeom)]
+    if not _on_one_floor(model, pairs) or not all(names):
+        return None
+    spec = make_spec()
+    for first, second in pairs.tolist():
+        cast("Any", spec).add_pair(geomname1=names[first], geomname2=names[second])
+    result = spec.compile()
+    if not _same_but_for_pairs(model, result):
+        return None
+    _mix(result)
+    # Leave no geom to the search, neither by itself nor by its body.
+    for bits in (
+        result.geom_contype,
+        result.geom_conaffinity,
+        result.body_contype,
+        result.body_conaffinity,
+    ):
+        bits[:] = 0
+    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _idle(model)
+    return result
+
+
+def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
+    """Return whether each pair joins the only fixed geom with the only geom of a body.
+
+    The order of the pairs then follows from that of the bodies.
+    """
+    bodies = model.geom_bodyid[pairs]
+    fixed = model.body_weldid[bodies] == 0
+    floor = np.unique(pairs[fixed])
+    moving = bodies[~fixed]
+    involved = np.unique(pairs)
+    return bool(
+        (fixed.sum(axis=1) == 1).all()
+        and floor.size == 1
+        and np.unique(moving).size == moving.size
+        and np.unique(model.geom_priority[involved]).size == 1
+        and not model.geom_adhesion[involved].any()
+        and not model.geom_surfacevel[involved].any()
+    )
+
+
+def _mix(model: mujoco.MjModel) -> None:
+    """Give each pair the parameters that the search would mix from its geoms.
+
+    Source: MuJoCo 4.0.0, `mujoco/doc/modeling.rst`, "Contact parameters"; margins and gaps are
+    summed, as measured.
+    """
+    one, other = model.pair_geom1, model.pair_geom2
+    model.pair_margin[:] = model.geom_margin[one] + model.geom_margin[other]
+    model.pair_gap[:] = model.geom_gap[one] + model.geom_gap[other]
+    model.pair_dim[:] = np.maximum(model.geom_condim[one], model.geom_condim[other])
+    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
+    model.pair_friction[:] = friction[:, [0, 0, 1, 2, 2]]
+    model.pair_solreffriction[:] = 0.0
+    for pair, (first, second) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
+        part = _part(*model.geom_solmix[[first, second]].tolist())
+        both = model.geom_solref[[first, second]]
+        model.pair_solref[pair] = (
+            part * both[0] + (1.0 - part) * both[1]
+            if (both[:, 0] > 0.0).all()
+            else both.min(axis=0)  # Direct format: stiffness and damping.
+        )
+        model.pair_solimp[pair] = (
+            part * model.geom_solimp[first] + (1.0 - part) * model.geom_solimp[second]
+        )
+
+
+def _part(one: float, other: float) -> float:
+    """Return the weight of the first geom in a mix.
+
+    Args:
+        one: `solmix` of the first geom.
+        other: `solmix` of the second geom.
+    """
+    if one >= _SMALLEST_MIX and other >= _SMALLEST_MIX:
+        return one / (one + other)
+    if one < _SMALLEST_MIX and other < _SMALLEST_MIX:
+        return 0.5
+    return 0.0 if one < _SMALLEST_MIX else 1.0
+
+
+def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
+    """Return whether two models have the same numbers, except names and pairs."""
+    for name in dir(model):
+        mine: Any = getattr(model, name)
+        if type(mine) is not np.ndarray or name.startswith(("pair_", "name", "_")):
+            continue
+        its: Any = getattr(other, name)
+        if its.dtype != mine.dtype or not np.array_equal(its, mine):
+            return False
+    return True
+
+
+# Fields that must be equal after every step; they include everything that the next step uses.
 _FIELDS: Final = (
     *("time", "qpos", "qvel", "act", "qacc", "qacc_warmstart", "qfrc_constraint", "xpos", "xquat"),
     *(
@@ -46,24 +295,28 @@ _OF_CONTACTS: Final = (
     *("geom", "dist", "pos", "frame", "includemargin", "friction", "solref", "solreffriction"),
     *("solimp", "dim", "exclude", "efc_address"),
 )
-# Starts from the model's own pose and from drawn ones, and steps from each.
+# Number of starts, the first from the model's own pose, and of steps from each.
 _STARTS: Final = 6
 _STEPS: Final = 8
 _SEED: Final = 20170706
-# Part of a joint's range, or rad and m where it has none, by which the drawn poses differ; and the
-# velocities, rad/s and m/s.
+# Spread of random poses, as a fraction of a joint's range, or rad and m without one; and standard
+# deviation of velocities, rad/s and m/s.
 _POSE_NOISE: Final = 0.5
 _SPEED: Final = 3.0
-# How deep below the floor the trunk is put, so that every geom touches it, m.
+# Depth of the trunk below the floor, so that every geom touches it, m.
 _SUNK_M: Final = 0.02
 
 
 def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
-    """Whether two models move equally, to the last bit, from a few starts.
+    """Return whether two models move equally, to the last bit, from several starts.
 
-    Some starts hang free; in others the trunk is thrown, turned over or sunk into the floor, so
-    that geoms touch it and joints are pressed into their limits. Every pair that can collide must
-    have touched where the search for contacts differs.
+    In some starts the trunk is in the air, in others it is thrown, turned over or sunk into the
+    floor, so that geoms touch it and joints reach their limits. Where the contact search differs,
+    every pair that can collide must have touched.
+
+    Args:
+        model: The original model.
+        other: The model that shall replace it.
     """
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
@@ -74,7 +327,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
             mujoco.mj_resetData(model, data)
             data.qpos[:] = pose
             data.qvel[:] = speed
-            mujoco.mj_forward(model, data)  # As at a reset: by the original.
+            mujoco.mj_forward(model, data)  # By the original, as in a reset.
         for _ in range(_STEPS):
             action = rng.uniform(-1.0, 1.0, model.nu)
             one.ctrl[:] = two.ctrl[:] = action
@@ -106,7 +359,7 @@ def _equal(one: Any, two: Any) -> bool:
 def _drawn(
     model: mujoco.MjModel, rng: np.random.Generator, start: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A pose (nq,) and velocities (nv,) to start from."""
+    """Return a pose (nq,) and velocities (nv,) to start from."""
     speed = _SPEED * rng.standard_normal(model.nv)
     if start == 0:
         return model.qpos0.copy(), np.zeros(model.nv)
@@ -114,7 +367,7 @@ def _drawn(
     for joint in range(model.njnt):
         at = int(model.jnt_qposadr[joint])
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-            if start % 2:  # Sunk: every geom that lies about level with the trunk touches.
+            if start % 2:  # Sunk: every geom level with the trunk touches.
                 pose[at + 2] = -_SUNK_M * start
             else:
                 pose[at + 2] = 0.4
@@ -124,231 +377,3 @@ def _drawn(
             pose[at] += rng.uniform(-_POSE_NOISE, _POSE_NOISE) * (high - low)
     mujoco.mj_normalizeQuat(model, pose)
     return pose, speed
-
-
-_Ints = NDArray[np.int64]
-
-_BIT: Final = mujoco.mjtDisableBit
-_NO_ISLANDS: Final = int(_BIT.mjDSBL_ISLAND)
-_NO_SEARCH: Final = int(_BIT.mjDSBL_MIDPHASE)
-_NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
-# What would let bodies of one tree be solved apart, or tie them to what the rules do not look at.
-_UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
-# Models that are remembered; those of envs that are in use live on by themselves.
-_REMEMBERED: Final = 32
-_SMALLEST_MIX: Final = float(cast("Any", mujoco).mjMINVAL)
-
-_twins: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()
-_demands: WeakValueDictionary[bytes, Demand] = WeakValueDictionary()
-_lock = threading.Lock()
-
-
-def find_fast_model(
-    watch: ModelWatch, make_spec: Callable[[], mujoco.MjSpec]
-) -> mujoco.MjModel | None:
-    """A model that steps the data of the watched model, moves equally, and costs less.
-
-    The answer is remembered, and one twin is shared by all envs of a body: nobody may write to it.
-
-    Args:
-        watch: The watch of the compiled model, which is unedited.
-        make_spec: Makes what the model was compiled from.
-
-    Returns:
-        The twin; None if there is none that is sure to move equally.
-    """
-    if not watch.sees:
-        return None
-    name = watch.digest
-    with _lock:  # Of several threads with the same body, one looks.
-        if name not in _twins:
-            _twins[name] = next(
-                (
-                    candidate
-                    for candidate in _candidates(watch.model, make_spec)
-                    if moves_equally(watch.model, candidate)
-                ),
-                None,
-            )
-            while len(_twins) > _REMEMBERED:
-                _twins.popitem(last=False)
-        return _twins[name]
-
-
-def forget_fast_models() -> None:
-    """Forget all twins, as for a measurement of what it takes to find one."""
-    with _lock:
-        _twins.clear()
-
-
-class Demand:
-    """How much a twin would be used.
-
-    Attributes:
-        steps: How many steps all envs with one body have taken without.
-    """
-
-    def __init__(self) -> None:
-        self.steps = 0
-
-
-def demand_for(watch: ModelWatch) -> Demand:
-    """The demand for a twin of the watched model, shared by all envs of its body."""
-    name = watch.digest
-    with _lock:
-        demand = _demands.get(name)
-        if demand is None:
-            demand = _demands[name] = Demand()
-        return demand
-
-
-def known_fast_model(watch: ModelWatch) -> mujoco.MjModel | None:
-    """The twin of the watched model, as it was when the watch began, if it has been found."""
-    name = watch.digest
-    with _lock:
-        if name in _twins:
-            _twins.move_to_end(name)
-        return _twins.get(name)
-
-
-def _candidates(
-    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
-) -> Iterator[mujoco.MjModel]:
-    """What the rules allow, the cheapest first."""
-    if _is_one_tree(model):
-        without_search = _without_search(model, make_spec)
-        if without_search is not None:
-            yield without_search
-        yield _in_one_piece(model)
-
-
-def _is_one_tree(model: mujoco.MjModel) -> bool:
-    """Whether all constraints are about one tree, and nothing unknown is in the model."""
-    return (
-        model.ntree == 1
-        and not model.opt.enableflags
-        and not any(getattr(model, size) for size in _UNKNOWN)
-        and mujoco.get_mjcb_contactfilter() is None
-    )
-
-
-def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The model without the search for islands."""
-    result = copy.copy(model)
-    result.opt.disableflags |= _NO_ISLANDS | _idle(model)
-    return result
-
-
-def _idle(model: mujoco.MjModel) -> int:
-    """The flags of what the model has none of; it has nothing unknown, such as tendons."""
-    # Without springs and dampers MuJoCo leaves out all other passive forces too.
-    has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
-    has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
-    idle = int(_BIT.mjDSBL_EQUALITY)
-    if has_dampers and not has_springs:
-        idle |= int(_BIT.mjDSBL_SPRING)
-    if not model.dof_frictionloss.any():
-        idle |= int(_BIT.mjDSBL_FRICTIONLOSS)
-    if not model.nsensor:
-        idle |= int(_BIT.mjDSBL_SENSOR)
-    return idle
-
-
-def _without_search(
-    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
-) -> mujoco.MjModel | None:
-    """The model without islands and with all its contacts as explicit pairs."""
-    if model.npair:
-        return None
-    _, pairs = colliding_pairs(model)
-    if not pairs.size:
-        result = copy.copy(model)
-        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS | _idle(model)
-        return result
-    names = [model.geom(geom).name for geom in range(model.ngeom)]
-    if not _on_one_floor(model, pairs) or not all(names):
-        return None
-    spec = make_spec()
-    for first, second in pairs.tolist():
-        cast("Any", spec).add_pair(geomname1=names[first], geomname2=names[second])
-    result = spec.compile()
-    if not _same_but_for_pairs(model, result):
-        return None
-    _mix(result)
-    # No geom is left for the search, by itself or by its body.
-    for bits in (
-        result.geom_contype,
-        result.geom_conaffinity,
-        result.body_contype,
-        result.body_conaffinity,
-    ):
-        bits[:] = 0
-    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _idle(model)
-    return result
-
-
-def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
-    """Whether each pair is the one fixed geom with the one geom of a body, mixed alike.
-
-    Then the order of the pairs, which is that of their bodies, leaves nothing open.
-    """
-    bodies = model.geom_bodyid[pairs]
-    fixed = model.body_weldid[bodies] == 0
-    floor = np.unique(pairs[fixed])
-    moving = bodies[~fixed]
-    involved = np.unique(pairs)
-    return bool(
-        (fixed.sum(axis=1) == 1).all()
-        and floor.size == 1
-        and np.unique(moving).size == moving.size
-        and np.unique(model.geom_priority[involved]).size == 1
-        and not model.geom_adhesion[involved].any()
-        and not model.geom_surfacevel[involved].any()
-    )
-
-
-def _mix(model: mujoco.MjModel) -> None:
-    """Give each pair the numbers that the search would have mixed from its geoms.
-
-    Source: MuJoCo 4.0.0, `mujoco/doc/modeling.rst`, "Contact parameters"; margins and gaps are
-    summed, as measured.
-    """
-    one, other = model.pair_geom1, model.pair_geom2
-    model.pair_margin[:] = model.geom_margin[one] + model.geom_margin[other]
-    model.pair_gap[:] = model.geom_gap[one] + model.geom_gap[other]
-    model.pair_dim[:] = np.maximum(model.geom_condim[one], model.geom_condim[other])
-    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
-    model.pair_friction[:] = friction[:, [0, 0, 1, 2, 2]]
-    model.pair_solreffriction[:] = 0.0
-    for pair, (first, second) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
-        part = _part(*model.geom_solmix[[first, second]].tolist())
-        both = model.geom_solref[[first, second]]
-        model.pair_solref[pair] = (
-            part * both[0] + (1.0 - part) * both[1]
-            if (both[:, 0] > 0.0).all()
-            else both.min(axis=0)  # Given directly, not as time and damping.
-        )
-        model.pair_solimp[pair] = (
-            part * model.geom_solimp[first] + (1.0 - part) * model.geom_solimp[second]
-        )
-
-
-def _part(one: float, other: float) -> float:
-    """The part of the first geom in a mix."""
-    if one >= _SMALLEST_MIX and other >= _SMALLEST_MIX:
-        return one / (one + other)
-    if one < _SMALLEST_MIX and other < _SMALLEST_MIX:
-        return 0.5
-    return 0.0 if one < _SMALLEST_MIX else 1.0
-
-
-def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
-    """Whether two models hold the same numbers, names and pairs apart."""
-    for name in dir(model):
-        mine: Any = getattr(model, name)
-        if type(mine) is not np.ndarray or name.startswith(("pair_", "name", "_")):
-            continue
-        its: Any = getattr(other, name)
-        if its.dtype != mine.dtype or not np.array_equal(its, mine):
-            return False
-    return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import threading
 from collections.abc import Sequence
@@ -32,12 +31,14 @@ __all__ = [
 
 
 class PausedTimer:
-    """A context in which MuJoCo measures nothing, for all threads; threads may be in it together.
+    """Context in which MuJoCo's profiling timer is paused, for all threads at once.
 
-    A clock that somebody has installed with `mujoco.set_mjcb_time` goes on.
+    In C nothing is measured unless a clock is installed. Python's MuJoCo installs one, and an ant's
+    step reads it hundreds of times to fill `data.timer`; `python -m benchmarks.run speed` measures
+    the cost. No other number depends on it. A clock installed with `mujoco.set_mjcb_time` is kept.
 
     Args:
-        clock: Where the address of the function is that tells the time.
+        clock: The pointer to the clock function.
     """
 
     def __init__(self, clock: ctypes.c_void_p) -> None:
@@ -60,16 +61,16 @@ class PausedTimer:
 
 
 @cache
-def paused_timer() -> contextlib.AbstractContextManager[None]:
-    """The context in which the stopwatch rests; it does nothing where there is no way to it."""
+def paused_timer() -> AbstractContextManager[None]:
+    """Return the context that pauses the timer; it does nothing if the timer cannot be reached."""
     if mujoco.get_mjcb_time() is not None:
-        return contextlib.nullcontext()  # Somebody's own clock, and ours is not known.
+        return nullcontext()  # A user's clock; MuJoCo's own is unknown then.
     try:
-        # The bindings are linked to the library, wherever it lies.
+        # The bindings are linked to the library, wherever it is installed.
         bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
         return PausedTimer(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
     except (AttributeError, OSError, ValueError):
-        return contextlib.nullcontext()
+        return nullcontext()
 
 
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
@@ -81,6 +82,10 @@ _BAD_STATE: Final = slice(
 )
 NO_WARNINGS: Final = [0, 0, 0]
 """`Binding.warnings` of a simulation that has not diverged."""
+
+
+# What a binding holds views or copies of.
+_BOUND_TO: Final = frozenset({"model", "data", "frame_skip"})
 
 
 class Outcomes(NamedTuple):
@@ -120,6 +125,8 @@ class Binding:
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
         kind: Envs with the same kind are concluded together; empty for an env that steps by
             itself, None until it is known. It is renewed after each reset.
+        valid: Whether the binding may be used again without `ready_together`, as long as the model
+            is unedited.
     """
 
     def __init__(self, watch: ModelWatch, data: mujoco.MjData, frame_skip: int) -> None:
@@ -140,6 +147,7 @@ class Binding:
         self.qvel = data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[_BAD_STATE]
         self.kind: str | None = None
+        self.valid = False
 
     def step_with(self, fast: mujoco.MjModel | None) -> None:
         """Step with a fast model from now on; with None, the public model keeps stepping."""
@@ -186,6 +194,7 @@ class TunedStep(Reshapable):
         super()._follow_body()
         self._watch = ModelWatch(self.model)
         self._rules = None
+        self._invalidate()
         self._bound = None
 
     def _start_rules(self) -> StartRules:
@@ -200,8 +209,23 @@ class TunedStep(Reshapable):
         """Set the pose (nq,) and the velocities (nv,)."""
         super().set_state(qpos, qvel)
         self._started = True
+        self._invalidate()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute; a new model, data or frame skip invalidates the binding."""
+        super().__setattr__(name, value)
+        if name in _BOUND_TO:
+            self._invalidate()
+
+    def _invalidate(self) -> None:
         if self._bound is not None:
             self._bound.kind = None
+            self._bound.valid = False
+
+    @property
+    def timer(self) -> AbstractContextManager[None]:
+        """The context in which the physics of this env step."""
+        return paused_timer() if self.fast_model else nullcontext()
 
     def render(self) -> Any:
         """Return a frame, or None where a window shows it.
@@ -248,6 +272,7 @@ class TunedStep(Reshapable):
             return None
         if bound.kind is None:
             bound.kind = self._kind_of(bound)
+        bound.valid = bool(bound.kind and bound.has_fast_model)
         return bound if bound.kind else None
 
     def _kind_of(self, bound: Any) -> str:
@@ -258,7 +283,11 @@ class TunedStep(Reshapable):
         return ""
 
     def conclude(
-        self, bounds: Sequence[Any], before: Sequence[Any], actions: NDArray[Any]
+        self,
+        bounds: Sequence[Any],
+        before: Sequence[Any],
+        actions: NDArray[Any],
+        out: NDArray[np.float64] | None,
     ) -> Outcomes:
         """Compute the results of envs of this one's kind after their physics has stepped.
 
@@ -266,6 +295,7 @@ class TunedStep(Reshapable):
             bounds: The binding of each env.
             before: What `remember` of each binding returned before the step.
             actions: The action of each env, a row each.
+            out: Array to write the observations into; None for a new one.
         """
         raise NotImplementedError
 
@@ -305,10 +335,9 @@ class TunedStep(Reshapable):
         if watch is None or watch.model is not self.model or not self._is_as_written():
             return None
         bound = self._bound = self._bind(watch)
-        if self.fast_model:
-            bound.timer = paused_timer()
-            if (fast := known_fast_model(watch)) is not None:
-                bound.step_with(fast)
+        bound.timer = self.timer
+        if self.fast_model and (fast := known_fast_model(watch)) is not None:
+            bound.step_with(fast)
         return bound
 
     def _is_as_written(self) -> bool:

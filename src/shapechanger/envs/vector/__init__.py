@@ -1,4 +1,4 @@
-"""Many envs stepped together by a few threads, with the numbers of Gymnasium's `SyncVectorEnv`."""
+"""Vector envs that step many envs with a few threads, with the results of `SyncVectorEnv`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Whether envs fit into one vector env."""
+"""Check the envs of a vector env, and the arguments of its reset."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, cast
 
@@ -17,10 +18,10 @@ _LONGEST_BODY: Final = 60
 
 
 def require_boxes(env: gym.Env[Any, Any]) -> None:
-    """Refuse spaces that are not arrays of numbers.
+    """Require Box spaces.
 
     Raises:
-        VectorEnvError: If one of the two is not.
+        VectorEnvError: If a space is not a Box.
     """
     for side, space in (("observation", env.observation_space), ("action", env.action_space)):
         if not isinstance(space, gym.spaces.Box):
@@ -31,10 +32,10 @@ def require_boxes(env: gym.Env[Any, Any]) -> None:
 
 
 def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
-    """Refuse envs whose numbers differ in how many they are or in what they mean.
+    """Require that all envs have the same spaces and layouts.
 
     Raises:
-        SpaceMismatch: If the spaces, or the names of what is in them, are not those of the first.
+        SpaceMismatch: If a space, or the names of its numbers, differ from those of the first env.
     """
     first = envs[0]
     for number, env in enumerate(envs[1:], 1):
@@ -59,20 +60,17 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
 
 
 def _names(env: gym.Env[Any, Any], side: str) -> tuple[str, ...]:
-    """What the numbers of a space are called; nothing if the env does not say."""
+    """Return the names of the numbers of a space; empty for an env without layouts."""
     layout = getattr(env.unwrapped, f"{side}_layout", None)
     return () if layout is None else tuple(layout.names)
 
 
 def _size(space: gym.spaces.Box) -> int:
-    size = 1
-    for length in space.shape:
-        size *= length
-    return size
+    return math.prod(space.shape)
 
 
 def _body(env: gym.Env[Any, Any]) -> str:
-    """The body of an env: its name if it has one, else its edits, not longer than a line."""
+    """Describe the body of an env: its name if it has one, else its edits, shortened."""
     inner: Any = env.unwrapped
     name = type(inner).__name__ if env.spec is None else env.spec.id
     body = getattr(inner, "body", None)
@@ -89,7 +87,11 @@ def _body(env: gym.Env[Any, Any]) -> str:
 
 
 def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """A seed for each env: a number counts up from the first env.
+    """Return one seed per env; a single number counts up from the first env.
+
+    Args:
+        seed: A number, one seed per env, or None.
+        num_envs: How many envs there are.
 
     Raises:
         VectorEnvError: If there are not as many seeds as envs.
@@ -106,7 +108,11 @@ def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> lis
 def masked_options(
     options: dict[str, Any] | None, num_envs: int
 ) -> tuple[NDArray[np.bool_] | None, dict[str, Any] | None]:
-    """Which envs are to be reset, or None for all, and the options for each of them.
+    """Split the options of a reset into its mask, None for all envs, and the others.
+
+    Args:
+        options: Options, which may contain `reset_mask`.
+        num_envs: How many envs there are.
 
     Raises:
         TypeError: If the mask is not an array of booleans.
@@ -116,12 +122,12 @@ def masked_options(
         return None, options
     mask = options["reset_mask"]
     if not isinstance(mask, np.ndarray):
-        raise TypeError(f"`reset_mask` is an array of booleans, not a {type(mask).__name__}.")
+        raise TypeError(f"`reset_mask` must be an array of booleans, not a {type(mask).__name__}.")
     given = cast("NDArray[Any]", mask)
     if given.dtype != np.bool_:
-        raise TypeError(f"`reset_mask` is an array of booleans, not of {given.dtype}.")
+        raise TypeError(f"`reset_mask` must be an array of booleans, not of {given.dtype}.")
     if given.shape != (num_envs,):
-        raise ValueError(f"`reset_mask` has the shape ({num_envs},), not {given.shape}.")
+        raise ValueError(f"`reset_mask` must have the shape ({num_envs},), not {given.shape}.")
     if not given.any():
         raise ValueError("`reset_mask` is true for no env, so nothing would be reset.")
     return given.copy(), {key: value for key, value in options.items() if key != "reset_mask"}

@@ -1,4 +1,4 @@
-"""A vector env whose envs are stepped by a few threads."""
+"""A vector env that steps its envs with a few threads."""
 
 from __future__ import annotations
 
@@ -14,26 +14,50 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from shapechanger.envs.actions import checked
-from shapechanger.envs.vector.batch import BatchStep
+from shapechanger.envs.actions import check_actions
+from shapechanger.envs.vector.batch import BatchStep, SubEnv
 from shapechanger.envs.vector.checks import (
     masked_options,
     one_seed_each,
     require_boxes,
     require_same_spaces,
 )
-from shapechanger.envs.vector.infos import Restart, Results, SubEnv, batched, in_columns
-from shapechanger.envs.vector.threads import Crew, Failures, work_through
+from shapechanger.envs.vector.infos import Restart, StepResults, batched, in_columns
+from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError
 
-__all__ = ["EnvAccess", "ThreadVectorEnv"]
+__all__ = ["ThreadVectorEnv"]
 
 
-class EnvAccess(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
-    """What a vector env passes on to its envs, as Gymnasium's `SyncVectorEnv` does.
+_Floats = NDArray[np.float64]
+_Bools = NDArray[np.bool_]
+
+
+class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
+    """Envs that are stepped together, with the results of Gymnasium's `SyncVectorEnv`.
+
+    MuJoCo steps outside Python's lock, so threads share the cores; each has a range of neighbouring
+    envs. Observations, rewards, ends and infos equal those of `SyncVectorEnv` to the last bit, with
+    any number of threads and after any edit of an env's model. It differs in two ways: actions are
+    checked before any env steps, and an env whose simulation diverges is terminated with
+    `info["diverged"]` (see `SubEnv`).
+
+    If an env raises, the others finish the step; on Ctrl-C, the threads do. The envs are then no
+    longer at the same step, so the next call must be `reset` or `close`.
+
+    Args:
+        makers: One function per env that makes it; all envs have the same Box spaces.
+        threads: How many threads step, including the caller's; at least 1. With
+            `render_mode="human"` it is 1, because one thread must draw all windows.
+        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
+        copy: Whether to return copies of the observations; otherwise the next step overwrites them.
 
     Attributes:
         envs: The envs.
+
+    Raises:
+        VectorEnvError: If there are no envs, no threads, or spaces other than Box.
+        SpaceMismatch: If the spaces of two envs differ.
     """
 
     envs: list[gym.Env[Any, Any]]
@@ -41,99 +65,6 @@ class EnvAccess(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     action_space: gym.Space[Any]
     single_observation_space: gym.Space[Any]
     single_action_space: gym.Space[Any]
-
-    @property
-    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The seed of each env's generator."""
-        return self.get_attr("np_random_seed")
-
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Each env's generator."""
-        return self.get_attr("np_random")
-
-    def render(self) -> tuple[Any, ...]:
-        """One frame per env."""
-        self._require_open()
-        return self._of_each(lambda i: cast("Any", self.envs[i]).render())
-
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each env, or read an attribute.
-
-        Args:
-            name: Its name.
-            *args: Arguments of the method.
-            **kwargs: Named arguments of the method.
-        """
-
-        def ask(i: int) -> Any:
-            found = self.envs[i].get_wrapper_attr(name)
-            return found(*args, **kwargs) if callable(found) else found
-
-        return self._of_each(ask)
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute of each env."""
-        return self.call(name)
-
-    def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each env.
-
-        Args:
-            name: Its name.
-            values: A list or tuple with one value per env, or one value for all.
-
-        Raises:
-            VectorEnvError: If there are not as many values as envs.
-        """
-        each = cast("Sequence[Any]", values) if isinstance(values, list | tuple) else None
-        if each is not None and len(each) != self.num_envs:
-            raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
-        self._of_each(
-            lambda i: self.envs[i].set_wrapper_attr(name, values if each is None else each[i])
-        )
-
-    def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
-        """What `work` gives for the number of each env, where that env is at home."""
-        raise NotImplementedError
-
-    def _require_open(self) -> None:
-        """Refuse to go on after `close`.
-
-        Raises:
-            ClosedEnvironmentError: If there is nothing to go on with.
-        """
-        if self.closed:
-            raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
-
-
-_Floats = NDArray[np.float64]
-_Bools = NDArray[np.bool_]
-
-
-class ThreadVectorEnv(EnvAccess):
-    """Envs of one class, stepped together, with the numbers of Gymnasium's `SyncVectorEnv`.
-
-    MuJoCo steps outside Python's lock, so threads share the cores: each has a row of neighbouring
-    envs of its own, and is given work once a step. Observations, rewards, ends and infos are those
-    of `SyncVectorEnv` to the last bit, with any number of threads. Two things are better told:
-    actions are looked at before any env steps, and an env whose simulation diverges is terminated
-    with `info["diverged"]` (see `SubEnv`).
-
-    If an env raises, the others finish the step; if somebody presses Ctrl-C, the threads do. Both
-    leave the envs apart in time, so the next call must be `reset` or `close`.
-
-    Args:
-        makers: For each env a function that makes it; their spaces are boxes, and the same.
-        threads: How many threads step, with that of the caller; at least one. Windows are drawn by
-            one thread, so with `render_mode="human"` it is one.
-        autoreset_mode: When an env that has ended starts again, as Gymnasium's vector envs.
-        copy: Whether observations are copies; else the next step writes into them.
-
-    Raises:
-        VectorEnvError: If there are no envs, no threads, or spaces that are not boxes.
-        SpaceMismatch: If the spaces of two envs differ.
-    """
 
     def __init__(
         self,
@@ -149,7 +80,7 @@ class ThreadVectorEnv(EnvAccess):
             raise VectorEnvError(f"A vector env needs at least one thread, got {threads}.")
         self.copy = copy
         self.autoreset_mode = self._mode = autoreset_mode
-        self.envs: list[gym.Env[Any, Any]] = []
+        self.envs = []
         try:
             for maker in makers:
                 self.envs.append(maker())
@@ -170,21 +101,17 @@ class ThreadVectorEnv(EnvAccess):
         self._action_shape = cast("tuple[int, ...]", self.single_action_space.shape)
         space = self.observation_space
         self._observations = np.zeros(cast("tuple[int, ...]", space.shape), space.dtype)
-        self._members = [
+        self._subs = [
             SubEnv(env, row) for env, row in zip(self.envs, self._observations, strict=True)
         ]
         self._ended = np.zeros(self.num_envs, np.bool_)
-        self._nowhere = np.zeros(self.num_envs, np.bool_)
+        self._none = np.zeros(self.num_envs, np.bool_)
         self._awaits_reset = True
-        threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
-        self._crew = Crew(threads, self.num_envs)
-        # Ends the threads of a vector env that nobody closes, and at the end of the program.
-        weakref.finalize(self, self._crew.stop)
-
-    @property
-    def threads(self) -> int:
-        """How many threads step, with that of the caller."""
-        return self._crew.threads
+        self.threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
+        self._threads = EnvThreads(self.threads, self.num_envs)
+        self._batch = BatchStep(self._subs, self._observations, self.threads)
+        # Ends the threads of a vector env that is never closed, at the latest at exit.
+        weakref.finalize(self, self._threads.stop)
 
     def reset(
         self,
@@ -205,7 +132,7 @@ class ThreadVectorEnv(EnvAccess):
 
         Raises:
             VectorEnvError: If there are not as many seeds as envs.
-            ResetNeeded: If the mask leaves envs out that have never been reset.
+            ResetNeeded: If the mask leaves out envs that have never been reset.
             TypeError: If the mask is not an array of booleans.
             ValueError: If the mask has another shape, or is true nowhere.
         """
@@ -214,10 +141,9 @@ class ThreadVectorEnv(EnvAccess):
         mask, options = masked_options(options, self.num_envs)
         if mask is not None and self._awaits_reset and not mask.all():
             raise gym.error.ResetNeeded("No episode is under way: call `reset` without a mask.")
-        chosen = range(self.num_envs) if mask is None else [int(i) for i in np.flatnonzero(mask)]
+        chosen = None if mask is None else np.flatnonzero(mask).tolist()
         observations, infos = self.reset_each(seeds, [options] * self.num_envs, chosen)
-        everybody = range(self.num_envs)
-        return observations, batched(in_columns(everybody, infos), self.num_envs)
+        return observations, batched(in_columns(range(self.num_envs), infos), self.num_envs)
 
     def reset_each(
         self,
@@ -225,25 +151,25 @@ class ThreadVectorEnv(EnvAccess):
         options: Sequence[dict[str, Any] | None],
         chosen: Sequence[int] | None = None,
     ) -> tuple[NDArray[Any], list[dict[str, Any]]]:
-        """Start an episode in each env, as `reset`; what came of it is told env by env.
+        """Start an episode in each env as `reset` does, but return one info per env.
 
         Args:
             seeds: The seed of each env.
             options: The options of each env.
-            chosen: Numbers of the envs that start again; None for all.
+            chosen: Numbers of the envs to reset; None for all.
 
         Returns:
-            The observations of all envs, and for each its info, empty where none started.
+            The observations of all envs, and the info of each, empty where it was not reset.
         """
         self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = range(self.num_envs) if chosen is None else chosen
 
         def start(i: int) -> None:
-            infos[i] = self._members[i].reset(seeds[i], options[i])
+            infos[i] = self._subs[i].reset(seeds[i], options[i])
 
         if any(given and "body" in given for given in options):
-            # Another body is compiled by one thread at a time, and its pictures are drawn anew.
+            # One thread at a time compiles a body, and its renderer is replaced.
             compiling = threading.Lock()
 
             def start_in_turn(i: int) -> None:
@@ -252,7 +178,7 @@ class ThreadVectorEnv(EnvAccess):
 
             self._guarded(lambda: self._at_home(start_in_turn, numbers))
         else:
-            self._guarded(lambda: self._crew.do(start, numbers))
+            self._guarded(lambda: self._threads.do(start, numbers))
         self._ended[numbers] = False
         return self._present_observations(), infos
 
@@ -268,78 +194,137 @@ class ThreadVectorEnv(EnvAccess):
             ClosedEnvironmentError: If the vector env is closed.
         """
         observations, results = self.step_each(actions)
-        return (
-            observations,
-            results.rewards,
-            results.terminated,
-            results.truncated,
-            results.batched(),
-        )
+        ends = results.terminated, results.truncated
+        return observations, results.rewards, *ends, results.batched()
 
-    def step_each(self, actions: Any) -> tuple[NDArray[Any], Results]:
-        """Take one step in each env, as `step`; what came of it can be told env by env.
+    def step_each(self, actions: Any) -> tuple[NDArray[Any], StepResults]:
+        """Take one step in each env as `step` does, but return results that hold one info per env.
+
+        Args:
+            actions: One action per env; their precision is kept.
 
         Returns:
-            The observations of all envs, and all else.
+            The observations of all envs, and all other results.
         """
         self._require_open()
-        waits = self._ended if self._mode is AutoresetMode.NEXT_STEP else self._nowhere
-        given = checked(actions, self.num_envs, self._action_shape, waits)
+        waiting = self._ended if self._mode is AutoresetMode.NEXT_STEP else self._none
+        given = check_actions(actions, self.num_envs, self._action_shape, waiting)
         self._require_running()
-        results = Results(self.num_envs)
-        restart = partial(self._restart, results) if self._starts_at_once else None
-        step = BatchStep(
-            self._members, given, self._observations, results, restart, self._crew.threads
-        )
-        self._guarded(lambda: self._advance(waits.tolist(), step, results))
+        results = StepResults(self.num_envs)
+        self._guarded(lambda: self._advance(given, waiting.tolist(), results))
         self._ended = results.terminated | results.truncated
         return self._present_observations(), results
 
-    def _advance(self, waiting: list[bool], stride: BatchStep, results: Results) -> None:
-        """Start again who waits for it, and step the others."""
+    def _advance(self, actions: NDArray[Any], waiting: list[bool], results: StepResults) -> None:
+        """Reset the envs that wait for it, and step the others."""
+        same_step = self._mode is AutoresetMode.SAME_STEP
+        restart = partial(self._restart, results)
+        self._batch.begin(actions, results, restart if same_step else None)
 
-        def start(i: int) -> None:
-            results.tell(i, (0.0, False, False, self._members[i].reset()))
+        def reset(i: int) -> None:
+            results.put(i, (0.0, False, False, self._subs[i].reset()))
 
         def work(thread: int, failures: Failures) -> None:
-            own = self._crew.parts[thread]
-            begin = [i for i in own if waiting[i]]
-            # What draws may not change threads.
-            work_through(start, [i for i in begin if self._members[i].tuned is None], failures)
-            anywhere = [i for i in begin if self._members[i].tuned is not None]
-            stride.advance(
-                thread,
-                [i for i in own if not waiting[i]],
-                [(i, partial(start, i)) for i in anywhere],
-                failures,
-            )
+            own = self._threads.parts[thread]
+            resets = [i for i in own if waiting[i]]
+            # Envs that may draw must stay in their thread.
+            for i in resets:
+                if self._subs[i].tuned is None:
+                    attempt(reset, i, failures)
+            anywhere = [i for i in resets if self._subs[i].tuned is not None]
+            stepping = [i for i in own if not waiting[i]]
+            self._batch.advance(thread, stepping, anywhere, reset, failures)
 
-        self._crew.share([partial(work, thread) for thread in range(self.threads)])
-        stride.conclude()
-        self._end_diverged(results)
-        if self._starts_at_once:
+        self._threads.share([partial(work, thread) for thread in range(self.threads)])
+        self._batch.conclude()
+        # Observations that are not finite end episodes, even if no simulation has noticed.
+        finite = np.isfinite(self._observations)
+        if not np.logical_and.reduce(finite, axis=None):
+            bad = ~finite.reshape(self.num_envs, -1).all(axis=1)
+            for i in np.flatnonzero(bad).tolist():
+                if i not in results.restarts:
+                    self._batch.end_diverged(i)
+        if same_step:
             ends = np.flatnonzero(results.terminated | results.truncated).tolist()
-            ended = [i for i in ends if i not in results.restarts]
-            if ended:
-                self._crew.do(partial(self._restart, results), ended)
+            if ended := [i for i in ends if i not in results.restarts]:
+                self._threads.do(restart, ended)
+
+    def _restart(self, results: StepResults, i: int) -> None:
+        """Reset an env whose episode has ended."""
+        sub = self._subs[i]
+        if not np.isfinite(sub.row).all():
+            self._batch.end_diverged(i)
+        results.restarts[i] = Restart(sub.row.copy(), sub.reset())
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The seed of each env's generator."""
+        return self.get_attr("np_random_seed")
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Each env's generator."""
+        return self.get_attr("np_random")
+
+    def render(self) -> tuple[Any, ...]:
+        """Return one frame per env."""
+        self._require_open()
+        return self._of_each(lambda i: cast("Any", self.envs[i]).render())
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of each env, or read an attribute.
+
+        Args:
+            name: Its name.
+            *args: Arguments of the method.
+            **kwargs: Named arguments of the method.
+        """
+
+        def ask(i: int) -> Any:
+            found = self.envs[i].get_wrapper_attr(name)
+            return found(*args, **kwargs) if callable(found) else found
+
+        return self._of_each(ask)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each env."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each env.
+
+        Args:
+            name: Its name.
+            values: A list or tuple with one value per env, or one value for all.
+
+        Raises:
+            VectorEnvError: If there are not as many values as envs.
+        """
+        each = cast("Sequence[Any]", values) if isinstance(values, list | tuple) else None
+        if each is not None and len(each) != self.num_envs:
+            raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
+        self._of_each(
+            lambda i: self.envs[i].set_wrapper_attr(name, values if each is None else each[i])
+        )
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close each env and end the threads."""
         try:
             self._at_home(lambda i: self.envs[i].close(), range(self.num_envs))
         finally:
-            self._crew.stop()
+            self._threads.stop()
 
     def _at_home(self, work: Callable[[int], None], numbers: Iterable[int]) -> None:
-        """Do `work` for the envs `numbers`, where they draw.
+        """Do `work` for some envs in the thread that owns their OpenGL contexts.
 
-        Those that step their physics apart draw nothing by the way, so whoever asks them for a
-        picture draws it. Others may: what they draw with belongs to their thread.
+        Envs whose physics step separately never draw while they step, so the caller's thread draws
+        them. Others may, and then their contexts belong to their thread.
         """
-        drawn_here = self.closed or all(member.tuned is not None for member in self._members)
-        self._crew.do(work, numbers, alone=drawn_here)
+        drawn_here = self.closed or all(sub.tuned is not None for sub in self._subs)
+        self._threads.do(work, numbers, alone=drawn_here)
 
     def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
+        """Return the result of `work` for each env."""
         found: dict[int, Any] = {}
 
         def ask(i: int) -> None:
@@ -348,11 +333,20 @@ class ThreadVectorEnv(EnvAccess):
         self._at_home(ask, range(self.num_envs))
         return tuple(found[i] for i in range(self.num_envs))
 
-    def _require_running(self) -> None:
-        """Refuse to step envs that are not under way.
+    def _require_open(self) -> None:
+        """Refuse to go on after `close`.
 
         Raises:
-            ResetNeeded: If one must be reset first.
+            ClosedEnvironmentError: If the vector env is closed.
+        """
+        if self.closed:
+            raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
+
+    def _require_running(self) -> None:
+        """Refuse to step envs whose episode has not begun or has ended.
+
+        Raises:
+            ResetNeeded: If an env must be reset first.
         """
         if self._awaits_reset:
             raise gym.error.ResetNeeded("These envs are not at the same step: call `reset` first.")
@@ -364,34 +358,14 @@ class ThreadVectorEnv(EnvAccess):
             )
 
     def _guarded(self, work: Callable[[], None]) -> None:
-        """Let the threads work; if that fails their envs are to be reset."""
+        """Let the threads work; if that fails, the envs must be reset."""
         self._awaits_reset = True
         try:
             work()
         finally:
-            # Threads that are still at work would find their envs closed.
-            self.closed = self._crew.lost
+            # Closing envs that threads still work on is not safe.
+            self.closed = self._threads.lost
         self._awaits_reset = False
-
-    @property
-    def _starts_at_once(self) -> bool:
-        return self._mode is AutoresetMode.SAME_STEP
-
-    def _restart(self, results: Results, i: int) -> None:
-        """Reset an env whose episode has ended; if its last observation is bad, say why."""
-        member = self._members[i]
-        if not np.isfinite(member.row).all():
-            results.tell_diverged(i, member)
-        results.restarts[i] = Restart(member.row.copy(), member.reset())
-
-    def _end_diverged(self, results: Results) -> None:
-        """End the episodes whose observation is not finite, though nobody has noticed before."""
-        finite = np.isfinite(self._observations)
-        if not np.logical_and.reduce(finite, axis=None):
-            bad = ~finite.reshape(self.num_envs, -1).all(axis=1)
-            for i in np.flatnonzero(bad).tolist():
-                if i not in results.restarts:
-                    results.tell_diverged(i, self._members[i])
 
     def _present_observations(self) -> NDArray[Any]:
         return self._observations.copy() if self.copy else self._observations

@@ -1,47 +1,35 @@
-"""The infos of many envs as one dictionary of arrays, with a mask for each."""
+"""Infos and results of one step of many envs."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Container, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, cast
 
-import gymnasium as gym
 import numpy as np
-from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from shapechanger.envs.stepping.tuned import TunedStep
+__all__ = ["InfoColumns", "Restart", "Step", "StepResults", "batched", "in_columns"]
 
-__all__ = ["InfoColumns", "Restart", "Results", "Step", "SubEnv", "batched", "in_columns"]
+Step = tuple[Any, Any, Any, dict[str, Any]]
+"""Reward, terminated, truncated and info of one env."""
 
-# For each key one entry per env, and under the key with a `_` before it whether the env has one.
-Batch = dict[str, Any]
+# One entry per env for each key, and under `_key` a mask of the envs that have one.
+_Batch = dict[str, Any]
 
 
 class InfoColumns(NamedTuple):
-    """The infos of envs that have the same keys.
+    """Infos of envs that have the same keys.
 
     Attributes:
-        numbers: The numbers of the envs, from the lowest up.
-        values: For each key one value per env.
+        numbers: The numbers of the envs, ascending.
+        values: One value per env for each key.
     """
 
     numbers: Sequence[int]
     values: Mapping[str, Sequence[Any] | NDArray[Any]]
 
-    def only(self, places: Sequence[int]) -> InfoColumns:
-        """The infos of the envs at these places."""
-        if len(places) == len(self.numbers):
-            return self
-        return InfoColumns(
-            [self.numbers[place] for place in places],
-            {key: [column[place] for place in places] for key, column in self.values.items()},
-        )
-
     def rows(self) -> list[dict[str, Any]]:
-        """The info of each env."""
+        """Return the info of each env."""
         return [
             dict(zip(self.values, row, strict=True))
             for row in zip(*self.values.values(), strict=True)
@@ -49,7 +37,7 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
-    """The infos of the envs `numbers`, with those together that have the same keys."""
+    """Group the infos of the envs `numbers` by their keys."""
     groups: dict[tuple[str, ...], list[int]] = {}
     for place, info in enumerate(infos):
         groups.setdefault(tuple(info), []).append(place)
@@ -62,25 +50,25 @@ def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> li
     ]
 
 
-def batched(parts: Iterable[InfoColumns], num_envs: int) -> Batch:
-    """The infos of all envs, as Gymnasium's vector envs give them.
+def batched(parts: Iterable[InfoColumns], num_envs: int) -> _Batch:
+    """Return the infos of all envs as Gymnasium's vector envs do.
 
-    Gymnasium adds one env after another and each key by itself. Envs whose infos have the same keys
-    are added together here, for a tenth of the time.
+    Gymnasium adds one env after another, key by key. Adding envs whose infos have the same keys
+    together takes a tenth of the time.
 
     Args:
         parts: The infos of the envs that have any.
         num_envs: How many envs there are.
     """
-    batch: Batch = {}
+    batch: _Batch = {}
     _extend(batch, parts, num_envs)
     return batch
 
 
-def _extend(batch: Batch, parts: Iterable[InfoColumns], num_envs: int) -> None:
-    """Add infos to arrays for `num_envs`, those of the lowest env first, as its types count."""
+def _extend(batch: _Batch, parts: Iterable[InfoColumns], num_envs: int) -> None:
+    """Add infos to arrays for `num_envs` envs: the lowest env first, as it sets the dtypes."""
     for numbers, values in sorted(parts, key=lambda part: part.numbers[0]):
-        where = slice(None) if len(numbers) == num_envs else np.asarray(numbers)
+        where = _where(numbers, num_envs)
         masks = np.zeros((len(values), num_envs), np.bool_)
         masks[:, where] = True
         for (key, column), mask in zip(values.items(), masks, strict=True):
@@ -96,11 +84,20 @@ def _added(
     numbers: Sequence[int],
     where: slice | NDArray[np.intp],
     num_envs: int,
-) -> NDArray[Any] | Batch:
-    """What is under `key` once the values of the envs `numbers`, which are `where`, are in it."""
+) -> NDArray[Any] | _Batch:
+    """Return the entry of `key` after adding the values of the envs `numbers`.
+
+    Args:
+        before: The present entry, or None.
+        key: The key.
+        values: One value per env of `numbers`.
+        numbers: The envs that have a value.
+        where: Index of these envs in an array of all envs.
+        num_envs: How many envs there are.
+    """
     first = values[0]
     if isinstance(first, dict) and key != "final_obs":
-        inner: Batch = {} if before is None else before
+        inner: _Batch = {} if before is None else before
         _extend(inner, in_columns(numbers, cast("Sequence[Any]", values)), num_envs)
         return inner
     if before is None and isinstance(values, np.ndarray) and values.size == num_envs:
@@ -120,7 +117,7 @@ def _added(
 
 
 def _empty(value: Any, num_envs: int) -> NDArray[Any]:
-    """An array for values such as this."""
+    """Return an array for values such as this."""
     if _has_an_array(value):
         return np.zeros(num_envs, np.asarray(value).dtype)
     if isinstance(value, np.ndarray):
@@ -130,109 +127,13 @@ def _empty(value: Any, num_envs: int) -> NDArray[Any]:
 
 
 def _has_an_array(value: object) -> bool:
-    """Whether values of this type get an array of it; NumPy's booleans do not."""
+    """Return whether values of this type get an array of it; NumPy's booleans do not."""
     return type(value) in (int, float, bool) or isinstance(value, np.number)
 
 
-# Places of mjWARN_BADQPOS, mjWARN_BADQVEL and mjWARN_BADQACC among MuJoCo's warnings.
-_BAD_QPOS: Final = 3
-_BAD_QVEL: Final = 4
-_BAD_QACC: Final = 5
-
-# Reward, terminated, truncated and info.
-Step = tuple[Any, Any, Any, dict[str, Any]]
-
-
-class SubEnv:
-    """An env that writes its observations into a row of a batch.
-
-    An env with a method `step_into(action, row)` is stepped by it, past the wrappers of `gym.make`:
-    the clock of `TimeLimit` goes on here, and the others have nothing to do between two resets.
-
-    A simulation has diverged when the env's info says so, or MuJoCo found a position, velocity or
-    acceleration that is not finite or is huge, or an observation is not finite. MuJoCo then goes on
-    from the model's own pose, which is no result of the action: the env is terminated, the step is
-    worth nothing, and its info has `diverged`. Numbers that are not finite read 0.
-
-    Args:
-        env: The env, as `gym.make` makes it.
-        row: Where its observations go.
-
-    Attributes:
-        tuned: The env without its wrappers, if its physics may step apart; else None.
-    """
-
-    __slots__ = ("_clock", "_limit", "_step_into", "_warnings", "env", "row", "tuned")
-
-    def __init__(self, env: gym.Env[Any, Any], row: NDArray[Any]) -> None:
-        self.env = env
-        self.row = row
-        self._clock: Any = None
-        self._limit = math.inf
-        self._step_into: Any = None
-        self._warnings: NDArray[Any] | None = None
-        inner: Any = env
-        while isinstance(inner, OrderEnforcing | PassiveEnvChecker | TimeLimit):
-            if isinstance(inner, TimeLimit):
-                self._clock = inner
-                self._limit = cast("Any", inner)._max_episode_steps
-            inner = cast("Any", inner).env
-        if inner is env.unwrapped and row.dtype == np.float64:
-            self._step_into = getattr(inner, "step_into", None)
-        # Steps its physics apart from what it makes of it.
-        self.tuned: TunedStep | None = (
-            cast("TunedStep", inner)
-            if self._step_into is not None and hasattr(inner, "ready_together")
-            else None
-        )
-
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> dict[str, Any]:
-        """Start an episode, and return its info."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        self.row[...] = observation
-        # A reset may have brought another body, and with it other data.
-        if self._step_into is None:
-            data = getattr(self.env.unwrapped, "data", None)
-            self._warnings = None if data is None else data.warning.number
-        return info
-
-    def step(self, action: Any) -> Step:
-        """Take one step; reward, terminated, truncated and info are as those of the env."""
-        if self._step_into is None:
-            observation, reward, terminated, truncated, info = self.env.step(action)
-            self.row[...] = observation
-        else:
-            reward, terminated, truncated, info = self._step_into(action, self.row)
-            truncated = self.ticked() or truncated
-        if "diverged" in info or (self._warnings is not None and self._warned()):
-            return self.diverged(truncated, info)
-        return reward, terminated, truncated, info
-
-    def ready(self) -> Any:
-        """The binding of the env, if its physics may step apart; else `step` must do it all."""
-        if self.tuned is None:
-            return None
-        return self.tuned.ready_together()
-
-    def ticked(self) -> bool:
-        """Count one more step; whether the time of the episode is over with it."""
-        clock = self._clock
-        if clock is None:
-            return False
-        clock._elapsed_steps += 1
-        return clock._elapsed_steps >= self._limit
-
-    def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
-        """What a step is that no simulation stands behind."""
-        self.row[~np.isfinite(self.row)] = 0.0
-        return 0.0, True, truncated, {**info, "diverged": True}
-
-    def _warned(self) -> bool:
-        """Whether MuJoCo has found the simulation bad since the last reset."""
-        counts = cast("NDArray[Any]", self._warnings)
-        return bool(counts[_BAD_QPOS] or counts[_BAD_QVEL] or counts[_BAD_QACC])
+def _where(numbers: Sequence[int], num_envs: int) -> slice | NDArray[np.intp]:
+    """Return the index of envs in arrays of all envs; a slice, which copies nothing, for all."""
+    return slice(None) if len(numbers) == num_envs else np.asarray(numbers)
 
 
 class Restart(NamedTuple):
@@ -247,19 +148,19 @@ class Restart(NamedTuple):
     info: dict[str, Any]
 
 
-class Results:
-    """What came of a step; threads may tell it of different envs at the same time.
+class StepResults:
+    """Results of one step of all envs; threads may fill in different envs at the same time.
 
-    Infos of envs that are told of together stay columns until somebody asks for them one by one.
+    Infos that arrive in columns stay columns until they are needed env by env.
 
     Args:
         num_envs: How many envs there are.
 
     Attributes:
-        rewards: What the step was worth to each, shape (n,).
-        terminated: Whether it ended the episode of each, (n,).
-        truncated: Whether the episode of each was cut off, (n,).
-        restarts: By number the envs that started again at once.
+        rewards: Shape (n,).
+        terminated: Whether the step ended each episode, shape (n,).
+        truncated: Whether each episode was cut off, shape (n,).
+        restarts: The envs that were reset within the step, by number.
     """
 
     def __init__(self, num_envs: int) -> None:
@@ -267,68 +168,64 @@ class Results:
         self.terminated = np.zeros(num_envs, np.bool_)
         self.truncated = np.zeros(num_envs, np.bool_)
         self.restarts: dict[int, Restart] = {}
-        self._single: dict[int, dict[str, Any]] = {}
+        self._infos: dict[int, dict[str, Any]] = {}
         self._columns: list[InfoColumns] = []
 
-    def tell(self, number: int, step: Step) -> None:
-        """Take what came of the step of one env."""
+    def put(self, number: int, step: Step) -> None:
+        """Set the result of one env."""
         reward, terminated, truncated, info = step
         self.rewards[number] = reward
         self.terminated[number] = terminated
         self.truncated[number] = truncated
-        self._single[number] = info
+        self._infos[number] = info
 
-    def tell_together(
+    def put_columns(
         self,
+        infos: InfoColumns,
         rewards: NDArray[Any],
         terminated: NDArray[np.bool_],
         truncated: list[bool],
-        infos: InfoColumns,
     ) -> None:
-        """Take what came of the steps of the envs that `infos` are of."""
-        everybody = len(infos.numbers) == self.rewards.size
-        where = slice(None) if everybody else np.asarray(infos.numbers)
+        """Set the results of several envs.
+
+        Args:
+            infos: Their infos, and which envs they are.
+            rewards: Their rewards.
+            terminated: Whether the step ended the episode of each.
+            truncated: Whether the episode of each was cut off.
+        """
+        where = _where(infos.numbers, self.rewards.size)
         self.rewards[where] = rewards
         self.terminated[where] = terminated
         self.truncated[where] = truncated
         self._columns.append(infos)
 
-    def tell_diverged(self, number: int, member: SubEnv) -> None:
-        """Take that the simulation of an env that has been told of has diverged."""
-        self._take_apart((number,))
-        cut_off = bool(self.truncated[number])
-        self.tell(number, member.diverged(cut_off, self._single[number]))
+    def info(self, number: int) -> dict[str, Any]:
+        """Return the info of one env."""
+        self._expand()
+        return self._infos[number]
 
     def of_each(self) -> list[dict[str, Any]]:
-        """The info of each env."""
-        everybody = range(self.rewards.size)
-        self._take_apart(everybody)
-        return [self._single[number] for number in everybody]
+        """Return the info of each env."""
+        self._expand()
+        return [self._infos[number] for number in range(self.rewards.size)]
 
     def batched(self) -> dict[str, Any]:
-        """All infos as Gymnasium's vector envs give them, with those of restarts."""
-        self._take_apart(self.restarts)
-        numbers = sorted(self._single)
-        infos = [self._with_restart(number) for number in numbers]
-        return batched([*self._columns, *in_columns(numbers, infos)], self.rewards.size)
+        """Return all infos as Gymnasium's vector envs do, including those of restarts."""
+        if self.restarts:
+            self._expand()
+        numbers = sorted(self._infos)
+        infos = in_columns(numbers, [self._with_restart(number) for number in numbers])
+        return batched([*self._columns, *infos], self.rewards.size)
+
+    def _expand(self) -> None:
+        """Split the columns into one info per env."""
+        for columns in self._columns:
+            self._infos.update(zip(columns.numbers, columns.rows(), strict=True))
+        self._columns = []
 
     def _with_restart(self, number: int) -> dict[str, Any]:
-        info, restart = self._single[number], self.restarts.get(number)
+        info, restart = self._infos[number], self.restarts.get(number)
         if restart is None:
             return info
         return {"final_obs": restart.final_observation, "final_info": info, **restart.info}
-
-    def _take_apart(self, chosen: Container[int]) -> None:
-        """Take the infos of some envs out of the columns."""
-        kept: list[InfoColumns] = []
-        for columns in self._columns:
-            apart = [place for place, number in enumerate(columns.numbers) if number in chosen]
-            if not apart:
-                kept.append(columns)
-                continue
-            out = columns.only(apart)
-            self._single.update(zip(out.numbers, out.rows(), strict=True))
-            left = sorted({*range(len(columns.numbers))} - {*apart})
-            if left:
-                kept.append(columns.only(left))
-        self._columns = kept

@@ -1,4 +1,4 @@
-"""Making a vector env from an id."""
+"""Make a vector env from an id."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def make_vec(
     copy: bool = True,
     **arguments: Any,
 ) -> ThreadVectorEnv:
-    """Envs of one id that step together; `gymnasium.make_vec` gives the same.
+    """Make a vector env of one id; `gymnasium.make_vec` returns the same.
 
     Args:
         env_id: A registered id; of the catalogue its name alone, such as `BigAnt`, will do. The
             envs of any other class must not share what they change, as they step in threads.
         num_envs: How many envs.
-        threads: How many threads step them, with that of the caller: 1 starts none. None for as
-            many as there are cores that this process may use. The numbers are the same with any.
-        bodies: For each env its body, in place of one for all. Lengths and masses may differ; the
-            spaces may not.
-        autoreset_mode: When an env that has ended starts again, as Gymnasium's vector envs.
-        copy: Whether observations are copies; else the next step writes into them.
+        threads: How many threads step them, including the caller's; 1 starts none. None for as many
+            as the cores that this process may use. The results do not depend on it.
+        bodies: One body per env instead of one for all. Lengths and masses may differ, spaces may
+            not.
+        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
+        copy: Whether to return copies of the observations; otherwise the next step overwrites them.
         **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.
 
     Raises:
@@ -66,7 +66,7 @@ def make_vec(
         autoreset_mode=_mode(autoreset_mode),
         copy=copy,
     )
-    # What `gymnasium.make_vec(spec)` makes the same from; it fills the spec in by itself too.
+    # `gymnasium.make_vec(spec)` makes the same again; it sets the spec of its own results too.
     spec = copying.deepcopy(envs.envs[0].spec)
     if spec is not None and spec.vector_entry_point is not None:
         spec.kwargs.update(arguments, num_envs=count, vectorization_mode="vector_entry_point")
@@ -85,14 +85,14 @@ def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
 
 
 def _known_id(env_id: str) -> str:
-    """The id, where its name alone was given."""
+    """Return the full id of a name such as `BigAnt`."""
     if env_id in gym.registry or ":" in env_id or "/" in env_id:
         return env_id
     return find_task(env_id) or find(env_id).id
 
 
 def _cores() -> int:
-    """How many cores this process may use."""
+    """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

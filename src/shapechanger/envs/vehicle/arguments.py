@@ -1,4 +1,4 @@
-"""What somebody asks a vehicle's env for: refused in words, or brought into form."""
+"""Arguments of `VehicleEnv`: the robot's profile, the frame size, courses and reset options."""
 
 from __future__ import annotations
 
@@ -29,49 +29,58 @@ __all__ = [
 ]
 
 Steering = Literal["proportional", "bang"]
-"""How the wheels turn: anywhere, or full left, straight and full right only, as in 2017."""
+"""Steering angles: any, or only full left, straight and full right, as in 2017."""
 
 _LEVELS: Final[dict[str, Literal["any", "three"]]] = {"proportional": "any", "bang": "three"}
-_LARGEST: Final = 1920  # Pixels, as in a profile.
+_MAX_PIXELS: Final = 1920  # As in a profile.
 
 
 def check_frame_size(size: Sequence[int]) -> tuple[int, int]:
-    """Width and height of pictures in pixels.
+    """Return width and height of frames in pixels.
 
     Raises:
-        SpaceMismatch: If no picture has this size.
+        SpaceMismatch: If it is not two whole numbers in range.
     """
     try:
         wide, high = (operator.index(pixels) for pixels in size)
     except (TypeError, ValueError):
         wide = high = 0
-    if not (1 <= wide <= _LARGEST and 1 <= high <= _LARGEST):
+    if not (1 <= wide <= _MAX_PIXELS and 1 <= high <= _MAX_PIXELS):
         raise SpaceMismatch(
-            f"The size of a picture is its width and its height, each 1 to {_LARGEST} pixels, got "
-            f"{size}."
+            f"The size of a frame is its width and height, each 1 to {_MAX_PIXELS} pixels, "
+            f"got {size}."
         )
     return wide, high
 
 
 def check_seed(what: str, seed: Any) -> int:
-    """The seed of a course or a start.
+    """Return a seed as an integer.
+
+    Args:
+        what: What it is the seed of, for the message: "course" or "start".
+        seed: A whole number from 0.
 
     Raises:
-        WorldError: If it is none.
+        WorldError: If it is anything else.
     """
     try:
         number = operator.index(seed)
     except TypeError:
         number = -1
     if number < 0:
-        raise WorldError(f"The seed of a {what} is a whole number from 0, got {seed!r}.")
+        raise WorldError(f"The seed of a {what} must be a whole number from 0, got {seed!r}.")
     return number
 
 
 def resolve_profile(
     robot: str | os.PathLike[str], steering: Steering | None, size: tuple[int, int]
 ) -> Profile:
-    """The profile, with the steering and the size of pictures that are asked for.
+    """Load a profile, and set its steering and its camera's frame size.
+
+    Args:
+        robot: Path or name of the profile.
+        steering: Replaces the profile's steering; None to keep it.
+        size: Width and height of frames, pixels.
 
     Raises:
         UnknownName: If there is no such profile or steering.
@@ -84,7 +93,7 @@ def resolve_profile(
     if [action.name for action in actions] != ["steering", "throttle"]:
         names = ", ".join(action.name for action in actions)
         raise ProfileError(
-            f"{profile.path}: a vehicle's actions are steering and throttle, not {names}."
+            f"{profile.path}: a vehicle's actions must be steering and throttle, not {names}."
         )
     if steering is not None:
         if steering not in _LEVELS:
@@ -95,7 +104,7 @@ def resolve_profile(
 
 
 Courses = Literal["training", "held-out"] | Sequence[int]
-"""Courses that vehicles learn on, those that they are judged on, or some by their seeds."""
+"""Courses for training, held-out courses for evaluation, or courses by their seeds."""
 
 _KINDS: Final = {"training": TRAINING, "held-out": HELD_OUT}
 _OPTIONS: Final = ("course", "start")
@@ -103,13 +112,13 @@ _OPTIONS: Final = ("course", "start")
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSetup:
-    """An episode's surroundings.
+    """Course, start and appearance of one episode.
 
     Attributes:
         course: Seed of the course.
         start: Seed of the start.
-        look: How it looks; None for as usual.
-        camera: How far the camera is off its place; None for not at all.
+        look: Light and textures; None for the default ones.
+        camera: Displacement of the camera; None for none.
     """
 
     course: int
@@ -119,15 +128,15 @@ class EpisodeSetup:
 
 
 class CourseSampler:
-    """Draws the surroundings of episodes.
+    """Samples course, start and appearance of episodes.
 
     Args:
-        courses: Where courses come from.
-        randomise: Whether looks and the camera's pose are drawn, too.
+        courses: Courses to sample from.
+        randomise: Whether to sample light, textures and the camera's pose too.
 
     Raises:
         UnknownName: If there are no courses of this name.
-        WorldError: If there are none at all, or a seed is none.
+        WorldError: If there is no course, or a seed is not a whole number from 0.
     """
 
     def __init__(self, courses: Courses, randomise: bool) -> None:
@@ -136,7 +145,7 @@ class CourseSampler:
                 raise UnknownName("kind of courses", courses, _KINDS)
             self._seeds: Sequence[int] = _KINDS[courses]
         else:
-            given: Any = courses  # Such as one seed alone, of somebody without a type checker.
+            given: Any = courses  # May be a single seed where nothing checks types.
             seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
             self._seeds = tuple(check_seed("course", seed) for seed in seeds)
         if not self._seeds:
@@ -149,23 +158,23 @@ class CourseSampler:
         return self._seeds[0]
 
     def hold_out(self) -> None:
-        """Draw courses that no vehicle learns on from now on."""
+        """Sample held-out courses from now on."""
         self._seeds = HELD_OUT
 
     def draw(
         self, rng: np.random.Generator, world: str, options: Mapping[str, Any]
     ) -> EpisodeSetup:
-        """The next episode's.
+        """Sample the next episode.
 
         Args:
-            rng: What it is drawn with. What `options` give is drawn all the same, so that the rest
-                does not depend on them.
+            rng: Source of randomness. Values that `options` give are drawn all the same, so that
+                the others do not depend on the options.
             world: Kind of place.
             options: `course` and `start`, each a seed.
 
         Raises:
             UnknownName: If there is no such option.
-            WorldError: If a seed is none.
+            WorldError: If a seed is not a whole number from 0.
         """
         for name in options:
             if name not in _OPTIONS:

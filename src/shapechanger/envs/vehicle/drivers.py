@@ -1,4 +1,4 @@
-"""Whoever shows how to drive: the expert, with mistakes that it puts right."""
+"""Drivers for `VehicleEnv`: the course expert, a demonstrator, and the shipped camera policies."""
 
 from __future__ import annotations
 
@@ -18,13 +18,25 @@ from shapechanger.worlds.world import Pose
 
 __all__ = ["CLONES", "ExpertDriver", "VehicleDemonstrator"]
 
+# A vehicle that is farther away after one period of 1/20 s was put back, m.
+_MOVED_M: Final = 0.3
+_FOLDER: Final = Path(__file__).parent / "clones"
+
+CLONES: Final[Mapping[str, Path]] = MappingProxyType(
+    {vehicle: _FOLDER / f"{vehicle}.zip" for vehicle in ("boat", "car", "tank", "truck")}
+)
+"""Files of the shipped camera policies by vehicle; `CameraPolicy.load` reads them.
+
+Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
+"""
+
 
 class VehicleDemonstrator:
-    """Shows how to drive in one env.
+    """Expert that makes mistakes and recovers from them, for demonstrations.
 
     Args:
-        world: Where the vehicle is.
-        seed: Of the mistakes.
+        world: The world of the vehicle.
+        seed: Seed of the mistakes.
     """
 
     def __init__(self, world: MujocoWorld, seed: int) -> None:
@@ -33,7 +45,7 @@ class VehicleDemonstrator:
         self.begin()
 
     def begin(self) -> None:
-        """An episode has begun."""
+        """Begin an episode."""
         self._course = self._world.course
         self._expert = CourseExpert(self._course, self._world.vehicle.name, path=self._world.path())
         self._expert.reset(self._world.pose)
@@ -42,23 +54,21 @@ class VehicleDemonstrator:
         )
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """What it means to do now, and what it does: each (2,), steering and throttle.
+        """Return the expert's action, to learn from, and the disturbed one, to take.
 
-        The second is to be taken, and the first to be learned.
+        Returns:
+            Each has shape (2,): steering and throttle.
         """
         seen = self._world.inputs()
-        meant = self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
-        return meant, self._disturbance.applied(meant)
-
-
-_MOVED_M: Final = 0.3  # No vehicle drives as far as this in one period of 1/20 s.
+        action = self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+        return action, self._disturbance.applied(action)
 
 
 class ExpertDriver:
-    """Drives in one world, on whatever course is laid out there.
+    """Expert that drives on the present course of a world.
 
     Args:
-        world: Where the vehicle is.
+        world: The world of the vehicle.
     """
 
     def __init__(self, world: MujocoWorld) -> None:
@@ -66,7 +76,7 @@ class ExpertDriver:
         self._course: Course | None = None
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
-        """What to do now, (2,) steering and throttle; the observation is not looked at."""
+        """Return an action, (2,), steering and throttle; the observation is ignored."""
         seen = self._world.inputs()
         if self._world.course is not self._course:
             self._course = self._world.course
@@ -80,11 +90,3 @@ class ExpertDriver:
 
     def _was_moved(self, pose: Pose) -> bool:
         return math.hypot(pose.x - self._before.x, pose.y - self._before.y) > _MOVED_M
-
-
-_FOLDER: Final = Path(__file__).parent / "clones"
-
-CLONES: Final[Mapping[str, Path]] = MappingProxyType(
-    {vehicle: _FOLDER / f"{vehicle}.zip" for vehicle in ("boat", "car", "tank", "truck")}
-)
-"""File of the policy by the name of the vehicle; `CameraPolicy.load` reads it."""

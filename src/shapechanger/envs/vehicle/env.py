@@ -34,111 +34,80 @@ from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["VehicleEnv", "draw_vehicle", "vehicle_reach"]
+__all__ = ["VehicleEnv"]
 
-# The ground that it stands on: half of its side, m, and its colour on land and on water.
+# The ground in images of the vehicle: half of its side, m, and its colour on land and on water.
 _GROUND_M: Final = 2.0
 _LAND: Final = (0.62, 0.60, 0.56, 1.0)
 _WATER: Final = (0.24, 0.40, 0.46, 1.0)
-
-
-def vehicle_reach(vehicle: str) -> float:
-    """How far from its middle the farthest point of a vehicle is, m.
-
-    Raises:
-        UnknownName: If there is no such vehicle.
-    """
-    model = _alone(vehicle)
-    return body_reach(model, model.qpos0)
-
-
-def draw_vehicle(vehicle: str, width: int, height: int, reach: float) -> NDArray[np.uint8]:
-    """A vehicle on even ground, shape (height, width, 3), with `reach` metres around its middle.
-
-    Raises:
-        UnknownName: If there is no such vehicle.
-        RenderError: If the size is no size, or there is nothing to draw with.
-    """
-    model = _alone(vehicle)
-    return draw(model, model.qpos0, width, height, reach)
-
-
-def _alone(vehicle: str) -> mujoco.MjModel:
-    """A model of nothing but the vehicle and the ground."""
-    spec = mujoco.MjSpec()
-    model = add_vehicle(spec, vehicle)
-    ground = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE)
-    ground.size = (_GROUND_M, _GROUND_M, 1.0)
-    ground.rgba = _WATER if model.floats else _LAND
-    return spec.compile()
-
-
 _MODES: Final = ("rgb_array",)
 
 
 class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
-    """Drive fast and hit nothing, with a camera that looks ahead.
+    """Drive fast without collisions, with a camera that looks ahead.
 
-    The robot is that of a profile, with its own guard and drivers, on simulated pins: caps, slew,
-    reflexes and sensors are those of the robot on the bench. `shapechanger/RemoteVehicle-v1` is the
-    same task on hardware, or behind a link.
+    The robot is defined by a profile and runs its own guard and drivers on simulated pins: caps,
+    slew, reflexes and sensors are those of the robot on the bench. `shapechanger/RemoteVehicle-v1`
+    is the same task on hardware, or over the link.
 
     ## Action space
     `Box(-1, 1, (2,), float32)`: `[steering, throttle]`; -1 steers left, +1 drives forward. It acts
     for one control period of the profile, 1/20 s.
 
     ## Observation space
-    The camera's picture, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
-    `state=True` a Dict of `image` and `state`; with `image=False` the state alone. What the numbers
-    of the state are is in `observation_layout`.
+    The camera's frame, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
+    `state=True` a Dict of `image` and `state`; with `image=False` the state alone.
+    `observation_layout` names the numbers of the state.
 
     ## Reward
-    `DriveReward`: metres forward, minus collisions and seconds of being stuck, all as the robot's
-    own sensors tell. `info["reward_terms"]` and `info["reward_sources"]` say how it came about.
+    `DriveReward`: metres forward, minus collisions and seconds of being stuck, all measured by the
+    robot's own sensors. `info["reward_terms"]` and `info["reward_sources"]` give its terms and
+    where they come from.
 
     ## Start
     At a random place of a course that the seed draws, looking along it, at rest.
 
     ## End
-    Terminated when the bumper touches something, unless the reward says otherwise. Truncated after
-    1,000 steps.
+    Terminated when the bumper touches something, unless `collision_ends_episode` is 0. Truncated
+    after 1,000 steps.
 
     ## Info
     `progress`, metres along the course since the start; `collisions` since the start, of any part
-    of the vehicle, also those that no bumper tells; `pose`, (x, y, heading) in m and rad; `course`,
-    the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`,
-    `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
+    of the vehicle, also where no bumper detects them; `pose`, (x, y, heading) in m and rad;
+    `course`, the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
+    `refused`, `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`,
+    `decided_ns`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
-        world: "corridor", "yard" or "harbour"; None for where the vehicle is at home.
-        robot: A profile, as a path or by its name; None for `lab-` and the vehicle.
-        steering: Replaces how the profile steers; None to leave it.
-        size: Width and height of the pictures in pixels.
-        image: Whether observations have a picture.
-        state: Whether observations have the state besides the picture.
-        reward: Weights that replace those of the profile, by name.
-        courses: "training" or "held-out" for the courses that `reset` draws, or their seeds.
-        randomise: Whether `reset` draws light, textures and the camera's pose, too.
-        put_back: Whether a vehicle that ran into something is put back on the lane, as a person
-            beside it would do, and drives on. A collision then ends nothing.
-        lenses: What is wrong with the camera, such as ("night", "dirt"); see
+        world: "corridor", "yard" or "harbour"; None for the vehicle's usual place.
+        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
+        steering: Replaces the profile's steering; None to keep it.
+        size: Width and height of frames in pixels.
+        image: Whether observations include the frame.
+        state: Whether observations include the state besides the frame.
+        reward: Weights by name that replace those of the profile.
+        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
+        randomise: Whether `reset` samples light, textures and the camera's pose too.
+        put_back: Whether to put the vehicle back on the lane after a collision, as a person beside
+            it would do. A collision then does not end the episode.
+        lenses: Impairments of the camera, such as ("night", "dirt"); see
             `shapechanger.worlds.lens`.
-        render_mode: "rgb_array" for `render` to give the newest picture.
+        render_mode: "rgb_array" for `render` to return the newest frame.
 
     Attributes:
-        parts: What the robot's outputs turn, such as "wheels" and "steering".
+        parts: The parts that the robot's outputs move, such as "wheels" and "steering".
 
     Raises:
         UnknownName: If there is no such vehicle, world, profile, steering, weight, lens, render
             mode or kind of courses.
         ProfileError: If the profile moves other parts than the vehicle has, or has no camera.
-        SpaceMismatch: If no picture has this size.
+        SpaceMismatch: If the frame size is out of range.
         WorldError: If the vehicle cannot drive in the world.
     """
 
     record_clock: Final = "twin"
-    """Where the nanoseconds in `info` come from."""
+    """Clock of the nanoseconds in `info`."""
     metadata: dict[str, Any] = {"render_modes": [*_MODES], "render_fps": 20}  # noqa: RUF012
 
     def __init__(
@@ -160,9 +129,9 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        if find_spec("gpiozero") is None:  # The drivers load it when their pins are opened.
+        if find_spec("gpiozero") is None:  # The drivers import it when they open their pins.
             raise MissingExtra("gpiozero", "robot")
-        vehicle_model(vehicle)  # Before a profile of a vehicle that there is not is missed.
+        vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
         if render_mode is not None and render_mode not in _MODES:
             raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
@@ -193,43 +162,44 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def world(self) -> MujocoWorld:
-        """The world, for whoever may know the truth."""
+        """The simulated world, with its ground truth."""
         return self._world
 
     @property
     def action_layout(self) -> Layout:
-        """What the numbers of an action mean."""
+        """Name, unit and range of each number of the action."""
         return self._senses.action_layout
 
     @property
     def observation_layout(self) -> Layout:
-        """What the numbers of an observation mean; a picture is the one block `camera/image`."""
+        """Name, unit and range of each number of the observation; a frame is `camera/image`."""
         return self._senses.observation_layout
 
     @property
     def newest_jpeg(self) -> bytes | None:
-        """The picture in the newest observation, as the robot has it; None without one."""
+        """The JPEG frame of the newest observation, as the robot sent it; None without one."""
         return None if self._last is None or not self._senses.has_image else self._last.frame
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Put the vehicle at a start.
+        """Start an episode.
 
         Args:
-            seed: Of the draw of courses, starts and looks.
-            options: `course`, the seed of a course, and `start`, the seed of a start on it; what
-                is left out is drawn.
+            seed: Seed of the sampling of courses, starts and looks.
+            options: `course`, the seed of a course, and `start`, the seed of a start on it; omitted
+                ones are sampled.
 
         Raises:
             UnknownName: If there is no such option.
-            WorldError: If a seed is none, or the vehicle touches something at the start.
+            WorldError: If a seed is not a whole number from 0, or the vehicle touches something at
+                the start.
         """
         super().reset(seed=seed)
         drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
         if drawn.course != self._world.seed or drawn.look is not None:
             self._world.lay_out(drawn.course, drawn.look, drawn.camera)
-        self._world.zero_odometer()  # So that no episode depends on those before it.
+        self._world.zero_odometer()  # So that no episode depends on earlier ones.
         last = self._robot.start(lambda: self._world.place(drawn.start))
         if self._world.touches:
             raise WorldError(
@@ -242,7 +212,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return view.observation, self._info(last, view)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Act for one control period.
+        """Take one step of one control period.
 
         Raises:
             SpaceMismatch: If the action does not fit the robot.
@@ -264,19 +234,19 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return view.observation, sum(terms.values()), terminated, False, info
 
     def hold_out(self) -> None:
-        """Draw, from the next reset on, courses that no vehicle learns on."""
+        """Sample held-out courses from the next reset on."""
         self._draw.hold_out()
 
     def demonstrator(self, seed: int) -> VehicleDemonstrator:
-        """A driver that knows the whole course, and shows how to drive here.
+        """Return an expert that knows the whole course and recovers from its own mistakes.
 
         Args:
-            seed: Of the mistakes that it makes and puts right.
+            seed: Seed of the mistakes.
         """
         return VehicleDemonstrator(self._world, seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """What the camera sees now, shape (height, width, 3); None without a render mode.
+        """Return the camera's frame, shape (height, width, 3); None without a render mode.
 
         Raises:
             RenderError: If `reset` was never called.
@@ -284,45 +254,52 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if self.render_mode is None:
             return None
         if self._last is None:
-            raise RenderError("There is nothing to see before the first reset().")
+            raise RenderError("Call reset() before render().")
         return self._world.picture()
 
-    # What a transfer study asks of an env, whichever kind it is.
+    # Interface of transfer studies; see `shapechanger.transfer`.
 
     @staticmethod
     def certify_shift(
         source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
     ) -> VehicleShift:
-        """What changes from one vehicle to the other, wrappers included; both are reset.
+        """Compare two vehicles, wrappers included; both are reset.
+
+        Args:
+            source: The env in which a policy is trained.
+            target: The env that it is transferred to.
+            allow_empty: Whether to accept vehicles that do not differ.
 
         Raises:
-            MorphologyError: If one of them is no vehicle.
-            EmptyShift: If nothing does, and `allow_empty` is false.
+            MorphologyError: If one of them is not a vehicle.
+            EmptyShift: If they do not differ and `allow_empty` is false.
         """
         return certify_vehicles(source, target, allow_empty=allow_empty)
 
     @property
     def reach(self) -> float:
-        """How far from the middle of the vehicle its farthest point is, m."""
-        return vehicle_reach(self._world.vehicle.name)
+        """Distance from the middle of the vehicle to its farthest point, m."""
+        model = _without_world(self._world.vehicle.name)
+        return body_reach(model, model.qpos0)
 
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """The vehicle on even ground, from outside, shape (height, width, 3).
+        """Return an image of the vehicle on flat ground, shape (height, width, 3).
 
         Args:
             width: Width in pixels.
             height: Height in pixels.
-            reach: Metres in view around the middle of the vehicle; None for its own reach.
+            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
 
         Raises:
             RenderError: If nothing can be drawn here.
         """
-        return draw_vehicle(self._world.vehicle.name, width, height, reach or self.reach)
+        model = _without_world(self._world.vehicle.name)
+        return draw(model, model.qpos0, width, height, reach or body_reach(model, model.qpos0))
 
     def close(self) -> None:
-        """Let go of the pins, and free what draws."""
+        """Release the pins and the renderer."""
         self._robot.close()
         self._world.close()
 
@@ -345,3 +322,13 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             "captured_ns": seen.captured_ns,
             "decided_ns": seen.command_ns,
         }
+
+
+def _without_world(vehicle: str) -> mujoco.MjModel:
+    """Return a model of the vehicle on flat ground."""
+    spec = mujoco.MjSpec()
+    model = add_vehicle(spec, vehicle)
+    ground = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE)
+    ground.size = (_GROUND_M, _GROUND_M, 1.0)
+    ground.rgba = _WATER if model.floats else _LAND
+    return spec.compile()

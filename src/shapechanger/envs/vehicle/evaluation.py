@@ -1,4 +1,4 @@
-"""How well somebody drives: how far it came, in what time, and how often it ran into something."""
+"""Evaluate driving: distance, time and collisions on given courses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapechanger.errors import WorldError
 __all__ = ["LIMIT_S", "METRES", "Act", "DriveResult", "DriveScore", "drive", "poisson_interval"]
 
 Act = Callable[[Any], NDArray[np.float32]]
-"""A driver: from an observation to an action."""
+"""A driver: maps an observation to an action."""
 
 METRES: Final = 30.0
 """Length of a drive, m."""
@@ -24,19 +24,19 @@ METRES: Final = 30.0
 LIMIT_S: Final = 120.0
 """Longest time for it, s; a tank at a quarter of its top speed gets there."""
 
-_PER_M: Final = 100.0  # Collisions are told per 100 m.
+_PER_M: Final = 100.0  # Collisions are reported per 100 m.
 
 
 @dataclass(frozen=True, slots=True)
 class DriveResult:
-    """What came of one drive.
+    """Result of one drive.
 
     Attributes:
         course: Seed of the course.
-        metres: Net progress along the course, m; driving backward counts down.
-        seconds: How long it took, in the vehicle's time, s.
-        collisions: How many times it ran into something.
-        reached: Whether it came as far as it was to.
+        metres: Net progress along the course, m; driving backward subtracts.
+        seconds: Duration in the vehicle's time, s.
+        collisions: Number of collisions.
+        reached: Whether it reached the required distance.
     """
 
     course: int
@@ -60,20 +60,20 @@ def drive(
     metres: float = METRES,
     limit_s: float = LIMIT_S,
 ) -> DriveResult:
-    """Let somebody drive along one course.
+    """Drive along one course.
 
-    A vehicle that runs into something is put back on the lane and goes on.
+    After a collision the vehicle is put back on the lane and goes on.
 
     Args:
         env: The vehicle, made with `put_back=True`.
-        act: Who drives.
+        act: The driver.
         course: Seed of the course.
-        start: Seed of the start on it; None for that of the course.
-        metres: How far to drive, net along the course, m.
-        limit_s: When to give up, s.
+        start: Seed of the start; None for the seed of the course.
+        metres: Required net progress along the course, m.
+        limit_s: Time limit, s.
 
     Raises:
-        WorldError: If a collision ended the drive, because the env puts nothing back.
+        WorldError: If a collision ended the drive, because the env does not put the vehicle back.
     """
     seen, info = env.reset(options={"course": course, "start": course if start is None else start})
     period_s = 1.0 / env.metadata["render_fps"]
@@ -92,19 +92,19 @@ def drive(
 
 @dataclass(frozen=True, slots=True)
 class DriveScore:
-    """Some drives in a few numbers.
+    """Statistics of several drives.
 
     Attributes:
-        drives: How many.
-        metres: Net progress of all of them, m.
+        drives: Number of drives.
+        metres: Total net progress, m.
         speed: Mean speed, all metres over all seconds, m/s.
         slowest: Mean speed of the slowest drive, m/s.
         fastest: Mean speed of the fastest drive, m/s.
-        collisions: Of all of them.
+        collisions: Total number of collisions.
         per_100_m: Collisions per 100 m of net progress; infinite without any progress.
         low: Lower bound of the collisions per 100 m, with 95 % confidence.
-        high: Upper bound of them.
-        reached: Share of drives that came as far as they were to.
+        high: Upper bound of the same.
+        reached: Share of drives that reached the required distance.
     """
 
     drives: int
@@ -120,7 +120,7 @@ class DriveScore:
 
     @classmethod
     def of(cls, drives: Sequence[DriveResult]) -> DriveScore:
-        """The score of some drives.
+        """Summarise drives.
 
         Raises:
             WorldError: If there are none.
@@ -130,7 +130,7 @@ class DriveScore:
         metres = sum(drive.metres for drive in drives)
         collisions = sum(drive.collisions for drive in drives)
         speeds = [drive.speed for drive in drives]
-        # Whoever got nowhere gave a collision no metres to be counted by.
+        # Without progress, the rate of collisions is infinite.
         scale = _PER_M / metres if metres > 0.0 else float("inf")
         low, high = poisson_interval(collisions)
         return cls(
@@ -148,15 +148,15 @@ class DriveScore:
 
 
 def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """The exact interval of a mean of which one count is known.
+    """Return the exact confidence interval of a Poisson mean, given one count.
 
     F. Garwood, "Fiducial limits for the Poisson distribution", Biometrika 28 (1936), by quantiles
-    of the chi-squared distribution. It holds where collisions do not bring each other about, for
-    which a vehicle is put back after each.
+    of the chi-squared distribution. It assumes that collisions are independent, which
+    is why a vehicle is put back after each.
 
     Args:
-        count: What was counted, >= 0.
-        confidence: How often the interval holds the mean, at least.
+        count: The count, >= 0.
+        confidence: Probability that the interval contains the mean, at least.
     """
     rest = (1.0 - confidence) / 2.0
     low = float(chi2.ppf(rest, 2 * count)) / 2.0 if count else 0.0

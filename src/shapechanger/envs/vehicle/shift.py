@@ -1,7 +1,7 @@
-"""What changes from one vehicle to another: what they are, and how they answer the same commands.
+"""Certificate of the shift between two vehicles: their properties, and how they drive.
 
-What is declared proves nothing, so both drive: a lens that distorts nothing, or a size that nobody
-reads, is found out.
+Properties prove nothing by themselves, so both vehicles drive the same commands: this also finds a
+lens that distorts nothing, or a size that nothing uses.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from shapechanger.worlds.simulation import MujocoWorld
 __all__ = ["VehicleShift", "certify_vehicles"]
 
 _STEPS: Final = 40
-# What both are told: half of the steps straight on, the other half to the left.
+# Commands of the rollout: half of the steps straight ahead, the other half to the left.
 _THROTTLE: Final = 0.5
 _STEERING: Final = -0.5
 
 
 class VehicleShift(msgspec.Struct, frozen=True):
-    """What a target does differently from its source.
+    """Differences between a source and a target vehicle.
 
     Attributes:
         source: Id of the source.
         target: Id of the target.
-        changes: What differs of the vehicles, the places and the cameras, a sentence each.
-        answers: How both answered the same commands, a sentence each.
-        is_empty: Whether they answered alike: the same pictures, places and rewards.
+        changes: Differences of the vehicles, places and cameras, one sentence each.
+        answers: Differences of the rollouts with the same commands, one sentence each.
+        is_empty: Whether the rollouts gave the same frames, places and rewards.
     """
 
     source: str
@@ -43,7 +43,7 @@ class VehicleShift(msgspec.Struct, frozen=True):
     is_empty: bool
 
     def __str__(self) -> str:
-        """The whole certificate as text."""
+        """Return the certificate as text."""
         lines = [f"{self.source} -> {self.target}"]
         for title, sentences in (("Changes", self.changes), ("Rollout", self.answers)):
             if sentences:
@@ -58,19 +58,19 @@ def certify_vehicles(
     seed: int = 0,
     allow_empty: bool = False,
 ) -> VehicleShift:
-    """Compare two vehicles, and certify what the shift between them is.
+    """Compare two vehicles, wrappers included, and certify the shift between them.
 
-    Both are reset and stepped, and left in the midst of an episode. Wrappers count.
+    Both are reset and stepped, and left in the middle of an episode.
 
     Args:
-        source: Where a skill is learned.
-        target: Where it moves to.
+        source: The env in which a policy is trained.
+        target: The env that it is transferred to.
         seed: Seed of the resets.
         allow_empty: Whether to certify a shift that changes nothing.
 
     Raises:
-        MorphologyError: If one of them is no vehicle.
-        EmptyShift: If nothing differs and `allow_empty` is false.
+        MorphologyError: If one of them is not a vehicle.
+        EmptyShift: If they do not differ and `allow_empty` is false.
     """
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)
@@ -85,21 +85,21 @@ def certify_vehicles(
     )
     if shift.is_empty and not allow_empty:
         raise EmptyShift(
-            f"{names[0]} and {names[1]} do the same: {_STEPS} steps gave the same pictures, places "
-            "and rewards. There is nothing to transfer across."
+            f"{names[0]} and {names[1]} do the same: {_STEPS} steps gave the same frames, places "
+            "and rewards, so there is nothing to transfer."
         )
     return shift
 
 
 class _Driven(NamedTuple):
-    """What a vehicle did.
+    """Rollout of one vehicle.
 
     Attributes:
-        seen: What it observed first and last.
-        path: Where it was at the start and after each step, (n, 3): x, y and heading.
-        rewards: What each step was worth.
-        straight_m: How far it came in the first half.
-        turned_deg: How far it turned to the left in the second half.
+        seen: The first and the last observation.
+        path: Pose at the start and after each step, (n, 3): x, y, m, and heading, rad.
+        rewards: Reward of each step.
+        straight_m: Distance driven in the first half.
+        turned_deg: Turn to the left in the second half.
     """
 
     seen: tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -109,7 +109,7 @@ class _Driven(NamedTuple):
     turned_deg: float
 
     def same_as(self, other: _Driven) -> bool:
-        """Whether nothing tells the two apart."""
+        """Return whether two rollouts are equal."""
         mine, theirs = (
             (*self.seen, self.path, self.rewards),
             (*other.seen, other.path, other.rewards),
@@ -143,23 +143,23 @@ def _drive(env: gym.Env[Any, Any], seed: int) -> _Driven:
 
 
 def _answers(one: _Driven, two: _Driven) -> tuple[str, ...]:
-    told = [
-        f"straight on at a throttle of {_THROTTLE:g} for {_STEPS // 2} steps: "
+    sentences = [
+        f"straight ahead at a throttle of {_THROTTLE:g} for {_STEPS // 2} steps: "
         f"{one.straight_m:.2f} m -> {two.straight_m:.2f} m",
         f"then steering {_STEERING:g} for as many: turned by {one.turned_deg:.0f} -> "
         f"{two.turned_deg:.0f} degrees",
     ]
     if one.seen[0].shape == two.seen[0].shape:
         gaps = [float(np.abs(a - b).mean()) for a, b in zip(one.seen, two.seen, strict=True)]
-        told.append(
-            f"what they see from the same seed differs by {gaps[0]:.1f} at the start and "
+        sentences.append(
+            f"their observations from the same seed differ by {gaps[0]:.1f} at the start and "
             f"{gaps[1]:.1f} at the end, mean over all numbers"
         )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
-    """What there is to say of a vehicle, by its name."""
+    """Return the properties of a vehicle by name."""
     inner: Any = env.unwrapped
     world: MujocoWorld = inner.world
     model = world.vehicle
@@ -175,24 +175,24 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
         "camera above the ground": f"{model.camera.z:g} m",
         "camera's angle of view": f"{model.camera.fovy_deg:g} degrees",
         "place": world.course.world,
-        "wrong with the camera": " and ".join(world.lenses) or "nothing",
+        "lenses": " and ".join(world.lenses) or "none",
     }
 
 
 def _name(env: gym.Env[Any, Any]) -> str:
-    """The id of a vehicle's env.
+    """Return the id of a vehicle's env.
 
     Raises:
-        MorphologyError: If it is no vehicle.
+        MorphologyError: If it is not a vehicle.
     """
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
     if not (hasattr(env.unwrapped, "world") and hasattr(env.unwrapped, "parts")):
-        raise MorphologyError(f"{name} is no vehicle, so it cannot be compared with one.")
+        raise MorphologyError(f"{name} is not a vehicle, so it cannot be compared with one.")
     return name
 
 
 def _flat(seen: Any) -> NDArray[np.float64]:
-    """An observation as one vector; the parts of a dictionary in alphabetical order."""
+    """Return an observation as one vector; the parts of a dict in alphabetical order."""
     if isinstance(seen, dict):
         parts = cast("dict[str, Any]", seen)
         return np.concatenate([_flat(parts[key]) for key in sorted(parts)])

@@ -1,4 +1,4 @@
-"""The console: one static page with which a person sees, drives and records, and what serves it."""
+"""Web page on which a person drives and records, and the loader of its files."""
 
 from __future__ import annotations
 

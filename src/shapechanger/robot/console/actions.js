@@ -1,5 +1,4 @@
-// What is commanded beside what is applied and what a program wants: a line for each action, and
-// marks on the stick.
+// Commanded, applied and suggested values: a line for each action, and marks on the stick.
 
 import { find, make, tell } from "./dom.js";
 import { inWords, signed } from "./layout.js";
@@ -27,17 +26,17 @@ export class Actions {
     tell(find("pad-info"), "");
   }
 
-  /** Show on the stick what the person asks for, by whichever device. */
+  /** Show the command of the person on the stick, from any device. */
   showAsked() {
     const { steering, throttle } = this.#pilot.asked;
     place(this.#knob, steering, throttle);
   }
 
-  /** Show an observation; `driving` is whether the sliders are the person's now. */
+  /** Show an observation; `driving` is true while the person sets the sliders. */
   show(observation, driving) {
     const { action_applied: applied, commanded, suggested, holder_role: role } = observation;
     const isByProgram = !observation.mine && role === "program";
-    // While a program drives, what it commands is what it wants.
+    // While a program drives, its command is shown as its suggestion.
     const wanted = suggested.length ? suggested : isByProgram ? commanded : [];
     const by = suggested.length ? observation.suggested_by : isByProgram ? observation.holder : "";
     this.#rows.forEach((each, index) => {
@@ -51,7 +50,7 @@ export class Actions {
     this.#mark(this.#wantedDot, wanted);
   }
 
-  /** Say which command moves nothing though nothing is said against it, as below a threshold. */
+  /** Explain a command that moves nothing without a refusal, as below a threshold. */
   #hint({ mine, armed, stop_reason: reason, commanded, action_applied: applied }) {
     const isQuiet = mine && armed && !reason;
     let hint = "";

@@ -1,24 +1,24 @@
-// MessagePack, as far as the link uses it: nil, booleans, numbers, text, bytes, arrays and maps.
+// The part of MessagePack that the link uses: nil, booleans, numbers, text, bytes, arrays, maps.
 //
-// An integer beyond 2^53 becomes a BigInt, because a Number would round it: a robot's clock counts
-// nanoseconds, and passes 2^53 after 104 days.
+// An integer above 2^53 becomes a BigInt, because a Number would round it: a robot's clock in
+// nanoseconds passes 2^53 after 104 days.
 
 const MOST_DEPTH = 32;
 const TEXT = new TextEncoder();
 const WORDS = new TextDecoder("utf-8", { fatal: true });
 
-/** A value as bytes. Whole numbers become integers, and all others 64-bit floats. */
+/** Encode a value. Whole numbers become integers, and all others 64-bit floats. */
 export function encode(value) {
   const out = new Writer();
   write(out, value);
   return out.bytes();
 }
 
-/** The value that these bytes are; throws a RangeError where they are no value, or more than one. */
+/** Decode a value; throws a RangeError for invalid bytes, or more than one value. */
 export function decode(bytes) {
   const reader = { bytes, view: new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength), at: 0 };
   const value = read(reader, 0);
-  if (reader.at !== bytes.length) throw new RangeError("There is more than one value.");
+  if (reader.at !== bytes.length) throw new RangeError("The message has more than one value.");
   return value;
 }
 
@@ -27,7 +27,7 @@ class Writer {
   #view = new DataView(this.#buffer.buffer);
   #length = 0;
 
-  /** Room for so many more bytes; where they begin. */
+  /** Make room for `size` more bytes; returns their offset. */
   #room(count) {
     const at = this.#length;
     this.#length += count;
@@ -45,7 +45,7 @@ class Writer {
     this.#buffer[at] = value;
   }
 
-  /** A number after its kind, by the DataView's method for it. */
+  /** Write a number after its type byte, with a method of the DataView. */
   number(kind, method, size, value) {
     this.byte(kind);
     const at = this.#room(size);
@@ -107,7 +107,7 @@ function writeNumber(out, value) {
 function writeBig(out, value) {
   if (BigInt.asUintN(64, value) === value) out.number(0xcf, "setBigUint64", 8, value);
   else if (BigInt.asIntN(64, value) === value) out.number(0xd3, "setBigInt64", 8, value);
-  else throw new RangeError("This integer needs more than 64 bits.");
+  else throw new RangeError("The integer needs more than 64 bits.");
 }
 
 function read(from, depth) {
@@ -142,7 +142,7 @@ function read(from, depth) {
     case 0xdd: return array(from, number(from, "getUint32", 4), depth);
     case 0xde: return map(from, number(from, "getUint16", 2), depth);
     case 0xdf: return map(from, number(from, "getUint32", 4), depth);
-    default: throw new RangeError(`The link has no values of kind ${kind}.`);
+    default: throw new RangeError(`The link does not use type ${kind} of MessagePack.`);
   }
 }
 
@@ -152,7 +152,7 @@ function number(from, method, size) {
   return from.view[method](at);
 }
 
-/** A BigInt as a Number where that is exact. */
+/** Convert a BigInt to a Number where that is exact. */
 function exact(big) {
   const near = Number(big);
   return Number.isSafeInteger(near) ? near : big;

@@ -1,11 +1,11 @@
-// The form for the key, and where a key may come from: the address, this tab, or a person.
+// The form for the key, which may also come from the address or from this tab.
 
 import { find, tell } from "./dom.js";
 import { parseKey } from "./proof.js";
 
 const KEPT = "shapechanger-key";
 
-/** The key in the address, which is taken out of it at once; "" for none. */
+/** Take the key out of the address; "" for none. */
 export function keyFromAddress() {
   const fields = new URLSearchParams(location.hash.slice(1));
   const key = fields.get("key") ?? "";
@@ -13,27 +13,27 @@ export function keyFromAddress() {
   return key;
 }
 
-/** The key that this tab keeps; "" for none. */
+/** Return the key that this tab keeps; "" for none. */
 export function keptKey() {
   return sessionStorage.getItem(KEPT) ?? "";
 }
 
-/** Keep a key in this tab until it is closed; "" for no more. */
+/** Keep a key in this tab until it is closed; "" deletes it. */
 export function keepKey(key) {
   if (key) sessionStorage.setItem(KEPT, key);
   else sessionStorage.removeItem(KEPT);
 }
 
-/** Who this is, if they do not say. */
+/** Return the default name of the person. */
 export function someName() {
   const isPhone = matchMedia("(pointer: coarse)").matches;
-  return isPhone ? "Somebody with a phone" : "Somebody at a computer";
+  return isPhone ? "Phone" : "Computer";
 }
 
 export class Door {
   #key = find("key");
 
-  /** `enter` is called with a key and a name; it may throw an Error in words. */
+  /** `enter` is called with a key and a name; it may throw an Error to show. */
   constructor(enter) {
     find("name").value = someName();
     find("key-form").addEventListener("submit", (event) => {
@@ -50,21 +50,21 @@ export class Door {
     });
   }
 
-  /** Show the form, with what was typed before still in it. */
+  /** Show the form, with the text of the last attempt. */
   show(key = "") {
     if (key) this.#key.value = key;
     find("enter").disabled = false;
     this.#key.focus();
   }
 
-  /** Say what is wrong with the key. */
+  /** Show the error in the key. */
   complain(text) {
     tell(find("key-trouble"), text);
     this.#key.setAttribute("aria-invalid", "true");
     this.#key.focus();
   }
 
-  /** Nobody can come in from here, and why. */
+  /** Show why this page cannot connect at all. */
   bar(text) {
     find("key-form").hidden = true;
     find("no-way").hidden = false;

@@ -1,11 +1,11 @@
-// Who drives, and what is said to the robot: one answer to each observation, and stops at once.
+// Driving: one answer to each observation, and stops at once.
 
 const TAKEN_WITHIN_MS = 2_000; // A program that waits takes a robot that is free within a moment.
 const LEASE_MS = 2_000;
 const PAUSE_MS = 1_000; // After a pause as long as this, what was held before it is not meant any more.
 const LEAST_MS = 15; // Between commands that nobody asked for but a moving stick.
 
-/** Fires `note` (detail: a sentence) when something did not come about. */
+/** Fires `note` (detail: a sentence) when a request failed. */
 export class Driver extends EventTarget {
   #link;
   #pilot;
@@ -15,13 +15,13 @@ export class Driver extends EventTarget {
   #isTaking = false;
   #isHidden = false;
 
-  /** The newest observation; null for none. */
+  /** The newest observation, or null. */
   seen = null;
 
-  /** Whether this page holds the command. */
+  /** True if this page has control. */
   mine = false;
 
-  /** Largest share of what the robot allows, 0.1 to 1. */
+  /** Speed cap, 0.1 to 1, as a share of what the robot allows. */
   scale = 0.5;
 
   constructor(link, pilot) {
@@ -30,17 +30,17 @@ export class Driver extends EventTarget {
     this.#pilot = pilot;
   }
 
-  /** Whether what the person does moves the robot. */
+  /** True if the person's input moves the robot. */
   get isDriving() {
     return Boolean(this.mine && this.seen?.armed && !this.seen.emergency && !this.#isHidden);
   }
 
-  /** Whether a program holds the command. */
+  /** True if a program has control. */
   get byProgram() {
     return !this.mine && this.seen?.holder_role === "program";
   }
 
-  /** Begin with a new connection: nothing of an old one goes on. */
+  /** Begin a new connection, without any state of the old one. */
   begin() {
     this.#seq = 0;
     this.seen = null;
@@ -50,7 +50,7 @@ export class Driver extends EventTarget {
     this.#link.say("acknowledge");
   }
 
-  /** Take an observation, and answer it. */
+  /** Handle an observation, and answer it. */
   observe(observation) {
     const nowMs = performance.now();
     const wasDriving = this.isDriving;
@@ -60,68 +60,68 @@ export class Driver extends EventTarget {
     this.mine = observation.mine;
     if (wasDriving && pauseMs > PAUSE_MS) {
       this.#pilot.letGo();
-      this.#note("Nothing came from the robot for a while: let go, and press again to drive on.");
+      this.#note("The robot sent nothing for a while: let go, and press again to drive on.");
     }
     if (!this.isDriving) this.#pilot.follow(observation.action_applied);
     if (this.isDriving) this.#command();
     else this.#link.say("acknowledge", { seq: observation.seq });
   }
 
-  /** Somebody else or nobody commands, or this page does. */
+  /** Handle a change of control. */
   onLease({ mine }) {
     this.mine = mine;
     this.#isTaking = false;
     if (this.isDriving) this.#command();
   }
 
-  /** The person does something else than before. */
+  /** Handle a change of the person's input. */
   changed() {
     if (this.isDriving) {
       const isRest = !this.#pilot.isAsking;
       if (isRest || performance.now() - this.#saidMs >= LEAST_MS) this.#command();
     } else if (this.#pilot.isAsking && this.byProgram && this.seen.armed && !this.#isTaking) {
-      // Whoever grasps the stick while a program drives wants to drive, at once.
+      // Moving the stick while a program drives takes control at once.
       this.take();
     }
   }
 
-  /** Everything stops, whoever drives. */
+  /** Stop the robot, without control too. */
   stop(reason) {
     this.#pilot.letGo();
     this.#link.say("emergencystop", { reason });
   }
 
-  /** Take the command; whether it was given. */
+  /** Take control; resolves to true if the robot gave it. */
   async take() {
     if (this.mine) return true;
     this.#isTaking = true;
     const lease = heard(this.#link, "lease", LEASE_MS);
     this.#link.say("take");
-    if (!(await lease)) this.#note("The robot does not answer in time: try again.");
+    if (!(await lease)) this.#note("The robot did not answer in time: try again.");
     this.#isTaking = false;
     return this.mine;
   }
 
-  /** Take the command, and let the outputs move. */
+  /** Take control, and arm the robot. */
   async arm() {
     this.#pilot.letGo();
     if (await this.take()) this.armAsItIs();
   }
 
-  /** Let the outputs move for whoever holds the command. */
+  /** Arm the robot for the client in control. */
   armAsItIs() {
     if (!this.seen) return;
     this.#link.say("arm", { answers: this.seen.seq, emergency: this.seen.emergencies });
   }
 
-  /** Keep the outputs at rest. */
+  /** Disarm the robot. */
   disarm() {
     this.#pilot.letGo();
     if (this.isDriving) this.#command();
     this.#link.say("disarm");
   }
 
-  /** Give the robot to a program that waits for it, and arm it for that. */
+  /** Give control to a waiting program, and arm the robot for it. */
   async handOver() {
     this.#pilot.letGo();
     if (this.mine) this.#link.say("release");
@@ -134,16 +134,16 @@ export class Driver extends EventTarget {
         return;
       }
     }
-    this.#note("No program waits for the robot: start one, and try again while its reset waits.");
+    this.#note("No program waits for control: start one, and try again while its reset waits.");
   }
 
-  /** The person cannot steer now, such as while another window has the focus. */
+  /** Handle a loss of the focus, without which the person cannot steer. */
   letGo() {
     this.#pilot.letGo();
     if (this.isDriving) this.#command();
   }
 
-  /** Nobody sees the page: what this page drives stops and is disarmed; a program drives on. */
+  /** Handle a hidden page: a robot that it drives is disarmed; a program drives on. */
   hide(isHidden) {
     if (isHidden && this.mine) this.disarm();
     if (isHidden) this.#pilot.letGo();
@@ -163,7 +163,7 @@ export class Driver extends EventTarget {
   }
 }
 
-/** The next message of a kind; null when none comes in time. */
+/** Resolve to the next message of a type, or null after the time limit. */
 function heard(link, kind, withinMs) {
   return new Promise((resolve) => {
     const done = (event) => {

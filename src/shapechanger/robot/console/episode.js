@@ -1,4 +1,4 @@
-// One recorded episode, fetched piece by piece; the pieces near where somebody looks come first.
+// One recorded episode, fetched piece by piece, first around the step that is shown.
 
 const AT_ONCE = 40; // Lines of a piece, about two seconds.
 
@@ -8,10 +8,10 @@ export class Episode {
   #total = null;
   #verdicts = null;
 
-  /** Steps by their number; those that were not fetched yet are missing. */
+  /** Steps by their number, as far as they were fetched. */
   steps = [];
 
-  /** Marks, by the number of their step. */
+  /** Marks by the number of their step. */
   marks = new Map();
 
   constructor(id, actions) {
@@ -19,7 +19,7 @@ export class Episode {
     this.actions = actions; // Names of the actions; those of its own header once that is known.
   }
 
-  /** What to fetch next, so that what is at a place comes first; null when all is here. */
+  /** Return the next range to fetch, first around a step; null when all is fetched. */
   missing(place) {
     if (this.#total === null) return { first: 0, count: AT_ONCE };
     const from = (start) => {
@@ -30,17 +30,17 @@ export class Episode {
     return first === null ? null : { first, count: AT_ONCE };
   }
 
-  /** There is a line more than before, at least. */
+  /** Note that there is at least one more line. */
   grow() {
     if (this.#total !== null) this.#total += 1;
   }
 
-  /** How much is here, 0 to 1. */
+  /** The fetched share, 0 to 1. */
   get share() {
     return this.#total ? this.#lines.reduce((sum) => sum + 1, 0) / this.#total : this.#total === 0 ? 1 : 0;
   }
 
-  /** Take a piece. */
+  /** Add a piece. */
   add(piece) {
     this.#total = piece.total;
     this.#verdicts = null;
@@ -58,13 +58,13 @@ export class Episode {
     });
   }
 
-  /** Whether a step was dropped, and not taken back since. */
+  /** Return true if a step is dropped. */
   isBad(step) {
     this.#verdicts ??= this.#judged();
     return this.#verdicts[step] ?? false;
   }
 
-  /** Stretches of dropped steps, as pairs of first and last. */
+  /** Return ranges of dropped steps, as pairs of first and last. */
   get bad() {
     const bad = [];
     this.steps.forEach((_, step) => {
@@ -84,7 +84,7 @@ export class Episode {
     return verdicts;
   }
 
-  /** The picture of a step as a Blob; null without one, or while it is not here. */
+  /** Return the frame of a step as a Blob; null without one, or before it is fetched. */
   picture(step) {
     const name = this.steps[step]?.frame?.[0];
     return (name && this.#pictures.get(name)) || null;

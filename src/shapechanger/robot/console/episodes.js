@@ -1,4 +1,4 @@
-// The shelf of recordings: look through an episode, and mark a stretch of it bad or good again.
+// Recordings: shows an episode, and marks a range of it as bad or good again.
 
 import { find, label, make, tell } from "./dom.js";
 import { Episode } from "./episode.js";
@@ -21,7 +21,7 @@ export class Episodes {
   #isFetching = false;
   #drawing = 0;
 
-  /** `opened` is called before the shelf covers the picture of the robot. */
+  /** `opened` is called before the dialog covers the robot's picture. */
   constructor(link, opened) {
     this.#link = link;
     find("browse").addEventListener("click", () => {
@@ -45,13 +45,13 @@ export class Episodes {
     });
   }
 
-  /** The names of the robot's actions. */
+  /** Set the names of the robot's actions. */
   begin(actions) {
     this.#actions = actions;
     this.#isFetching = false;
   }
 
-  /** The connection has ended: the shelf is the robot's. */
+  /** Close the dialog after the connection ended. */
   close() {
     this.#dialog.close();
   }
@@ -86,7 +86,7 @@ export class Episodes {
     if (!judged) {
       const count = this.#summaries.length;
       const words = count === 1 ? "1 episode." : `${count} episodes, newest first.`;
-      tell(find("episodes-state"), count ? words : "Nothing was recorded yet.");
+      tell(find("episodes-state"), count ? words : "No episodes yet.");
     }
   }
 
@@ -103,7 +103,7 @@ export class Episodes {
   }
 
   #older() {
-    const button = make("button", { type: "button" }, "Older ones");
+    const button = make("button", { type: "button" }, "Older episodes");
     button.addEventListener("click", () => this.#link.say("browse", { before: this.#summaries.at(-1).id }));
     return button;
   }
@@ -134,7 +134,7 @@ export class Episodes {
     if (piece.episode !== this.#episode?.id || !piece.lines.length) return;
     this.#episode.add(piece);
     const share = Math.floor(100 * this.#episode.share);
-    tell(find("episodes-state"), share < 100 ? `Loading, ${share} %.` : "All of it is here.");
+    tell(find("episodes-state"), share < 100 ? `Loading, ${share} %.` : "Loaded.");
     this.#scrub.max = Math.max(this.#scrub.max, this.#episode.steps.length - 1);
     this.#look();
     this.#fetch();
@@ -148,7 +148,7 @@ export class Episodes {
     this.#showRange();
     const seen = episode.steps[step];
     if (!seen) {
-      tell(find("step-state"), "On its way…");
+      tell(find("step-state"), "Loading…");
       this.#fetch();
       return;
     }
@@ -173,7 +173,7 @@ export class Episodes {
       if (mine === this.#drawing) draw(this.#canvas, this.#context, bitmap);
       else bitmap.close();
     } catch {
-      tell(find("step-state"), "The picture of this step is broken.");
+      tell(find("step-state"), "The picture of this step is damaged.");
     }
   }
 
@@ -221,11 +221,11 @@ export class Episodes {
     const [first, last] = this.#range;
     if (!this.#link.say("judge", { episode: id, first, last, keep })) return;
     tell(find("episodes-state"), `Steps ${first} to ${last} are ${keep ? "good again" : "bad"}.`);
-    // The robot appends a line that says so; the episode is as long as that now.
+    // The robot appends a line for that, which makes the episode longer.
     this.#link.addEventListener("recordings", () => this.#again(id), { once: true });
   }
 
-  /** Fetch what was appended. */
+  /** Fetch the appended lines. */
   #again(id) {
     if (this.#episode?.id !== id) return;
     this.#episode.grow();

@@ -1,4 +1,4 @@
-"""The files of the console, read once and held in memory: they are few and small."""
+"""Files of the console, read once and kept in memory."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from shapechanger.errors import RobotError
 __all__ = ["ENTRY", "ConsoleFile", "console_files"]
 
 ENTRY: Final = "index.html"
-"""Name of the page itself."""
+"""Name of the page."""
 
 _FOLDER: Final = Path(__file__).parent
-# What a browser may be given; a file of any other kind in the folder stays there.
+# Media types to serve; other files in the folder are not served.
 _KINDS: Final = {
     ".html": "text/html",
     ".css": "text/css",
@@ -25,11 +25,11 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ConsoleFile:
-    """A file as it goes to a browser.
+    """File to send to a browser.
 
     Attributes:
-        content_type: Its media type; the text is UTF-8.
-        body: Its bytes.
+        content_type: Media type; the text is UTF-8.
+        body: Content of the file.
     """
 
     content_type: str
@@ -37,10 +37,10 @@ class ConsoleFile:
 
 
 def console_files(folder: Path = _FOLDER) -> dict[str, ConsoleFile]:
-    """The files of the console by name.
+    """Read the console's files, by name.
 
     Raises:
-        RobotError: If they cannot be read, as after an installation that went wrong.
+        RobotError: If they cannot be read, as after a failed installation.
     """
     try:
         files = {
@@ -49,7 +49,7 @@ def console_files(folder: Path = _FOLDER) -> dict[str, ConsoleFile]:
             if path.suffix in _KINDS
         }
     except OSError as error:
-        raise RobotError(f"The console in {folder} cannot be read: {error}.") from error
+        raise RobotError(f"Cannot read the console in {folder}: {error}.") from error
     if ENTRY not in files:
-        raise RobotError(f"There is no {ENTRY} in {folder}: install shapechanger again.")
+        raise RobotError(f"{folder} has no {ENTRY}: install shapechanger again.")
     return files

@@ -1,4 +1,4 @@
-// A gamepad: the left stick steers; the triggers, the right stick or the left one drive.
+// Gamepad: the left stick steers; the triggers or either stick drive.
 
 const DEAD = 0.12; // Share of a stick's travel that is no wish: sticks do not rest at 0.
 const POLL_MS = 20;
@@ -28,14 +28,14 @@ export class Gamepads {
     if (this.#pad()) this.#begin();
   }
 
-  /** Count nothing until the sticks have been at rest. */
+  /** Ignore the sticks until they have been at rest. */
   letGo() {
     this.#mustRest = true;
     this.value = { steering: 0, throttle: 0 };
   }
 
   #pad() {
-    // Where a page may not ask, as in an insecure context, there is no such function.
+    // The function does not exist in an insecure context.
     return navigator.getGamepads?.().find((pad) => pad?.connected) ?? null;
   }
 

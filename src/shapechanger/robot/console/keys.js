@@ -1,4 +1,4 @@
-// The keys that drive: W A S D by their place on the keyboard, and the arrows.
+// Driving keys: W A S D by their position on the keyboard, and the arrows.
 
 const DRIVES = {
   KeyW: ["throttle", 1], ArrowUp: ["throttle", 1],
@@ -7,7 +7,7 @@ const DRIVES = {
   KeyD: ["steering", 1], ArrowRight: ["steering", 1],
 };
 
-/** Whether a key belongs to what has the focus, because somebody types there. */
+/** Return true if a key belongs to a focused text field. */
 export function isTyping(event) {
   const { target } = event;
   return target instanceof HTMLInputElement && !["range", "checkbox"].includes(target.type);
@@ -33,7 +33,7 @@ export class Keys {
     return value;
   }
 
-  /** Count no key as held until it is pressed again. */
+  /** Ignore held keys until they are pressed again. */
   letGo() {
     this.#held.clear();
   }
@@ -42,7 +42,7 @@ export class Keys {
     const { code, ctrlKey, metaKey, altKey, target } = event;
     if (!(code in DRIVES) || ctrlKey || metaKey || altKey || isTyping(event)) return;
     if (document.querySelector("dialog[open]")) return;
-    // A slider that has the focus is moved by the arrows, and not the robot.
+    // The arrows move a focused slider, and not the robot.
     if (code.startsWith("Arrow") && target instanceof HTMLInputElement) return;
     event.preventDefault(); // Neither scroll the page.
     if (event.repeat || this.#held.has(code)) return;

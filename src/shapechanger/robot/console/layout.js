@@ -1,8 +1,8 @@
-// What each number of a command and of a state means, from the robot's layouts.
+// Features of commands and states, from the robot's layouts.
 
 const UNITS = { 1: "", rad: "rad", "m/s": "m/s", "m/s^2": "m/s²", degC: "°C" };
 
-/** The single numbers of a layout in order: name, unit, low and high (infinite where there is none). */
+/** Return each number of a layout: name, unit, low and high (infinite if unbounded). */
 export function features(json) {
   if (!json) return [];
   return JSON.parse(json).features.flatMap((feature) => {
@@ -14,12 +14,12 @@ export function features(json) {
   });
 }
 
-/** A name for people: "wheel_speed" is "wheel speed". */
+/** Return a display name: "wheel_speed" is "wheel speed". */
 export function inWords(name) {
   return name.replace(/[_/]+/g, " ");
 }
 
-/** A number with so many digits as can be read while it changes; "–" for one that nobody measures. */
+/** Format a changing number with few digits; "–" for NaN. */
 export function shown(value, unit = "") {
   if (value === null || !Number.isFinite(value)) return "–";
   const digits = Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : 2;
@@ -27,14 +27,14 @@ export function shown(value, unit = "") {
   return unit ? `${text} ${unit}` : text;
 }
 
-/** A value with its sign, as for a command. */
+/** Format a value with its sign. */
 export function signed(value) {
   if (value === undefined || !Number.isFinite(value)) return "–";
   const text = shown(value);
   return value > 0 && /[1-9]/.test(text) ? `+${text}` : text;
 }
 
-/** The difference of two times of one clock in ms; each is a Number or a BigInt of nanoseconds. */
+/** Return the difference of two times of one clock, ms; each a Number or a BigInt, ns. */
 export function msBetween(earlierNs, laterNs) {
   if (typeof earlierNs === "number" && typeof laterNs === "number") return (laterNs - earlierNs) / 1e6;
   return Number(BigInt(laterNs) - BigInt(earlierNs)) / 1e6;

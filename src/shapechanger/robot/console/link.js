@@ -1,9 +1,9 @@
-// The connection to the robot: says hello, keeps in touch, and tries again when it ends.
+// Connection to the robot: authenticates, watches for silence, and reconnects.
 
 import { decode, encode } from "./codec.js";
 import { fromHex, makeProof, parseKey } from "./proof.js";
 
-/** Version of the messages that this page speaks. */
+/** Version of the messages that this page uses. */
 export const VERSION = 1;
 
 const FIRST_WAIT_MS = 500;
@@ -12,7 +12,7 @@ const PING_MS = 1_000;
 const SILENCE_MS = 6_000; // After which a connection that is open and silent counts as lost.
 const GREETING_MS = 8_000;
 
-/** What a page may know of the robot before it has a key; throws where nobody answers. */
+/** Fetch the description of the robot before authentication; throws if it does not answer. */
 export async function introduction() {
   const answer = await fetch("/console/robot.json", { cache: "no-store" });
   if (!answer.ok) throw new Error(`The robot answered ${answer.status}.`);
@@ -21,7 +21,7 @@ export async function introduction() {
 
 /**
  * Fires `state` (detail: {state, text, waitMs?}) with the states connecting, open, waiting and
- * refused, and for each message of the robot an event of its kind, with the message as detail.
+ * refused, and for each message of the robot an event of its type, with the message as detail.
  */
 export class Link extends EventTarget {
   #socket = null;
@@ -36,7 +36,7 @@ export class Link extends EventTarget {
   #name = "";
   #frames = true;
 
-  /** What the robot is; null while there is no connection. */
+  /** Description of the robot; null without a connection. */
   welcome = null;
 
   constructor({ frames = true } = {}) {
@@ -44,7 +44,7 @@ export class Link extends EventTarget {
     this.#frames = frames;
   }
 
-  /** Connect with a key, and stay so until `close`. Throws an Error in words for what is no key. */
+  /** Connect with a key, and reconnect until `close`. Throws an Error for an invalid key. */
   open(key, name) {
     if (key) parseKey(key);
     this.#key = key;
@@ -53,18 +53,18 @@ export class Link extends EventTarget {
     this.#connect();
   }
 
-  /** End the connection, and do not try again. */
+  /** End the connection, and do not reconnect. */
   close() {
     this.#attempt += 1;
     this.#drop();
   }
 
-  /** Try at once, if the next try is only waited for. */
+  /** Reconnect at once, if a later attempt is scheduled. */
   retry() {
     if (this.#timer) this.#connect();
   }
 
-  /** Say something; whether there was somebody to say it to. */
+  /** Send a message; returns false without a connection. */
   say(kind, fields = {}) {
     if (!this.welcome || this.#socket?.readyState !== WebSocket.OPEN) return false;
     this.#socket.send(encode({ kind, ...fields }));
@@ -148,7 +148,7 @@ export class Link extends EventTarget {
     try {
       return decode(new Uint8Array(data));
     } catch (error) {
-      this.dispatchEvent(new CustomEvent("nonsense", { detail: `Not understood: ${error.message}` }));
+      this.dispatchEvent(new CustomEvent("nonsense", { detail: `Invalid message: ${error.message}` }));
       return null;
     }
   }
@@ -160,7 +160,7 @@ export class Link extends EventTarget {
     this.#tell("waiting", text, { waitMs });
   }
 
-  /** Measure the round trip once more; `pong` tells it. */
+  /** Measure the round trip; fires `pong`. */
   ping() {
     this.#token += 1;
     if (this.say("ping", { token: this.#token })) this.#pings.set(this.#token, performance.now());
@@ -168,10 +168,10 @@ export class Link extends EventTarget {
 
   #check() {
     if (performance.now() - this.#heardMs > SILENCE_MS) {
-      // The radio is gone and nobody said so. The socket's own end may take minutes.
+      // The radio is gone without a sign. The end of the socket may take minutes.
       this.#attempt += 1;
       this.#drop();
-      this.#wait("The robot has fallen silent.");
+      this.#wait("The robot no longer answers.");
       return;
     }
     this.ping();

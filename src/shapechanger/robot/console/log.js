@@ -1,9 +1,9 @@
-// What happened, newest last, for people to read and to hear.
+// Log of events, newest last, for people to read and to hear.
 
 import { make } from "./dom.js";
 
 const MOST = 100;
-const AGAIN_MS = 5_000; // The same words within this time are counted, and not said again.
+const AGAIN_MS = 5_000; // The same text within this time is counted, and not repeated.
 
 export class Log {
   #list;
@@ -13,7 +13,7 @@ export class Log {
     this.#list = list;
   }
 
-  /** Whether these words were the last ones. */
+  /** Return true if this text was the last one. */
   said(text) {
     return text === this.#last.text;
   }

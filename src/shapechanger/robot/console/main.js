@@ -1,4 +1,4 @@
-// Puts the page together.
+// Assembles the page.
 
 import { Actions } from "./actions.js";
 import { find, tell } from "./dom.js";
@@ -22,7 +22,7 @@ import { ageOnArrivalMs, RoundTrips } from "./timing.js";
 
 const CAP_STEP = 10; // %
 const PRESS_MS = 1_000; // The click that follows a press is not a second one.
-const OLD_MS = 500; // A picture as old as this is not what the robot sees now.
+const OLD_MS = 500; // An older picture is marked as old.
 
 const link = new Link();
 const log = new Log(find("log"));
@@ -38,10 +38,10 @@ const pads = new Gamepads(changed, (what) => (what === "stop" ? stop("A gamepad'
 const stick = new Stick(find("pad"), changed);
 const tilt = new Tilt(changed);
 const episodes = new Episodes(link, () => {
-  if (driver?.mine) driver.disarm(); // Nobody looks through the camera meanwhile.
+  if (driver?.mine) driver.disarm(); // The dialog covers the live picture.
 });
 
-let driver = null; // Knows the robot's actions, so there is one for each connection.
+let driver = null; // Depends on the robot's actions, so it is made for each connection.
 let actions = null;
 let readings = null;
 let key = "";
@@ -83,10 +83,10 @@ function lose(text) {
   for (const device of [keys, pads, stick, tilt]) device.letGo();
   showTilt();
   picture.forget();
-  tell(find("picture-state"), "No connection.");
+  tell(find("picture-state"), "Not connected.");
   trips.clear();
   episodes.close();
-  status.lose(`${text} The robot stops by itself when it hears nothing.`);
+  status.lose(`${text} The robot stops by itself without commands.`);
 }
 
 link.addEventListener("welcome", ({ detail: welcome }) => {
@@ -116,7 +116,7 @@ link.addEventListener("observation", ({ detail: seen }) => {
   if (!driver) return;
   const nowMs = performance.now();
   driver.observe(seen);
-  // A hidden page draws nothing: it only keeps in touch.
+  // A hidden page draws nothing.
   if (document.hidden) return;
   if (seen.frame) picture.show(seen.frame, ageOnArrivalMs(seen, trips.typicalMs), nowMs);
   status.show(seen, driver.mine, nowMs);
@@ -129,14 +129,14 @@ link.addEventListener("lease", ({ detail: lease }) => {
   if (lease.reason) log.add(lease.reason);
 });
 link.addEventListener("event", ({ detail: { text, name } }) => {
-  if (name === "disarmed" && log.said(text)) return; // An emergency stop disarms, in the same words.
+  if (name === "disarmed" && log.said(text)) return; // An emergency stop also disarms, with the same text.
   log.add(text, name === "emergency" || name === "bump" ? "trouble" : "event");
 });
 link.addEventListener("refused", ({ detail: { reason } }) => log.add(reason, "refused"));
 link.addEventListener("nonsense", ({ detail }) => log.add(detail, "trouble"));
 link.addEventListener("pong", ({ detail }) => trips.add(detail.roundTripMs));
 
-// What the person does.
+// Input of the person.
 
 function stop(reason) {
   driver?.stop(reason);
@@ -170,7 +170,7 @@ function showTilt() {
 }
 
 for (const id of ["stop", "episodes-stop"]) {
-  // A finger that comes down on STOP has stopped the robot before it is lifted.
+  // A finger on STOP stops the robot before it is lifted.
   let downMs = -Infinity;
   find(id).addEventListener("pointerdown", () => {
     downMs = performance.now();
@@ -209,7 +209,7 @@ find("leave").addEventListener("click", () => {
   driver?.hide(true);
   link.close();
   keepKey("");
-  lose("You left.");
+  lose("Disconnected.");
   tell(find("connection"), "Not connected.");
   hasBeenIn = false;
   view("door");
@@ -229,7 +229,7 @@ listen(stop, () => driver !== null, {
   "-": () => setCap(find("cap").valueAsNumber - CAP_STEP),
 });
 
-// What stops it though nobody pressed anything.
+// Stops without a press of a button.
 
 addEventListener("blur", () => {
   driver?.letGo();
@@ -249,7 +249,7 @@ addEventListener("pageshow", ({ persisted }) => {
 });
 addEventListener("online", () => link.retry());
 
-// Numbers that change by themselves.
+// Numbers that change over time.
 
 function refresh() {
   requestAnimationFrame(refresh);
@@ -262,7 +262,7 @@ function refresh() {
   tell(find("rate"), `${picture.rate(nowMs).toFixed(0)} /s`);
   tell(find("trip"), trips.typicalMs === null ? "–" : shown(trips.typicalMs, "ms"));
   if (ageMs !== null) {
-    const words = `The picture is ${(ageMs / 1000).toFixed(1)} s old: this is not what the robot sees now.`;
+    const words = `The picture is ${(ageMs / 1000).toFixed(1)} s old, and not the current view.`;
     tell(find("picture-state"), isOld ? words : "");
   }
 }

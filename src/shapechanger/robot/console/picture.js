@@ -1,4 +1,4 @@
-// The live picture: the newest JPEG only. What comes while one is decoded replaces what waits.
+// Live picture: only the newest JPEG. One that arrives during decoding replaces the waiting one.
 
 export class Picture {
   #canvas;
@@ -7,7 +7,7 @@ export class Picture {
   #busy = false;
   #drawnMs = [];
 
-  /** Pictures that came and were never drawn, because there was a newer one. */
+  /** Number of pictures skipped for newer ones. */
   dropped = 0;
 
   constructor(canvas) {
@@ -16,32 +16,32 @@ export class Picture {
   }
 
   /**
-   * Show a picture as soon as it is decoded.
+   * Show a picture once it is decoded.
    *
-   * `ageMs` is its age at the moment `atMs` of this page's clock.
+   * `ageMs` is its age at `atMs` of this page's clock.
    */
   show(jpeg, ageMs, atMs) {
     if (this.#waiting) this.dropped += 1;
-    // A copy: the bytes are a part of a message that would stay in memory as a whole.
+    // A copy, because a view would keep the whole message in memory.
     this.#waiting = { blob: new Blob([jpeg], { type: "image/jpeg" }), ageMs, atMs };
     if (!this.#busy) this.#work();
   }
 
-  /** Age and time of what is on the canvas; null for nothing yet. */
+  /** Age and time of the shown picture, or null. */
   newest = null;
 
-  /** How old the picture on the canvas is now, ms; null without one. */
+  /** Return the age of the shown picture now, ms, or null. */
   ageMs(nowMs) {
     return this.newest && this.newest.ageMs + nowMs - this.newest.atMs;
   }
 
-  /** Pictures drawn a second, over the last two. */
+  /** Pictures per second, over the last two seconds. */
   rate(nowMs) {
     this.#drawnMs = this.#drawnMs.filter((atMs) => nowMs - atMs < 2_000);
     return this.#drawnMs.length / 2;
   }
 
-  /** Forget what is shown, such as when the connection ended. */
+  /** Clear the picture, as after the connection ended. */
   forget() {
     this.#waiting = null;
     this.newest = null;
@@ -66,7 +66,7 @@ export class Picture {
   }
 }
 
-/** Draw a picture over a whole canvas, in its own size. */
+/** Draw a picture over the whole canvas, at its own size. */
 export function draw(canvas, context, bitmap) {
   if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
     canvas.width = bitmap.width;

@@ -1,4 +1,4 @@
-// What the person wants: of all devices the one that asks for most, and the sliders for the rest.
+// Command of the person: the largest value of all devices, and the sliders for other actions.
 
 const BY_STICK = ["steering", "throttle"];
 
@@ -13,17 +13,17 @@ export class Pilot {
     this.#devices = devices;
   }
 
-  /** Whether a stick means anything to this robot. */
+  /** True if the robot has steering or throttle. */
   get hasStick() {
     return this.#features.some(({ name }) => BY_STICK.includes(name));
   }
 
-  /** Whether an action is one that a slider sets. */
+  /** Return true if a slider sets this action. */
   static hasSlider(name) {
     return !BY_STICK.includes(name);
   }
 
-  /** Steering and throttle as the devices have them, -1 to 1 each. */
+  /** Steering and throttle of the devices, -1 to 1 each. */
   get asked() {
     const asked = { steering: 0, throttle: 0 };
     for (const { value } of this.#devices) {
@@ -34,32 +34,32 @@ export class Pilot {
     return asked;
   }
 
-  /** Whether anybody asks for anything. */
+  /** True if any device is used. */
   get isAsking() {
     const { steering, throttle } = this.asked;
     return steering !== 0 || throttle !== 0;
   }
 
-  /** Hold what a slider says. */
+  /** Set the value of a slider. */
   hold(index, value) {
     this.#held[index] = value;
   }
 
-  /** The robot moves its other actions by itself: the sliders follow until somebody commands. */
+  /** Make the sliders follow the robot while the person does not command. */
   follow(applied) {
     this.#held = [...applied];
   }
 
-  /** What a slider holds. */
+  /** Return the value of a slider. */
   held(index) {
     return this.#held[index] ?? 0;
   }
 
-  /** The values of a command that goes with a scale, in the order of the layout. */
+  /** Return the values of a command with a scale, in the order of the layout. */
   values(scale) {
     const { asked } = this;
     return this.#features.map(({ name, low, high }, index) => {
-      // What no cap is meant for is divided by it, because the robot multiplies all values.
+      // Values without a cap are divided by it, because the robot multiplies all values.
       if (Pilot.hasSlider(name)) return this.held(index) / scale;
       const value = asked[name];
       const most = value < 0 ? -low : high;
@@ -67,7 +67,7 @@ export class Pilot {
     });
   }
 
-  /** Count nothing that is held now; it must be let go, and pressed again. */
+  /** Ignore held devices until they are let go, and used again. */
   letGo() {
     for (const device of this.#devices) device.letGo();
   }

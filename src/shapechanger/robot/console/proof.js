@@ -1,4 +1,4 @@
-// The key of a robot as people write it, and the proof that somebody holds it.
+// Parsing of the robot's key, and the proof that the client holds it.
 
 const ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"; // Base 32, RFC 4648.
 const CHARACTERS = 26;
@@ -6,11 +6,11 @@ const KEY_BYTES = 16;
 const PURPOSE = new TextEncoder().encode("shapechanger link 1");
 const MISREAD = { 0: "O", 1: "I", 8: "B" };
 
-/** The 16 bytes of a key; groups, spaces and small letters do not matter. Throws an Error in words. */
+/** Return the 16 bytes of a key; groups, spaces and case do not matter. Throws an Error. */
 export function parseKey(text) {
   const plain = text.toUpperCase().replace(/[-\s]/g, "").replace(/[018]/g, (c) => MISREAD[c]);
   if (plain.length !== CHARACTERS) {
-    throw new Error(`A key has ${CHARACTERS} letters and numbers, this one has ${plain.length}.`);
+    throw new Error(`A key has ${CHARACTERS} letters and digits, got ${plain.length}.`);
   }
   const key = new Uint8Array(KEY_BYTES);
   let bits = 0;
@@ -18,7 +18,7 @@ export function parseKey(text) {
   let at = 0;
   for (const letter of plain) {
     const value = ALPHABET.indexOf(letter);
-    if (value < 0) throw new Error("A key has only the letters A to Z and the numbers 2 to 7.");
+    if (value < 0) throw new Error("A key has only the letters A to Z and the digits 2 to 7.");
     held = (held << 5) | value;
     bits += 5;
     if (bits >= 8) {
@@ -28,16 +28,16 @@ export function parseKey(text) {
       at += 1;
     }
   }
-  if (held !== 0) throw new Error("This key has a wrong last letter.");
+  if (held !== 0) throw new Error("The last letter of this key is wrong.");
   return key;
 }
 
-/** The bytes of hexadecimal digits. */
+/** Return the bytes of hexadecimal digits. */
 export function fromHex(digits) {
   return Uint8Array.from(digits.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
 }
 
-/** HMAC-SHA256 of nonce, certificate and role, each with its length before it. */
+/** Return the HMAC-SHA256 of nonce, certificate and role, each after its length. */
 export async function makeProof(key, nonce, certificate, role) {
   const parts = [PURPOSE, nonce, certificate, new TextEncoder().encode(role)];
   const text = new Uint8Array(parts.reduce((sum, part) => sum + 4 + part.length, 0));

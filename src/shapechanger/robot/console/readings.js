@@ -1,4 +1,4 @@
-// The numbers of the state, with their units and where they come from.
+// Numbers of the state, with their units and sources.
 
 import { find, make, tell } from "./dom.js";
 import { inWords, shown } from "./layout.js";
@@ -26,7 +26,7 @@ export class Readings {
       tell(cell, inFew(state[index], this.#features[index]));
       const source = sources[name] ?? "";
       cell.dataset.source = source;
-      cell.title = source === "absent" ? "Nothing measures this." : source && `from ${source}`;
+      cell.title = source === "absent" ? "Not measured." : source && `from ${source}`;
     }
     const battery = this.#features.findIndex(({ name }) => name === "battery");
     find("battery-fact").hidden = battery < 0;
@@ -34,7 +34,7 @@ export class Readings {
   }
 }
 
-/** A number with its unit; what only can be so or not, in a word. */
+/** Format a number with its unit, and a yes-or-no value as a word. */
 function inFew(value, { unit, low, high }) {
   if (!unit && low === 0 && high === 1 && (value === 0 || value === 1)) return value ? "yes" : "no";
   return shown(value, unit);

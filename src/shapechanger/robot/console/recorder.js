@@ -1,4 +1,4 @@
-// The recording of this drive: on and off, marks, and taking back the last five seconds.
+// Recorder: on and off, marks, and undo of the last five seconds.
 
 import { find, label, tell } from "./dom.js";
 
@@ -18,7 +18,7 @@ export class Recorder {
     link.addEventListener("recorderstate", ({ detail }) => this.#show(detail));
   }
 
-  /** A new connection: the robot can record, or not. */
+  /** Begin a connection; the robot may be unable to record. */
   begin(canRecord) {
     find("recording").hidden = !canRecord;
     this.#show({ episode: "", recording: false, steps: 0, dropped: 0, seconds: 0, marks: 0, text: "" });
@@ -45,7 +45,7 @@ export class Recorder {
     find("mark").disabled = !state.recording;
     find("undo").disabled = !state.recording;
     document.body.dataset.recording = String(state.recording);
-    // The numbers change each second, and are read to nobody who does not ask.
+    // Screen readers do not announce the numbers, which change each second.
     find("recorder-state").setAttribute("aria-live", state.recording ? "off" : "polite");
     const counts = [`${state.steps} steps`, `${state.seconds.toFixed(0)} s`];
     if (state.dropped) counts.push(`${state.dropped} undone`);

@@ -1,4 +1,4 @@
-// The keys that do not drive. Space and Escape stop the robot wherever the focus is.
+// Keys other than those that drive. Space and Escape stop the robot with the focus anywhere.
 
 import { isTyping } from "./keys.js";
 
@@ -7,7 +7,7 @@ const STOPS = new Set(["Space", "Escape"]);
 /** `actions` maps keys to functions; `stop` is called for Space and Escape while `isLive()`. */
 export function listen(stop, isLive, actions) {
   const stops = (event) => isLive() && STOPS.has(event.code) && !isTyping(event);
-  // Before any element: Space on a button must not press it, but stop the robot.
+  // Capture the key before any element: Space on a button must stop the robot.
   addEventListener(
     "keydown",
     (event) => {

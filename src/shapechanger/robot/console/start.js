@@ -1,5 +1,5 @@
-// Loads the page. What a bad radio did not bring is asked for again, by loading the page anew: a
-// browser does not ask twice for a part that failed.
+// Loads the page. If a part fails to load over a bad radio, the page is reloaded, because a browser
+// does not request a failed part again.
 
 const MOST_TRIES = 5;
 const PAUSE_MS = 1_000;
@@ -14,8 +14,8 @@ try {
   const again = tries < MOST_TRIES;
   sessionStorage.setItem(TRIES, again ? tries + 1 : 0);
   document.getElementById("connection").textContent = again
-    ? "The page did not come whole. Trying again…"
-    : "The page did not come whole: is the robot in reach? Load it again.";
+    ? "Part of the page failed to load. Trying again…"
+    : "Part of the page failed to load. Is the robot in reach? Reload the page.";
   if (again) setTimeout(() => location.reload(), PAUSE_MS);
   else throw error;
 }

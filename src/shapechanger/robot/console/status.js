@@ -1,15 +1,15 @@
-// The sentence that says what the robot does and who drives it, and what can be done about it.
+// State of the robot and its driver in a sentence, and the buttons that can change it.
 
 import { find, label, tell } from "./dom.js";
 
-const STOPPED_MS = 400; // A reason that is shorter than this would only flicker.
+const STOPPED_MS = 400; // A shorter reason would only flicker.
 
 export class Status {
   #reason = "";
   #sinceMs = 0;
   #wasEmergency = false;
 
-  /** Show what an observation says; `mine` is whether this page commands. */
+  /** Show an observation; `mine` is true if this page has control. */
   show(seen, mine, nowMs) {
     if (seen.stop_reason !== this.#reason) {
       this.#reason = seen.stop_reason;
@@ -19,7 +19,7 @@ export class Status {
     const { body } = document;
     body.dataset.robot = seen.emergency ? "emergency" : seen.armed ? "armed" : "disarmed";
     body.dataset.driver = mine ? "me" : seen.holder_role || "nobody";
-    tell(find("holder"), mine ? "you" : seen.holder || "nobody");
+    tell(find("holder"), mine ? "you" : seen.holder || "none");
     tell(find("state"), sentence(seen, mine, reason));
     if (seen.emergency && !this.#wasEmergency) tell(find("alert"), `Emergency stop. ${seen.stop_reason}`);
     if (!seen.emergency) tell(find("alert"), "");
@@ -34,7 +34,7 @@ export class Status {
     find("hand").setAttribute("aria-keyshortcuts", isOthers ? "E" : "P");
   }
 
-  /** There is no connection. */
+  /** Show a lost connection. */
   lose(text) {
     const { body } = document;
     body.dataset.robot = "lost";
@@ -45,12 +45,12 @@ export class Status {
 }
 
 function sentence(seen, mine, reason) {
-  if (seen.emergency) return `Emergency stop: ${reason || seen.stop_reason || "everything rests."}`;
+  if (seen.emergency) return `Emergency stop: ${reason || seen.stop_reason || "all outputs are at rest."}`;
   const who = mine ? "You drive" : seen.holder ? `${seen.holder} drives` : "";
   if (!seen.armed) {
-    if (mine) return "Yours, and not armed: arm it to drive.";
-    return who ? `${seen.holder} holds it, not armed.` : "Nobody drives. Arm it to drive.";
+    if (mine) return "You have control. Arm the robot to drive.";
+    return who ? `${seen.holder} has control; not armed.` : "No driver. Arm the robot to drive.";
   }
-  if (!who) return "Armed, and nobody drives.";
-  return reason ? `${who}; it rests: ${reason}` : `${who}.`;
+  if (!who) return "Armed, without a driver.";
+  return reason ? `${who}. At rest: ${reason}` : `${who}.`;
 }

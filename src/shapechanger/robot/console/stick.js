@@ -1,4 +1,4 @@
-// The stick on the screen, for a finger or a mouse; it springs back.
+// Stick on the screen for a finger or a mouse, which springs back.
 
 export class Stick {
   #pad;
@@ -18,12 +18,12 @@ export class Stick {
         if (event.pointerId === this.#pointer) this.#release();
       });
     }
-    // A long press opens no menu, and a finger neither scrolls nor zooms while it steers.
+    // While steering, a long press opens no menu, and a finger does not scroll or zoom.
     pad.addEventListener("contextmenu", (event) => event.preventDefault());
     pad.addEventListener("touchmove", (event) => event.preventDefault(), { passive: false });
   }
 
-  /** Spring back; whoever holds it must let go first. */
+  /** Spring back; a held stick must be let go first. */
   letGo() {
     this.#pointer = null;
     this.value = { steering: 0, throttle: 0 };
@@ -51,7 +51,7 @@ export class Stick {
   #follow(event) {
     const { left, top, width, height } = this.#pad.getBoundingClientRect();
     const clip = (value) => Math.max(-1, Math.min(1, value));
-    // The middle of the knob travels a third of the pad to each side, as `place` shows it.
+    // The knob's centre travels a third of the pad to each side, as in `place`.
     const steering = clip(((event.clientX - left) / width - 0.5) / 0.33);
     const throttle = clip((0.5 - (event.clientY - top) / height) / 0.33);
     this.value = { steering: calm(steering), throttle: calm(throttle) };
@@ -59,13 +59,13 @@ export class Stick {
   }
 }
 
-/** Nothing near the middle: a finger that goes straight ahead shall not steer. */
+/** Dead zone in the middle, so that a finger straight ahead does not steer. */
 function calm(value) {
   const size = Math.abs(value);
   return size < 0.08 ? 0 : (Math.sign(value) * (size - 0.08)) / 0.92;
 }
 
-/** Put a mark on the pad where a steering and a throttle are. */
+/** Place a mark on the pad at a steering and a throttle. */
 export function place(mark, steering, throttle) {
   mark.style.left = `${50 + 33 * steering}%`;
   mark.style.top = `${50 - 33 * throttle}%`;

@@ -1,4 +1,4 @@
-// Tilting the device: how it is held when this is switched on is the middle.
+// Tilt control; the orientation at switch-on is the centre.
 
 const FULL_DEG = 25; // Tilt of a full command.
 const DEAD_DEG = 3;
@@ -11,23 +11,23 @@ export class Tilt {
   /** Steering and throttle, -1 to 1 each. */
   value = { steering: 0, throttle: 0 };
 
-  /** Whether it is on. */
+  /** True while it is on. */
   isOn = false;
 
   constructor(changed) {
     this.#changed = changed;
   }
 
-  /** Whether this device may be one that can be tilted. */
+  /** True if the device may have a tilt sensor. */
   static get isThere() {
     return "DeviceOrientationEvent" in globalThis && navigator.maxTouchPoints > 0;
   }
 
-  /** Switch it on, after asking where that must be; throws an Error in words. */
+  /** Switch it on, with the user's permission where needed; throws an Error. */
   async start() {
     const { requestPermission } = DeviceOrientationEvent;
     if (requestPermission && (await requestPermission.call(DeviceOrientationEvent)) !== "granted") {
-      throw new Error("The browser does not let this page know how the device is tilted.");
+      throw new Error("The browser denies access to the tilt sensor.");
     }
     this.#middle = null;
     this.isOn = true;
@@ -52,7 +52,7 @@ export class Tilt {
   }
 }
 
-/** Tilt to the right and towards the person, in degrees, however the screen is turned. */
+/** Return the tilt to the right and towards the person, degrees, in any screen orientation. */
 function asHeld(beta, gamma, angle) {
   if (angle === 90) return { across: beta, along: -gamma };
   if (angle === 270) return { across: -beta, along: gamma };

@@ -1,4 +1,4 @@
-// Round trips, and how old a thing was when it arrived. Two machines' clocks are never subtracted.
+// Round trips and ages on arrival. Clocks of two machines are never subtracted.
 
 import { msBetween } from "./layout.js";
 
@@ -16,14 +16,14 @@ export class RoundTrips {
     this.#trips = [];
   }
 
-  /** The middle one of the last few, ms; null for none yet. */
+  /** Median of the last few, ms, or null. */
   get typicalMs() {
     if (!this.#trips.length) return null;
     return [...this.#trips].sort((a, b) => a - b)[this.#trips.length >> 1];
   }
 }
 
-/** How old what an observation shows was on its arrival, ms: on the robot, and half the way there. */
+/** Return the age of an observation on arrival, ms: on the robot, plus half a round trip. */
 export function ageOnArrivalMs(observation, roundTripMs) {
   return msBetween(observation.captured_ns, observation.sent_ns) + (roundTripMs ?? 0) / 2;
 }

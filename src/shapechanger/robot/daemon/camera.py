@@ -1,4 +1,4 @@
-"""The thread that reads the camera, and lets through only pictures that are good and new."""
+"""Camera thread of the daemon, which passes on only valid, new frames."""
 
 from __future__ import annotations
 
@@ -14,20 +14,46 @@ from shapechanger.robot.cameras.jpeg import FreezeDetector, check_jpeg
 
 __all__ = ["FrameChecks", "FrameReader", "Latest"]
 
-_FUTURE_NS: Final = 50_000_000  # Two clocks that are one may still be read in another order.
+_T = TypeVar("_T")
+
+_FUTURE_NS: Final = 50_000_000  # Two readings of one clock may be seen in the other order.
 _FIRST_PAUSE_S: Final = 0.1
 _LONGEST_PAUSE_S: Final = 2.0
 _BAD_UNTIL_REOPENED: Final = 10
 _JOIN_S: Final = 2.0
 
 
+class Latest(Generic[_T]):
+    """Mailbox with one slot: a newer item replaces one that was not taken.
+
+    One thread may put and another may take; a race can only lose an item to a newer one.
+    """
+
+    __slots__ = ("_slot",)
+
+    def __init__(self) -> None:
+        self._slot: list[_T] = []
+
+    def put(self, item: _T) -> None:
+        """Replace the item."""
+        self._slot = [item]
+
+    def take(self) -> _T | None:
+        """Remove and return the item, or None if there is none."""
+        slot = self._slot
+        try:
+            return slot.pop()  # The first to pop has it; `put` makes a new list.
+        except IndexError:
+            return None
+
+
 class FrameChecks:
-    """Says whether a picture may count as what the robot sees now.
+    """Rejects frames that fail to decode, repeat the last one or have an impossible time.
 
     Args:
-        size: Width and height that it must have.
-        now_ns: Gives the robot's time, to refuse pictures from the future; None where time moves
-            in steps, so that a picture may come before its time is known here.
+        size: Required width and height, pixels.
+        now_ns: Returns the robot's time, to reject frames from the future; None where time moves
+            in steps, and a frame may arrive before its time is known here.
     """
 
     def __init__(self, size: tuple[int, int], now_ns: Callable[[], int] | None = None) -> None:
@@ -37,33 +63,36 @@ class FrameChecks:
         self._newest_ns = -1
 
     def refusal(self, frame: Frame) -> str:
-        """Why a picture does not count, in words; empty if it does."""
+        """Return the reason to reject a frame, or "" if it is valid and new."""
         try:
             check_jpeg(frame.jpeg, self._size)
-            # Down to the last block: strict refuses what a decoder would fill up with grey.
+            # To the last block: strict rejects data that a decoder would fill up with grey.
             simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
         except (RobotError, ValueError) as error:
             return str(error)
         if not self._freeze.is_new(frame.jpeg):
-            return "The camera gives the same picture again and again."
+            return "The camera repeats the same frame."
         if frame.captured_ns <= self._newest_ns:
-            return "The camera gave a picture that is older than the one before."
+            return "The camera sent a frame that is older than the one before."
         if self._now_ns is not None and frame.captured_ns > self._now_ns() + _FUTURE_NS:
-            return "The camera gave a picture from the future."
+            return "The camera sent a frame from the future."
         self._newest_ns = frame.captured_ns
         return ""
 
 
 class FrameReader:
-    """Reads a camera in a thread of its own, and opens it again when it fails.
+    """Reads a camera in a thread, and reopens it after failures.
 
     Args:
-        plan: The camera.
-        checks: What a picture must pass.
-        deliver: Called with each good and new picture, in the thread.
-        report: Called in the thread with a sentence when something is wrong, and when it is well
-            again; the same sentence is said once.
+        plan: Settings of the camera.
+        checks: Checks each frame.
+        deliver: Called in the thread with each valid, new frame.
+        report: Called in the thread with a sentence when the camera fails, once for each kind of
+            failure, and when it recovers.
         opener: Opens the camera.
+
+    Attributes:
+        errors: Number of frames or attempts that failed.
     """
 
     def __init__(
@@ -75,7 +104,6 @@ class FrameReader:
         opener: Callable[[CameraPlan], Camera] = open_camera,
     ) -> None:
         self.errors = 0
-        """How many pictures or attempts failed."""
         self._plan = plan
         self._checks = checks
         self._deliver = deliver
@@ -87,11 +115,11 @@ class FrameReader:
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread, and let go of the camera."""
+        """End the thread, and close the camera."""
         self._end.set()
         camera = self._camera
         if camera is not None:
@@ -120,7 +148,7 @@ class FrameReader:
             self._end.wait(pause_s)
 
     def _read(self, camera: Camera) -> bool:
-        """Read until the camera fails; whether there was a good picture."""
+        """Read until the camera fails. Return True if there was a valid frame."""
         good, bad = False, 0
         while not self._end.is_set() and bad < _BAD_UNTIL_REOPENED:
             try:
@@ -133,14 +161,14 @@ class FrameReader:
             if refusal:
                 bad += 1
                 self._fail(refusal)
-                # A broken driver may not wait between pictures, and then this must.
+                # A broken driver may return without waiting for the next frame.
                 self._end.wait(0.5 / self._plan.fps)
                 continue
             good, bad = True, 0
             self._deliver(frame)
             if self._trouble:
                 self._trouble = ""
-                self._report("The camera gives pictures again.")
+                self._report("The camera works again.")
         return good
 
     def _fail(self, trouble: str) -> None:
@@ -148,40 +176,3 @@ class FrameReader:
         if trouble != self._trouble:
             self._trouble = trouble
             self._report(trouble)
-
-
-_T = TypeVar("_T")
-
-
-class Latest(Generic[_T]):
-    """Holds the newest thing that was put, until it is taken once.
-
-    A queue plays back what piled up while nobody read; this cannot, since it holds one thing and
-    gives it away once. One thread may put and another may take; a race can only lose a thing to a
-    newer one.
-    """
-
-    __slots__ = ("_slot",)
-
-    def __init__(self) -> None:
-        self._slot: list[_T] = []
-
-    def __bool__(self) -> bool:
-        """Whether there is something to take."""
-        return bool(self._slot)
-
-    def put(self, thing: _T) -> None:
-        """Replace what is there."""
-        self._slot = [thing]
-
-    def take(self) -> _T | None:
-        """The newest thing, which is then gone; None if there is none."""
-        slot = self._slot
-        try:
-            return slot.pop()  # Whoever pops first has it; `put` makes a new list.
-        except IndexError:
-            return None
-
-    def clear(self) -> None:
-        """Throw away what is there."""
-        self._slot = []

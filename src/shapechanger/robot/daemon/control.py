@@ -1,4 +1,4 @@
-"""Who commands: one at a time, and a person before a program."""
+"""Control lease and pending commands: which client commands the robot, and what it asked for."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from shapechanger.link.messages import Role
 
 __all__ = ["ClientIdentity", "ControlLease", "PendingCommand", "PendingCommands"]
 
+_NS_PER_MS: Final = 1_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class ClientIdentity:
-    """Somebody who may command.
+    """Identity of a connected client.
 
     Attributes:
         session: Number of the connection.
-        name: Who it is, for people to read.
-        role: Who drives.
+        name: Display name.
+        role: "person" or "program".
     """
 
     session: int
@@ -26,11 +28,11 @@ class ClientIdentity:
 
 
 class ControlLease:
-    """Gives the command to one connection at a time.
+    """Control of the robot, held by one connection at a time.
 
     Attributes:
-        number: Number of the lease in force, or of the last one; each is larger than the one
-            before, so that commands of an old one can be told.
+        number: Number of the current lease, or of the last one. Each lease has a larger number
+            than the one before, so that commands of an earlier lease can be recognised.
     """
 
     def __init__(self) -> None:
@@ -39,66 +41,63 @@ class ControlLease:
 
     @property
     def holder(self) -> ClientIdentity | None:
-        """Who commands; None for nobody."""
+        """The client that holds the lease, or None."""
         return self._holder
 
     def holds(self, session: int) -> bool:
-        """Whether a connection commands."""
+        """Return True if this connection holds the lease."""
         return self._holder is not None and self._holder.session == session
 
-    def refusal(self, who: ClientIdentity) -> str:
-        """Why somebody cannot take the command now; empty when they can."""
+    def refusal(self, client: ClientIdentity) -> str:
+        """Return the reason why `client` cannot take the lease now, or "" if it can."""
         held = self._holder
-        if held is None or held.session == who.session:
+        if held is None or held.session == client.session:
             return ""
-        if who.role == "person" and held.role == "program":
+        if client.role == "person" and held.role == "program":
             return ""
-        return f"{held.name} commands; a {who.role} cannot take it from a {held.role}."
+        return f"{held.name} has control; a {client.role} cannot take it from a {held.role}."
 
-    def take(self, who: ClientIdentity) -> ClientIdentity | None:
-        """Give the command to somebody whom `refusal` did not refuse.
+    def take(self, client: ClientIdentity) -> ClientIdentity | None:
+        """Give the lease to a client that `refusal` accepts.
 
         Returns:
-            Who lost it by that; None for nobody.
+            The client that lost the lease, or None.
         """
         held = self._holder
-        if held is not None and held.session == who.session:
+        if held is not None and held.session == client.session:
             return None
-        self._holder = who
+        self._holder = client
         self.number += 1
         return held
 
-    def give_up(self, session: int) -> bool:
-        """Take the command from a connection; whether it had it."""
+    def release(self, session: int) -> bool:
+        """End the lease of a connection. Return False if the connection did not hold it."""
         if not self.holds(session):
             return False
         self._holder = None
         return True
 
 
-_NS_PER_MS: Final = 1_000_000
-
-
 @dataclass(frozen=True, slots=True)
 class PendingCommand:
-    """What somebody wants, and until when.
+    """A command or a suggestion, with its expiry time.
 
     Attributes:
-        who: Who it is.
+        client: The client that sent it.
         values: One number for each action of the robot.
-        until_ns: When it is forgotten, of the robot's time.
+        until_ns: Expiry on the robot's clock, ns.
     """
 
-    who: ClientIdentity
+    client: ClientIdentity
     values: tuple[float, ...]
     until_ns: int
 
 
 class PendingCommands:
-    """The newest command and the newest suggestion, each as long as it counts.
+    """The newest command and the newest suggestion, until they expire.
 
     Args:
-        deadline_ms: How long either counts at most.
+        deadline_ms: Longest lifetime of either, ms.
     """
 
     def __init__(self, deadline_ms: int) -> None:
@@ -107,31 +106,44 @@ class PendingCommands:
         self._suggestion: PendingCommand | None = None
 
     def command(
-        self, who: ClientIdentity, values: tuple[float, ...], ttl_ms: int, now_ns: int
+        self, client: ClientIdentity, values: tuple[float, ...], ttl_ms: int, now_ns: int
     ) -> None:
-        """Somebody commands."""
-        until_ns = now_ns + _NS_PER_MS * min(ttl_ms, self._deadline_ms)
-        self._command = PendingCommand(who, values, until_ns)
+        """Replace the command of the lease holder.
 
-    def end_command(self) -> None:
-        """The newest command is taken back."""
+        Args:
+            client: The lease holder.
+            values: One number for each action of the robot.
+            ttl_ms: Lifetime, ms; the deadline holds where it is shorter.
+            now_ns: Time of arrival on the robot's clock, ns.
+        """
+        until_ns = now_ns + _NS_PER_MS * min(ttl_ms, self._deadline_ms)
+        self._command = PendingCommand(client, values, until_ns)
+
+    def clear_command(self) -> None:
+        """Drop the command."""
         self._command = None
 
-    def suggest(self, who: ClientIdentity, values: tuple[float, ...], now_ns: int) -> None:
-        """Somebody who does not command says what they would do."""
-        self._suggestion = PendingCommand(who, values, now_ns + _NS_PER_MS * self._deadline_ms)
+    def suggest(self, client: ClientIdentity, values: tuple[float, ...], now_ns: int) -> None:
+        """Replace the suggestion, which comes from a client without the lease.
+
+        Args:
+            client: The client that sent it.
+            values: One number for each action of the robot.
+            now_ns: Time of arrival on the robot's clock, ns.
+        """
+        self._suggestion = PendingCommand(client, values, now_ns + _NS_PER_MS * self._deadline_ms)
 
     def forget(self, session: int) -> None:
-        """Somebody has left, or commands now: what they suggested does not count any more."""
-        if self._suggestion is not None and self._suggestion.who.session == session:
+        """Drop the suggestion of a client that left or took the lease."""
+        if self._suggestion is not None and self._suggestion.client.session == session:
             self._suggestion = None
 
     def commanded(self, now_ns: int) -> tuple[float, ...]:
-        """The newest command that is in force; empty for none."""
-        wish = self._command
-        return () if wish is None or now_ns > wish.until_ns else wish.values
+        """Return the values of the unexpired command, or () if there is none."""
+        pending = self._command
+        return () if pending is None or now_ns > pending.until_ns else pending.values
 
     def suggested(self, now_ns: int) -> PendingCommand | None:
-        """The newest suggestion; None for none."""
-        wish = self._suggestion
-        return None if wish is None or now_ns > wish.until_ns else wish
+        """Return the unexpired suggestion, or None."""
+        pending = self._suggestion
+        return None if pending is None or now_ns > pending.until_ns else pending

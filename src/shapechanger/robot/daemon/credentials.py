@@ -1,4 +1,4 @@
-"""The key and the certificate of a robot: how they are made, kept and read."""
+"""Key and certificate of a robot: making, storing and reading them."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """What makes a robot known to its clients.
+    """Files that identify a robot to its clients.
 
     Attributes:
-        key_file: File of the key that clients must hold.
-        certificate: File of the certificate (PEM).
-        private_key: File of its private key (PEM).
+        key_file: Key that clients must hold.
+        certificate: Certificate (PEM).
+        private_key: Private key of the certificate (PEM).
         fingerprint: SHA-256 of the certificate (DER).
     """
 
@@ -52,15 +52,15 @@ class Credentials:
 
 
 def credentials_folder(name: str) -> Path:
-    """Where the credentials of a robot are, by its name.
+    """Return the folder of a robot's credentials.
 
     Raises:
-        RobotError: If the name is no name of a folder.
+        RobotError: If the name cannot be the name of a folder.
     """
     if not name or name.startswith(".") or "/" in name or "\0" in name:
-        raise RobotError(f"A robot cannot be called {name!r}: its name is that of a folder.")
+        raise RobotError(f"A robot's name must be a valid folder name, got {name!r}.")
     config = os.environ.get("XDG_CONFIG_HOME", "")
-    # The XDG base directory specification says that a relative path must be ignored.
+    # The XDG base directory specification requires relative paths to be ignored.
     base = Path(config) if config.startswith("/") else Path.home() / ".config"
     return base / "shapechanger" / "robots" / name
 
@@ -68,19 +68,23 @@ def credentials_folder(name: str) -> Path:
 def make_credentials(folder: Path, name: str) -> Credentials:
     """Make a key and a self-signed certificate that is valid for ten years.
 
-    What is there already stays: clients know it.
+    Existing credentials stay, because clients know them.
+
+    Args:
+        folder: Folder of the credentials.
+        name: Name of the robot, the common name of the certificate.
 
     Raises:
         OutputError: If the folder cannot be written.
-        RobotError: If half of it is there, or others may read it.
+        RobotError: If some of the files exist, or other users can read them.
     """
     files = [folder / part for part in (_KEY, _CERTIFICATE, _PRIVATE_KEY)]
     if all(file.exists() for file in files):
         return load_credentials(folder)
     if any(file.exists() for file in files):
         raise RobotError(
-            f"Only some of the credentials are in {folder}. "
-            "Move them away, and run `shapechanger robot init` again."
+            f"{folder} holds only some of the credentials. Move them away, and run "
+            "`shapechanger robot init` again."
         )
     certificate, private_key = _self_signed(name)
     is_new = not folder.exists()
@@ -90,24 +94,24 @@ def make_credentials(folder: Path, name: str) -> Credentials:
         write_new(folder / _PRIVATE_KEY, private_key, 0o600)
         write_new(folder / _CERTIFICATE, certificate, 0o644)
     except OSError as error:
-        # On a full disk, say. Half of them would be in the way of the next try.
+        # On a full disk, for example. Partial credentials would block the next attempt.
         with contextlib.suppress(OSError):
             for file in files:
                 file.unlink(missing_ok=True)
             if is_new:
                 folder.rmdir()
-        raise OutputError(f"The credentials cannot be written to {folder}: {error}.") from error
+        raise OutputError(f"Cannot write the credentials to {folder}: {error}.") from error
     return load_credentials(folder)
 
 
 def load_credentials(folder: Path) -> Credentials:
-    """The credentials in a folder.
+    """Read the credentials in a folder.
 
     Raises:
-        RobotError: If one is missing, or is no such thing, or others may read it.
+        RobotError: If a file is missing or invalid, or other users can read it.
     """
     read_key(folder / _KEY)
-    _refuse_others(folder / _PRIVATE_KEY)
+    _check_private(folder / _PRIVATE_KEY)
     certificate = folder / _CERTIFICATE
     return Credentials(
         key_file=folder / _KEY,
@@ -118,48 +122,50 @@ def load_credentials(folder: Path) -> Credentials:
 
 
 def read_key(file: Path) -> bytes:
-    """The key in a file.
+    """Read the key in a file.
 
     Raises:
-        RobotError: If it is missing or no key, or others may read it.
+        RobotError: If it is missing or invalid, or other users can read it.
     """
-    _refuse_others(file)
+    _check_private(file)
     try:
         return parse_key(file.read_text())
     except (OSError, UnicodeDecodeError, LinkError) as error:
-        raise RobotError(f"The key in {file} cannot be read: {error}") from error
+        raise RobotError(f"Cannot read the key in {file}: {error}") from error
 
 
 def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, bytes]:
-    """What a server speaks TLS with, 1.3 at least, and the fingerprint of its certificate.
+    """Return the server's context for TLS 1.3 or newer, and the fingerprint of its certificate.
+
+    Args:
+        certificate: Certificate (PEM).
+        private_key: Its private key (PEM).
 
     Raises:
-        RobotError: If the files are missing, do not fit each other, or others may read the key.
+        RobotError: If a file is missing, the two do not match, or other users can read the key.
     """
-    _refuse_others(private_key)
+    _check_private(private_key)
     fingerprint = _fingerprint(certificate)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     try:
         context.load_cert_chain(certificate, private_key)
     except (OSError, ssl.SSLError) as error:
-        raise RobotError(f"{certificate} and {private_key} are no pair: {error}.") from error
+        raise RobotError(f"{certificate} and {private_key} do not match: {error}.") from error
     return context, fingerprint
 
 
 def check_exposure(plan: DaemonPlan) -> None:
-    """Refuse to let others drive.
+    """Refuse to serve other machines without TLS and a key.
 
     Raises:
-        RobotError: If the plan listens beyond this machine without TLS and a key, and nobody asked
-            for that.
+        RobotError: If the plan does so without `insecure`.
     """
     secured = plan.certificate and plan.private_key and plan.key_file
     if not (secured or plan.insecure or is_loopback(plan.host)):
         raise RobotError(
-            f"{plan.host} can be reached by others, and without a certificate and a key everybody "
-            "there could drive the robot. Run `shapechanger robot init`, or listen at 127.0.0.1; "
-            "`--insecure` does it all the same."
+            f"Other machines reach {plan.host}, and could drive the robot without a key. Run "
+            "`shapechanger robot init`, listen at 127.0.0.1, or pass `--insecure`."
         )
 
 
@@ -169,27 +175,29 @@ def _fingerprint(certificate: Path) -> bytes:
     except FileNotFoundError as error:
         raise _missing(certificate) from error
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise RobotError(f"The certificate {certificate} cannot be read: {error}.") from error
+        raise RobotError(f"Cannot read the certificate {certificate}: {error}.") from error
 
 
-def _refuse_others(file: Path) -> None:
+def _check_private(file: Path) -> None:
     try:
         mode = file.stat().st_mode
     except FileNotFoundError as error:
         raise _missing(file) from error
     except OSError as error:
-        raise RobotError(f"{file} cannot be read: {error}.") from error
+        raise RobotError(f"Cannot read {file}: {error}.") from error
     if mode & _OTHERS:
-        raise RobotError(f"Others may read {file}. Run `chmod 600 {file}`; better, make it anew.")
+        raise RobotError(
+            f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new one."
+        )
 
 
 def _missing(file: Path) -> RobotError:
-    return RobotError(f"There is no {file}. Run `shapechanger robot init` to make it.")
+    return RobotError(f"{file} does not exist. Run `shapechanger robot init` to make it.")
 
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:
-    """A certificate and its private key, both PEM."""
-    # Loaded here, because only the making needs it: 10 MB that a daemon shall not hold.
+    """Return a certificate and its private key, both PEM."""
+    # Imported here, to keep 10 MB out of the daemon.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec
@@ -197,7 +205,7 @@ def _self_signed(name: str) -> tuple[bytes, bytes]:
 
     private_key = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-    # A Pi without a battery may think that it is the past; its certificate began long before.
+    # The clock of a Pi without a battery may be in the past, so the validity starts early.
     begin = datetime.datetime(2020, 1, 1, tzinfo=datetime.UTC)
     now = max(begin, datetime.datetime.now(datetime.UTC))
     certificate = (

@@ -1,11 +1,11 @@
-"""Announces the robot on the local network, so that `shapechanger robot find` sees it."""
+"""mDNS announcement of the robot, for `shapechanger robot find`."""
 
 from __future__ import annotations
 
 import ipaddress
 import logging
 import socket
-from typing import Any, Final
+from typing import Any
 
 from zeroconf import (
     Error,
@@ -14,24 +14,22 @@ from zeroconf import (
 )
 from zeroconf.asyncio import AsyncZeroconf
 
+from shapechanger.link.address import SERVICE
 from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import VERSION
 from shapechanger.robot.daemon.plan import DaemonPlan
 
-__all__ = ["SERVICE", "Announcement"]
-
-SERVICE: Final = "_shapechanger._tcp.local."
-"""What the robot is announced as."""
+__all__ = ["Announcement"]
 
 _log = logging.getLogger(__name__)
 
 
 class Announcement:
-    """One robot's announcement; that it fails is said in words, and the robot serves all the same.
+    """Announcement of one robot; if it fails, a warning is logged and the robot serves anyway.
 
     Args:
-        plan: The robot.
-        port: Port that it listens at.
+        plan: Description of the robot.
+        port: Port of the server.
         fingerprint: Fingerprint of its certificate; empty without TLS.
     """
 
@@ -42,13 +40,13 @@ class Announcement:
         self._zeroconf: Any = None  # AsyncZeroconf; its types are only partly known.
 
     async def start(self) -> bool:
-        """Announce the robot; whether that went well."""
+        """Announce the robot. Return False if that failed."""
         try:
             self._zeroconf = AsyncZeroconf()
             await self._zeroconf.async_register_service(self._service(), allow_name_change=True)
         except (Error, OSError, RuntimeError, ValueError) as error:
             _log.warning(
-                "%s is not announced on the network, so it is found by its address only: %s",
+                "%s cannot be announced on the network, so clients need its address: %s",
                 self._plan.robot,
                 error or type(error).__name__,
             )
@@ -57,7 +55,7 @@ class Announcement:
         return True
 
     async def close(self) -> None:
-        """Say that the robot is gone."""
+        """Withdraw the announcement."""
         zeroconf, self._zeroconf = self._zeroconf, None
         if zeroconf is None:
             return
@@ -65,10 +63,10 @@ class Announcement:
             await zeroconf.async_unregister_all_services()
             await zeroconf.async_close()
         except (Error, OSError, RuntimeError) as error:
-            _log.warning("The announcement could not be taken back: %s", error)
+            _log.warning("The announcement cannot be withdrawn: %s", error)
 
     def _service(self) -> ServiceInfo:
-        name = self._plan.robot.replace(".", " ")  # A dot would begin another label.
+        name = self._plan.robot.replace(".", " ")  # A dot would start another label.
         label = name.encode()[:63].decode(errors="ignore")  # RFC 6763: 63 bytes.
         return ServiceInfo(
             SERVICE,
@@ -86,7 +84,7 @@ class Announcement:
 
 
 def _addresses(host: str) -> list[bytes]:
-    """The addresses under which others reach a robot that listens at a host's address."""
+    """Return the addresses at which other machines reach a robot that listens at `host`."""
     listening = ipaddress.ip_address(host)
     if not listening.is_unspecified:
         return [listening.packed]

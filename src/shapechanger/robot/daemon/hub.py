@@ -1,4 +1,4 @@
-"""What all connections to a robot share: the command, the newest state and picture, the guard."""
+"""Session hub: state that all connections share, and the path of commands to the guard."""
 
 from __future__ import annotations
 
@@ -28,51 +28,51 @@ from shapechanger.robot.guard.messages import GuardState, Order
 __all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "ConnectedClient", "SessionHub"]
 
 MAX_CLIENTS: Final = 8
-"""Connections that are known at the same time."""
+"""Most clients connected at the same time."""
 
 MAX_PROGRAMS: Final = 6
-"""How many of them may be programs, so that a person finds a place to stop the robot from."""
+"""Most programs among them, so that a person can always connect and stop the robot."""
 
-_ARRIVALS: Final = 64  # Commands whose time of arrival is remembered; more than are on their way.
+_ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
 
 
 class ConnectedClient(Protocol):
-    """A connection whose client is known."""
+    """An authenticated connection, as the hub sees it."""
 
     @property
-    def who(self) -> ClientIdentity:
-        """Who it is."""
+    def client(self) -> ClientIdentity:
+        """Identity of the client."""
         ...
 
-    def tell(self, message: RobotMessage) -> None:
-        """Send a message when there is time."""
+    def post(self, message: RobotMessage) -> None:
+        """Queue a message."""
         ...
 
-    def notice(self) -> None:
-        """There is a new state or picture."""
+    def notify(self) -> None:
+        """Report a new state or frame."""
         ...
 
 
 class SessionHub:
-    """The robot, as its connections see it; it waits for nothing and knows no sockets.
+    """The robot, as its connections see it. The hub never blocks and knows no sockets.
 
     Args:
-        plan: What the robot is.
-        now_ns: Gives the robot's time.
-        order: Hands an order to the guard.
-        call: Runs a function in the thread of the connections, from any other one.
+        plan: Description of the robot.
+        now_ns: Returns the robot's time, ns.
+        order: Passes an order to the guard.
+        call: Runs a function in the event loop's thread, from any other thread.
 
     Attributes:
-        plan: What the robot is.
-        lease: Who commands.
-        recorder: Records what is driven.
-        library: Knows what was recorded.
-        reader: Reads the state.
-        action_size: How many numbers a command has.
-        state: What the guard said last; None for nothing yet.
-        newest: The newest picture; None for none yet.
-        pictured: Set at each new picture, for whoever waits for one.
-        unsettled: Whether an order was given that takes effect at the guard's next tick.
+        plan: Description of the robot.
+        lease: The control lease.
+        recorder: Records episodes.
+        library: Reads recorded episodes.
+        reader: Reads the guard's state in the order of the layout.
+        action_size: Number of values of a command.
+        state: Newest state of the guard, or None.
+        newest: Newest frame, or None.
+        frame_arrived: Set at each new frame.
+        unsettled: True if an order was given that takes effect at the guard's next tick.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class SessionHub:
         plan: DaemonPlan,
         now_ns: Callable[[], int],
         order: Callable[[Order], None],
-        call: Callable[[Callable[[], None]], None] | None = None,
+        call: Callable[[Callable[[], None]], None] = lambda work: work(),
     ) -> None:
         self.plan = plan
         self.lease = ControlLease()
@@ -89,84 +89,93 @@ class SessionHub:
         self.action_size = actions.size
         self.state: GuardState | None = None
         self.newest: NumberedFrame | None = None
-        self.pictured = asyncio.Event()
+        self.frame_arrived = asyncio.Event()
         self.unsettled = False
         self._now_ns = now_ns
         self._order = order
-        self._members: dict[int, ConnectedClient] = {}
+        self._clients: dict[int, ConnectedClient] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._wishes = PendingCommands(plan.deadline_ms)
-        call = _at_once if call is None else call
-        self.recorder = Recorder(plan, self._tell, call)
+        self._pending = PendingCommands(plan.deadline_ms)
+        self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
 
     def now_ns(self) -> int:
-        """The robot's time."""
+        """Return the robot's time, ns."""
         return self._now_ns()
 
     def join(self, member: ConnectedClient) -> None:
-        """Let a client in.
+        """Add an authenticated client.
 
         Raises:
-            RobotRefused: If there are too many.
+            RobotRefused: If too many clients are connected.
         """
-        programs = sum(other.who.role == "program" for other in self._members.values())
-        if len(self._members) >= MAX_CLIENTS:
-            raise RobotRefused(f"{MAX_CLIENTS} clients are connected already; there is no place.")
-        if member.who.role == "program" and programs >= MAX_PROGRAMS:
+        programs = sum(other.client.role == "program" for other in self._clients.values())
+        if len(self._clients) >= MAX_CLIENTS:
+            raise RobotRefused(f"{MAX_CLIENTS} clients are connected, which is the limit.")
+        if member.client.role == "program" and programs >= MAX_PROGRAMS:
             raise RobotRefused(
-                f"{MAX_PROGRAMS} programs are connected already; the other places are for persons."
+                f"{MAX_PROGRAMS} programs are connected, which is the limit; only a person can "
+                "still connect."
             )
-        self._members[member.who.session] = member
+        self._clients[member.client.session] = member
 
     def leave(self, session: int) -> None:
-        """A connection has ended; if it commanded, the robot stops and is disarmed."""
-        member = self._members.pop(session, None)
+        """Remove a client; if it had control, the robot stops and is disarmed."""
+        member = self._clients.pop(session, None)
         if member is None:
             return
-        self._wishes.forget(session)
-        self.release(member.who, f"the connection to {member.who.name} has ended")
+        self._pending.forget(session)
+        self.release(member.client, f"the connection to {member.client.name} ended")
         self.recorder.forget(session)
-        if self.recorder.on and not any(m.who.role == "person" for m in self._members.values()):
-            # Nobody is left who could end it.
-            self.recorder.end("The last person has left, and recording ended with that.")
-            self._tell(self.recorder.state())
+        people = any(other.client.role == "person" for other in self._clients.values())
+        if self.recorder.on and not people:
+            self.recorder.end("The last person disconnected, which ended the recording.")
+            self._broadcast(self.recorder.state())
 
-    def take(self, who: ClientIdentity) -> None:
-        """Give somebody the command, and tell everybody; or tell them why not."""
-        refusal = self.lease.refusal(who)
+    def take(self, client: ClientIdentity) -> None:
+        """Give control to a client and report it to all, or report the refusal to the client."""
+        refusal = self.lease.refusal(client)
         if refusal:
             held = self.lease.holder
             name = "" if held is None else held.name
-            self._members[who.session].tell(Lease(mine=False, holder=name, reason=refusal))
+            self._clients[client.session].post(Lease(mine=False, holder=name, reason=refusal))
             return
-        lost = self.lease.take(who)
-        self._wishes.forget(who.session)
-        reason = f"{who.name} commands."
+        lost = self.lease.take(client)
+        self._pending.forget(client.session)
+        reason = f"{client.name} has control."
         if lost is not None:
-            # What the other one said last must not act on: whoever took it wants that ended.
+            # The last command of the previous holder must not stay in force.
             self.give_order(Order(kind="halt"))
-            self._wishes.end_command()
-            reason = f"{who.name}, a person, took the command from {lost.name}."
-        self._tell_lease(reason)
+            self._pending.clear_command()
+            reason = f"{client.name}, a person, took control from {lost.name}."
+        self._broadcast_lease(reason)
 
-    def release(self, who: ClientIdentity, why: str) -> None:
-        """Take the command from somebody who has it, and disarm."""
-        if not self.lease.give_up(who.session):
+    def release(self, client: ClientIdentity, why: str) -> None:
+        """End the lease of a client, if it holds it, and disarm the robot.
+
+        Args:
+            client: The client.
+            why: Reason, a clause without a full stop.
+        """
+        if not self.lease.release(client.session):
             return
         self.give_order(Order(kind="disarm", reason=why))
-        self._wishes.end_command()
-        self._tell_lease(f"Nobody commands: {why}.")
+        self._pending.clear_command()
+        self._broadcast_lease(f"No client has control: {why}.")
 
     def command(self, command: Command, now_ns: int) -> None:
-        """Hand a command that was found good to the guard."""
-        key = (self.lease.number, command.seq)
-        self._arrivals[key] = now_ns
+        """Pass a valid command of the lease holder to the guard.
+
+        Args:
+            command: The command.
+            now_ns: Its arrival time, ns.
+        """
+        self._arrivals[self.lease.number, command.seq] = now_ns
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
         values = tuple(command.scale * value for value in command.values)
         if (held := self.lease.holder) is not None:
-            self._wishes.command(held, values, command.ttl_ms, now_ns)
+            self._pending.command(held, values, command.ttl_ms, now_ns)
             if self.state is not None and self.state.armed:
                 self.recorder.decided(held, command.answers, values, now_ns)
         self._order(
@@ -182,94 +191,94 @@ class SessionHub:
         )
 
     def halt(self) -> None:
-        """Take back the newest command, because whoever commands said nonsense after it."""
-        # Nobody has to wait until it takes effect: whoever said that waits for an observation.
-        self._wishes.end_command()
+        """Drop the newest command, because the lease holder sent an invalid one after it."""
+        # Not `give_order`: the sender waits for an observation anyway, so time need not step.
+        self._pending.clear_command()
         self._order(Order(kind="halt", issued_ns=self._now_ns()))
 
     def give_order(self, order: Order) -> None:
-        """Hand the guard an order that is no command, with the time of now."""
+        """Pass an order other than a command to the guard, with the current time."""
         self.unsettled = True
         self._order(replace(order, issued_ns=self._now_ns()))
 
-    def suggest(self, who: ClientIdentity, values: tuple[float, ...]) -> None:
-        """Take down what somebody who does not command would do."""
-        self._wishes.suggest(who, values, self._now_ns())
+    def suggest(self, client: ClientIdentity, values: tuple[float, ...]) -> None:
+        """Store the suggestion of a client without the lease."""
+        self._pending.suggest(client, values, self._now_ns())
 
     def commanded(self) -> tuple[float, ...]:
-        """The newest command that is in force; empty for none."""
+        """Return the values of the command in force, or () if there is none."""
         if self.state is None or not self.state.armed:
             return ()
-        return self._wishes.commanded(self._now_ns())
+        return self._pending.commanded(self._now_ns())
 
     def suggested(self) -> PendingCommand | None:
-        """What somebody who does not command would do; None for nothing."""
-        return self._wishes.suggested(self._now_ns())
+        """Return the unexpired suggestion, or None."""
+        return self._pending.suggested(self._now_ns())
 
     def command_ns(self) -> int | None:
-        """When the command arrived that the outputs follow now."""
+        """Return the arrival time of the command that the outputs follow, ns, or None."""
         if self.state is None or self.state.applied_seq is None:
             return None
         return self._arrivals.get((self.state.applied_session, self.state.applied_seq))
 
     def on_state(self, state: GuardState) -> None:
-        """The guard says what it does."""
+        """Handle a new state of the guard."""
         before, self.state = self.state, state
-        for name, text in _happened(before, state):
+        for name, text in _state_events(before, state):
             self.event(name, text)
         if state.refused:
-            self._tell_refused(state)
-        self._notice()
+            self._post_refused(state)
+        self._notify()
 
     def on_frame(self, frame: Frame) -> None:
-        """The camera gave a picture that was found good and new."""
+        """Handle a new, valid frame of the camera."""
         seq = 1 if self.newest is None else self.newest.seq + 1
         self.newest = NumberedFrame(seq, frame)
-        self.pictured.set()
-        self._notice()
+        self.frame_arrived.set()
+        self._notify()
 
     def event(self, name: str, text: str) -> None:
-        """Tell everybody that something happened."""
-        self._tell(Event(name=name, text=text, at_ns=self._now_ns()))
+        """Report an event to all clients.
 
-    def _tell(self, message: RobotMessage) -> None:
-        for member in list(self._members.values()):
-            member.tell(message)
+        Args:
+            name: Kind of event, such as "armed".
+            text: A sentence.
+        """
+        self._broadcast(Event(name=name, text=text, at_ns=self._now_ns()))
 
-    def _tell_lease(self, reason: str) -> None:
+    def _broadcast(self, message: RobotMessage) -> None:
+        for member in list(self._clients.values()):
+            member.post(message)
+
+    def _broadcast_lease(self, reason: str) -> None:
         held = self.lease.holder
         name = "" if held is None else held.name
-        for session, member in list(self._members.items()):
-            member.tell(Lease(mine=self.lease.holds(session), holder=name, reason=reason))
+        for session, member in list(self._clients.items()):
+            member.post(Lease(mine=self.lease.holds(session), holder=name, reason=reason))
 
-    def _tell_refused(self, state: GuardState) -> None:
-        """Tell whoever commands; what is no command concerns everybody."""
+    def _post_refused(self, state: GuardState) -> None:
+        """Report a refused command to the lease holder, and any other refused order to all."""
         refused = Refused(reason=state.refused, seq=state.refused_seq)
         held = self.lease.holder
         if state.refused_seq is None:
-            self._tell(refused)
-        elif held is not None and held.session in self._members:
-            self._members[held.session].tell(refused)
+            self._broadcast(refused)
+        elif held is not None and held.session in self._clients:
+            self._clients[held.session].post(refused)
 
-    def _notice(self) -> None:
-        for member in self._members.values():
-            member.notice()
-
-
-def _at_once(work: Callable[[], None]) -> None:
-    """For who has one thread only."""
-    work()
+    def _notify(self) -> None:
+        for member in self._clients.values():
+            member.notify()
 
 
-def _happened(before: GuardState | None, now: GuardState) -> list[tuple[str, str]]:
-    """What people should know of the change from one state to the next: names and sentences."""
-    happened: list[tuple[str, str]] = []
+def _state_events(before: GuardState | None, now: GuardState) -> list[tuple[str, str]]:
+    """Return the events between two states, as names and sentences."""
+    events: list[tuple[str, str]] = []
     if now.emergencies > (0 if before is None else before.emergencies):
-        happened.append(("emergency", now.stop_reason or "Emergency stop."))
+        events.append(("emergency", now.stop_reason or "Emergency stop."))
     if now.armed and not (before is not None and before.armed):
-        happened.append(("armed", "The outputs may move."))
+        events.append(("armed", "The outputs may move."))
     if before is not None and before.armed and not now.armed:
-        happened.append(("disarmed", now.stop_reason or "Disarmed."))
+        events.append(("disarmed", now.stop_reason or "Disarmed."))
     if before is not None and now.bumps > before.bumps:
-        happened.append(("bump", "The robot bumped into something."))
-    return happened
+        events.append(("bump", "The robot bumped into something."))
+    return events

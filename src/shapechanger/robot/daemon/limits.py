@@ -1,4 +1,4 @@
-"""How much a client may say: so many messages a second."""
+"""Limits for one client: its message rate, its outbox, and the age of what it answers."""
 
 from __future__ import annotations
 
@@ -13,15 +13,20 @@ from shapechanger.link.messages import Event, Lease, RecorderState, RobotMessage
 __all__ = ["MESSAGES_PER_S", "MessageRate", "Outbox", "SentObservations", "printable"]
 
 MESSAGES_PER_S: Final = 500.0
-"""Messages a second that a connection may send; a driver sends 50."""
+"""Messages per second that a connection may send; a driver sends 50."""
+
+_MAX_EVENTS: Final = 32
+_MAX_MESSAGES: Final = 256
+_NS_PER_MS: Final = 1_000_000
+_WINDOW: Final = 64  # More than a second at 50 Hz; older observations are stale in any case.
 
 
 class MessageRate:
-    """A bucket of tokens: one second's worth may come at once.
+    """Token bucket that holds one second's worth of messages.
 
     Args:
-        per_s: Messages a second.
-        clock: Seconds of a monotonic clock.
+        per_s: Messages per second.
+        clock: Monotonic clock, s.
     """
 
     def __init__(
@@ -33,7 +38,7 @@ class MessageRate:
         self._at = clock()
 
     def spend(self) -> bool:
-        """Count one message; whether it is still within the rate."""
+        """Count one message. Return False if it exceeds the rate."""
         now = self._clock()
         self._tokens = min(self._per_s, self._tokens + (now - self._at) * self._per_s)
         self._at = now
@@ -43,74 +48,59 @@ class MessageRate:
         return True
 
     def give_back(self) -> None:
-        """Do not count one message, because the robot itself kept the pace."""
+        """Uncount one message, because the robot set the pace."""
         self._tokens = min(self._per_s, self._tokens + 1.0)
 
 
-_MAX_EVENTS: Final = 32
-_MAX_MESSAGES: Final = 256
-
-
 class Outbox:
-    """Messages that wait to be sent to one client.
+    """Queue of messages for one client, other than observations.
 
-    Of leases and of the recorder's states only the newest one waits, and of events the newest 32;
-    of answers there may be 256, and then the client does not read.
+    It keeps the newest lease, the newest recorder state and the newest 32 events. Other messages
+    are accepted while fewer than 256 are queued.
     """
 
     def __init__(self) -> None:
         self._messages: deque[RobotMessage] = deque()
 
     def __len__(self) -> int:
-        """How many wait."""
+        """Return the number of queued messages."""
         return len(self._messages)
 
     def put(self, message: RobotMessage) -> None:
         """Add a message.
 
         Raises:
-            LinkError: If too many wait already.
+            LinkError: If the client does not read and the queue is full.
         """
         if isinstance(message, Lease | RecorderState):
-            self._drop(type(message), keep=0)
+            self._trim(type(message), keep=0)
         elif isinstance(message, Event):
-            self._drop(Event, keep=_MAX_EVENTS - 1)
+            self._trim(Event, keep=_MAX_EVENTS - 1)
         elif len(self._messages) >= _MAX_MESSAGES:
-            raise LinkError("You do not read what you are told.")
+            raise LinkError("The client does not read its messages.")
         self._messages.append(message)
 
     def take(self) -> RobotMessage | None:
-        """The oldest message; None for none."""
+        """Remove and return the oldest message, or None if the queue is empty."""
         return self._messages.popleft() if self._messages else None
 
     def holds(self, *kinds: type[RobotMessage]) -> bool:
-        """Whether a message of one of these kinds waits."""
+        """Return True if a message of one of these types is queued."""
         return any(isinstance(message, kinds) for message in self._messages)
 
-    def _drop(self, kind: type[RobotMessage], keep: int) -> None:
-        """Drop the oldest messages of a kind until so many are left."""
-        surplus = sum(isinstance(message, kind) for message in self._messages) - keep
-        if surplus <= 0:
-            return
-        kept: deque[RobotMessage] = deque()
-        for message in self._messages:
-            if surplus > 0 and isinstance(message, kind):
-                surplus -= 1
-            else:
-                kept.append(message)
-        self._messages = kept
-
-
-_NS_PER_MS: Final = 1_000_000
-_WINDOW: Final = 64  # At 50 Hz more than a second: older ones are too old in any case.
+    def _trim(self, kind: type[RobotMessage], keep: int) -> None:
+        """Remove the oldest messages of a type until `keep` are left."""
+        queued = [message for message in self._messages if isinstance(message, kind)]
+        for message in queued[: max(0, len(queued) - keep)]:
+            self._messages.remove(message)
 
 
 class SentObservations:
-    """The observations that one client was sent last.
+    """The last observations sent to one client, and when.
 
     Args:
-        max_age_ms: How old an observation may be that a command answers.
-        window: How many are remembered.
+        max_age_ms: Oldest observation that a command may answer, ms since it was sent.
+        window: Number of observations to remember.
     """
 
     def __init__(self, max_age_ms: int, window: int = _WINDOW) -> None:
@@ -118,28 +108,28 @@ class SentObservations:
         self._sent: deque[tuple[int, int]] = deque(maxlen=window)
 
     def add(self, seq: int, now_ns: int) -> None:
-        """Remember that an observation leaves now; its `seq` is larger than those before."""
+        """Remember that observation `seq` is sent now; `seq` increases from call to call."""
         self._sent.append((seq, now_ns))
 
     def refusal(self, answers: int, now_ns: int) -> str:
-        """Why what arrives now must not act; empty when it may.
+        """Return the reason why a message must not act, or "" if it may.
 
         Args:
-            answers: `seq` of the observation that it answers.
-            now_ns: The robot's time.
+            answers: `seq` of the observation that the message answers.
+            now_ns: The robot's time, ns.
         """
-        for seq, sent_ns in reversed(self._sent):
-            if seq == answers:
-                age_ms = (now_ns - sent_ns) / _NS_PER_MS
-                if age_ms > self._max_age_ms:
-                    return (
-                        f"It answers observation {answers}, which was sent {age_ms:.0f} ms ago; "
-                        f"at most {self._max_age_ms} ms are allowed."
-                    )
-                return ""
-        return f"It answers observation {answers}, which was not sent to this client of late."
+        sent_ns = dict(self._sent).get(answers)
+        if sent_ns is None:
+            return f"Observation {answers} was not sent to this client recently."
+        age_ms = (now_ns - sent_ns) / _NS_PER_MS
+        if age_ms > self._max_age_ms:
+            return (
+                f"Observation {answers} was sent {age_ms:.0f} ms ago; "
+                f"at most {self._max_age_ms} ms are allowed."
+            )
+        return ""
 
 
 def printable(text: str) -> str:
-    """Without what moves a terminal's cursor, and in one line."""
+    """Return `text` as one line, without control characters."""
     return "".join(c if c.isprintable() else " " for c in text).strip()

@@ -1,4 +1,4 @@
-"""What a client is told of the robot, from what the guard and the camera said last."""
+"""Observations, built from the newest state of the guard and the newest frame of the camera."""
 
 from __future__ import annotations
 
@@ -15,33 +15,34 @@ from shapechanger.robot.guard.messages import GuardState
 __all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
 
 ABSENT: Final = "absent"
-"""Source of a quantity that nothing measures; its number is NaN, never an invented 0."""
+"""Source of a quantity that no sensor measures; its value is NaN, never an invented 0."""
 
 _APPLIED: Final = "/applied"
 
 
 @dataclass(frozen=True, slots=True)
 class NumberedFrame:
-    """A picture that was found good, with its number; the same number is the same picture."""
+    """A valid frame and its number; equal numbers mean the same frame."""
 
     seq: int
     frame: Frame
 
 
 class StateReader:
-    """Puts the quantities of the guard in the order of the state layout.
+    """Orders the quantities of the guard as in the state layout.
 
     Args:
-        state_layout: What the state holds.
-        action_layout: What a command holds.
+        state_layout: Layout of `Observation.state`.
+        action_layout: Layout of `Command.values`.
     """
 
     def __init__(self, state_layout: Layout, action_layout: Layout) -> None:
         self._features = state_layout.features
         self._places = {name: i for i, name in enumerate(action_layout.names)}
+        self._measured = [f.name for f in self._features if not f.name.endswith(_APPLIED)]
 
     def values(self, state: GuardState | None) -> tuple[float, ...]:
-        """The numbers of the state layout; NaN for each that is not known."""
+        """Return the numbers of the state layout, NaN where the value is unknown."""
         return tuple(
             self._value(feature.name, state)
             for feature in self._features
@@ -49,10 +50,9 @@ class StateReader:
         )
 
     def sources(self, state: GuardState | None) -> dict[str, str]:
-        """Where each quantity comes from."""
-        named = [f.name for f in self._features if not f.name.endswith(_APPLIED)]
+        """Return the source of each quantity by name."""
         known = {} if state is None else state.sources
-        return {name: ABSENT for name in named if name not in known} | known
+        return {name: ABSENT for name in self._measured if name not in known} | known
 
     def _value(self, name: str, state: GuardState | None) -> float:
         if state is None:
@@ -78,21 +78,21 @@ def build_observation(
     commanded: tuple[float, ...] = (),
     suggested: PendingCommand | None = None,
 ) -> Observation:
-    """Put an observation together.
+    """Build the observation for one client.
 
     Args:
-        seq: Its number.
-        now_ns: The robot's time.
-        reader: Knows the layouts.
-        state: What the guard said last; None for nothing yet.
-        newest: The newest good picture; None for none yet.
-        frame_sent: Number of the last picture that this client was sent; None if it wants none.
-        lease: Number of the lease in force. A command of an older one is not this driver's.
-        command_ns: When the command behind `state.applied` arrived.
-        holder: Who commands.
-        mine: Whether that is the client.
-        commanded: The newest command that is in force; empty for none.
-        suggested: What somebody who does not command would do; None for nothing.
+        seq: Number of the observation.
+        now_ns: The robot's time, ns.
+        reader: Reads the state in the order of the layout.
+        state: Newest state of the guard, or None.
+        newest: Newest valid frame, or None.
+        frame_sent: Number of the last frame sent to this client; None if it wants no frames.
+        lease: Number of the current lease. A command of an earlier lease came from another client.
+        command_ns: Arrival time of the command behind `state.applied`, ns.
+        holder: Holder of the lease.
+        mine: Whether the client holds the lease.
+        commanded: Values of the unexpired command; () for none.
+        suggested: Unexpired suggestion of a client without the lease.
     """
     state_ns = now_ns if state is None else state.at_ns
     is_new = newest is not None and frame_sent is not None and newest.seq != frame_sent
@@ -110,7 +110,7 @@ def build_observation(
         applied_seq=state.applied_seq if state is not None and drives else None,
         applied_ns=state.applied_ns if state is not None and drives else None,
         command_ns=command_ns if drives else None,
-        stop_reason="The guard has said nothing yet." if state is None else state.stop_reason,
+        stop_reason="The guard has not reported yet." if state is None else state.stop_reason,
         armed=state is not None and state.armed,
         emergency=state is not None and state.emergency,
         emergencies=0 if state is None else state.emergencies,
@@ -119,5 +119,5 @@ def build_observation(
         holder_role="" if holder is None else holder.role,
         commanded=commanded,
         suggested=() if suggested is None else suggested.values,
-        suggested_by="" if suggested is None else suggested.who.name,
+        suggested_by="" if suggested is None else suggested.client.name,
     )

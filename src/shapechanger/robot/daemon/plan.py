@@ -1,4 +1,4 @@
-"""What the daemon needs to know, as the command line hands it over."""
+"""Settings of the daemon, as the command line passes them on."""
 
 from __future__ import annotations
 
@@ -15,34 +15,33 @@ __all__ = ["DaemonPlan"]
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Everything that the daemon needs, checked by type when it is read.
+    """Settings of the daemon, type-checked when they are read.
 
     Attributes:
         robot: Name of the robot.
-        body: What it is, such as "car".
+        body: Kind of robot, such as "car".
         action_layout: JSON of the `Layout` of a command's values.
-        state_layout: JSON of the `Layout` of an observation's state. A feature is filled from the
-            quantity of the guard of the same name; from the action of the same name for
-            "NAME/applied"; with NaN where nothing measures it.
-        camera: The camera; None without one.
-        control_hz: How many commands a second the robot expects.
-        tick_hz: How often the guard looks at its rules.
-        deadline_ms: How long the newest command acts at most; the guard enforces it.
-        max_observation_age_ms: How old an observation may be that a command answers.
-        reward: Weights of the task by name.
-        reset: Commands that bring the robot back, and how many seconds each lasts.
-        arming: Who may arm it.
-        clock: Where its time comes from.
+        state_layout: JSON of the `Layout` of an observation's state. A feature takes the
+            value of the guard's quantity of the same name, "NAME/applied" that of the applied
+            action NAME, and NaN where no sensor measures it.
+        camera: Settings of the camera; None without one.
+        control_hz: Commands per second that the robot expects.
+        tick_hz: Rate of the guard, Hz.
+        deadline_ms: Longest time that a command acts, ms; the guard enforces it.
+        max_observation_age_ms: Oldest observation that a command may answer, ms.
+        reward: Weights of the task, by name.
+        reset: Commands that return the robot to the start, each with its duration, s.
+        arming: Who may arm the robot.
+        clock: Source of the robot's time.
         host: Address to listen at.
-        port: Port to listen at; 0 for any that is free.
+        port: Port to listen at; 0 for any free port.
         certificate: File of the certificate (PEM); "" for no TLS.
         private_key: File of its private key (PEM).
         key_file: File of the key that clients must hold; "" for none.
-        insecure: Whether somebody asked in so many words to listen beyond this machine without TLS
-            or a key.
+        insecure: Whether to serve other machines without TLS or a key.
         discovery: Whether to announce the robot on the local network.
-        ready_file: File that tells the port once it is known; "" for none.
-        recordings: Folder for what is recorded; "" for none.
+        ready_file: File that the port is written to; "" for none.
+        recordings: Folder of the recorded episodes; "" for none.
     """
 
     robot: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -69,17 +68,17 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     recordings: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as what JSON can hold."""
+        """Return the plan as values that JSON can hold."""
         return msgspec.to_builtins(self)
 
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> DaemonPlan:
-        """Read what `to_dict` gave.
+        """Read the output of `to_dict`.
 
         Raises:
-            ProfileError: If it is no plan.
+            ProfileError: If a field is unknown or has the wrong type or range.
         """
         try:
             return msgspec.convert(fields, cls)
         except msgspec.ValidationError as error:
-            raise ProfileError(f"This is no plan for a daemon: {error}.") from error
+            raise ProfileError(f"Invalid daemon plan: {error}.") from error

@@ -1,4 +1,10 @@
-"""The place before the door: sockets of which nobody knows yet who holds their other end."""
+"""Connections that have not authenticated yet: the listening sockets, and the limits.
+
+asyncio's own servers report a connection after its TLS handshake. Until then it already costs a
+file descriptor, and one machine with a thousand silent connections would lock out every other
+client. `Listener` therefore accepts the sockets itself, and `PreAuthConnections` bounds how many
+there are and how long they live.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +16,6 @@ import socket
 import ssl
 from collections import Counter
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from typing import Final, Protocol
 
 from shapechanger.errors import RobotError
@@ -18,157 +23,156 @@ from shapechanger.errors import RobotError
 __all__ = ["PRE_AUTH_TIMEOUT_S", "Listener", "PreAuthConnection", "PreAuthConnections"]
 
 PRE_AUTH_TIMEOUT_S: Final = 3.0
-"""Seconds in which a socket must ask for something, and after that for the next thing."""
+"""Time that a connection has for its first request, and for each one after it, s."""
 
-_MOST: Final = 48
-_MOST_OF_ONE: Final = 16  # A browser opens six, and somebody may have two pages open.
+_log = logging.getLogger(__name__)
+
+_MAX_TOTAL: Final = 48
+_MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two pages open.
+_BACKLOG: Final = 32
+_SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few frames.
+_ACCEPT_PAUSE_S: Final = 0.05  # After a failed accept, most likely for want of descriptors.
 
 
 class PreAuthConnection(Protocol):
-    """A socket that was accepted."""
+    """An accepted socket."""
 
     @property
     def address(self) -> str:
-        """Where it comes from."""
+        """The address of the other end."""
         ...
 
     @property
     def is_gone(self) -> bool:
-        """Whether it has closed by itself."""
+        """True once the connection has closed by itself."""
         ...
 
     def drop(self) -> None:
-        """End it, without a word."""
+        """Close the connection without a message."""
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class _Waiting:
-    visitor: PreAuthConnection
-    timer: asyncio.TimerHandle
-
-
 class PreAuthConnections:
-    """Keeps strangers few and short, so that whoever holds the key always finds a place.
+    """Bounded, short-lived set of connections before authentication.
 
-    Nobody is turned away for others' sake, since that one may be the person who wants to stop the
-    robot: the newcomer gets the place of the oldest socket of the address that has the most.
+    A new connection is never turned away, because it may be the person who wants to stop the
+    robot: it replaces the oldest connection of the address that has the most.
 
     Args:
-        most: How many may be here.
-        most_of_one: How many of one address.
-        patience_s: Seconds after which one that asked for nothing is dropped.
+        max_total: Most connections.
+        max_per_address: Most connections of one address.
+        timeout_s: Time after which a connection without a request is dropped, s.
     """
 
     def __init__(
         self,
-        most: int = _MOST,
-        most_of_one: int = _MOST_OF_ONE,
-        patience_s: float = PRE_AUTH_TIMEOUT_S,
+        max_total: int = _MAX_TOTAL,
+        max_per_address: int = _MAX_PER_ADDRESS,
+        timeout_s: float = PRE_AUTH_TIMEOUT_S,
     ) -> None:
-        self._most = most
-        self._most_of_one = most_of_one
-        self._patience_s = patience_s
-        self._waiting: dict[Hashable, _Waiting] = {}
+        self._max_total = max_total
+        self._max_per_address = max_per_address
+        self._timeout_s = timeout_s
+        # Oldest first.
+        self._waiting: dict[Hashable, tuple[PreAuthConnection, asyncio.TimerHandle]] = {}
 
     def __len__(self) -> int:
-        """How many are here."""
+        """Return the number of connections."""
         return len(self._waiting)
 
-    def enter(self, key: Hashable, visitor: PreAuthConnection) -> None:
-        """Let a socket wait; there is always room, at somebody's cost.
+    def add(self, key: Hashable, connection: PreAuthConnection) -> None:
+        """Add a connection, and drop another one if there are too many.
 
         Args:
-            key: What it is known by from now on.
-            visitor: The socket.
+            key: Identifies the connection from now on.
+            connection: The connection.
         """
-        for other in [k for k, waiting in self._waiting.items() if waiting.visitor.is_gone]:
-            self.leave(other)
-        counts = Counter(waiting.visitor.address for waiting in self._waiting.values())
-        if counts[visitor.address] >= self._most_of_one:
-            self._drop_oldest(visitor.address)
-        elif len(self._waiting) >= self._most:
+        for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:
+            self.remove(other)
+        if self._counts()[connection.address] >= self._max_per_address:
+            self._drop_oldest(connection.address)
+        elif len(self._waiting) >= self._max_total:
             self.drop_one()
-        timer = asyncio.get_running_loop().call_later(self._patience_s, self._drop, key)
-        self._waiting[key] = _Waiting(visitor, timer)
+        self._insert(key, connection)
 
     def renew(self, key: Hashable) -> None:
-        """It was given a file of the console: it may wait anew, as the youngest."""
-        waiting = self._waiting.pop(key, None)
-        if waiting is None:
-            return
-        waiting.timer.cancel()
-        timer = asyncio.get_running_loop().call_later(self._patience_s, self._drop, key)
-        self._waiting[key] = _Waiting(waiting.visitor, timer)
-
-    def keep(self, key: Hashable) -> None:
-        """It asked for the link, which has a limit of its own for the hello."""
+        """Restart the timeout after a request was served; the connection becomes the youngest."""
         if key in self._waiting:
-            self._waiting[key].timer.cancel()
+            connection, _ = self._waiting[key]
+            self.remove(key)
+            self._insert(key, connection)
 
-    def leave(self, key: Hashable) -> None:
-        """It has shown the key, or it has ended."""
-        waiting = self._waiting.pop(key, None)
-        if waiting is not None:
-            waiting.timer.cancel()
+    def stop_timer(self, key: Hashable) -> None:
+        """End the timeout of a connection that opened the link, whose hello has its own limit."""
+        if key in self._waiting:
+            self._waiting[key][1].cancel()
+
+    def remove(self, key: Hashable) -> None:
+        """Forget a connection that has authenticated or ended."""
+        if key in self._waiting:
+            self._waiting.pop(key)[1].cancel()
 
     def drop_one(self) -> None:
-        """Make room: the oldest one of the address that has the most."""
-        counts = Counter(waiting.visitor.address for waiting in self._waiting.values())
+        """Drop the oldest connection of the address that has the most."""
+        counts = self._counts()
         if counts:
-            # Of addresses that have as many, the first is the one that has been here longest.
+            # Of addresses with equal counts, `max` picks the one that connected first.
             self._drop_oldest(max(counts, key=lambda address: counts[address]))
 
     def close(self) -> None:
-        """Drop everybody."""
+        """Drop all connections."""
         for key in list(self._waiting):
             self._drop(key)
 
+    def _counts(self) -> Counter[str]:
+        return Counter(connection.address for connection, _ in self._waiting.values())
+
+    def _insert(self, key: Hashable, connection: PreAuthConnection) -> None:
+        timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
+        self._waiting[key] = connection, timer
+
     def _drop_oldest(self, address: str) -> None:
-        self._drop(next(k for k, w in self._waiting.items() if w.visitor.address == address))
+        self._drop(next(k for k, (c, _) in self._waiting.items() if c.address == address))
 
     def _drop(self, key: Hashable) -> None:
-        visitor = self._waiting[key].visitor
-        self.leave(key)
-        visitor.drop()
-
-
-_log = logging.getLogger(__name__)
-
-_BACKLOG: Final = 32
-_SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few pictures.
-_REST_S: Final = 0.05  # After an accept that failed, for want of descriptors most likely.
+        connection, _ = self._waiting[key]
+        self.remove(key)
+        connection.drop()
 
 
 class Listener:
-    """Accepts connections, and keeps those that are not known yet on the doorstep.
+    """Accepts connections, and registers each one before its TLS handshake.
 
     Args:
-        doorstep: Where they wait, by the protocol that speaks with them.
-        protocol: Makes what speaks with a connection.
-        tls: What to speak TLS with; None for no TLS.
+        connections: Where new connections are registered, by their protocol.
+        protocol: Makes the protocol of a connection.
+        tls: The TLS context, or None for plain TCP.
     """
 
     def __init__(
         self,
-        doorstep: PreAuthConnections,
+        connections: PreAuthConnections,
         protocol: Callable[[], asyncio.Protocol],
         tls: ssl.SSLContext | None,
     ) -> None:
-        self._doorstep = doorstep
+        self._connections = connections
         self._protocol = protocol
         self._tls = tls
         self._sockets: list[socket.socket] = []
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self, host: str, port: int) -> int:
-        """Begin to listen.
+        """Start listening.
+
+        Args:
+            host: Address to listen at; "" for all.
+            port: Port to listen at; 0 for any free port.
 
         Returns:
             The port.
 
         Raises:
-            RobotError: If the address cannot be listened at.
+            RobotError: If the address cannot be used.
         """
         loop = asyncio.get_running_loop()
         try:
@@ -176,23 +180,25 @@ class Listener:
                 host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )
             for family, *_, address in dict.fromkeys(found):
-                self._sockets.append(_listening(family, address))
+                listening = socket.create_server(address, family=family, backlog=_BACKLOG)
+                self._sockets.append(listening)
+                listening.setblocking(False)
         except OSError as error:
             self._close_sockets()
             why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
             raise RobotError(
-                f"{host} port {port} cannot be listened at: {why}. Does the robot run already?"
+                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
             ) from error
         self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
         return self._sockets[0].getsockname()[1]
 
     async def close(self) -> None:
-        """Stop, and drop those that are not known yet."""
+        """Stop listening, and drop all connections that have not authenticated."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._close_sockets()
-        self._doorstep.close()
+        self._connections.close()
 
     def _close_sockets(self) -> None:
         for each in self._sockets:
@@ -203,24 +209,27 @@ class Listener:
         while True:
             try:
                 accepted, address = await loop.sock_accept(listening)
+                accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
             except OSError as error:
                 if not fails:
-                    _log.warning("Connections cannot be accepted: %s", error)
+                    _log.warning("Cannot accept connections: %s", error)
                 fails = True
-                self._doorstep.drop_one()
-                await asyncio.sleep(_REST_S)
+                self._connections.drop_one()
+                await asyncio.sleep(_ACCEPT_PAUSE_S)
                 continue
             fails = False
             protocol = self._protocol()
-            self._doorstep.enter(protocol, _Arrival(accepted, address[0], protocol, self._tls))
-            await asyncio.sleep(0)  # However many come, those who are here have their turn.
+            self._connections.add(
+                protocol, _AcceptedSocket(accepted, address[0], protocol, self._tls)
+            )
+            await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
 
 
-class _Arrival:
-    """A connection from its acceptance on.
+class _AcceptedSocket:
+    """A connection from its acceptance on, through the TLS handshake.
 
     Attributes:
-        address: Where it comes from.
+        address: The address of the other end.
     """
 
     def __init__(
@@ -237,15 +246,15 @@ class _Arrival:
 
     @property
     def is_gone(self) -> bool:
-        """Whether it has closed by itself."""
+        """True once the connection has closed by itself."""
         return self._task.done() and (self._transport is None or self._transport.is_closing())
 
     def drop(self) -> None:
-        """End it, without a word."""
+        """Close the connection without a message."""
         if self._transport is not None:
             self._transport.abort()
             return
-        # The handshake reads the end of the connection, however far it has come.
+        # The handshake then reads the end of the stream, however far it has come.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
@@ -255,21 +264,5 @@ class _Arrival:
             self._transport, _ = await loop.connect_accepted_socket(
                 lambda: protocol, self._socket, ssl=tls
             )
-        except OSError as error:  # Who speaks no TLS, or leaves, is nobody we talk to.
-            _log.debug("%s does not get through the handshake: %s", self.address, error)
-
-
-def _listening(family: int, address: tuple[object, ...]) -> socket.socket:
-    listening = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        listening.setblocking(False)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-        if family == socket.AF_INET6:
-            listening.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-        listening.bind(address)
-        listening.listen(_BACKLOG)
-    except BaseException:
-        listening.close()
-        raise
-    return listening
+        except OSError as error:  # The other end speaks no TLS, or has left.
+            _log.debug("The TLS handshake with %s failed: %s", self.address, error)

@@ -1,4 +1,4 @@
-"""The daemon's process: puts its parts together, and ends with the guard or the supervisor."""
+"""Process of the daemon: assembles its parts, and ends with the guard or the supervisor."""
 
 from __future__ import annotations
 
@@ -33,46 +33,24 @@ from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.hardware import Clock, connect
 
-__all__ = ["Daemon", "main", "start_log"]
-
-_MOST_LINES: Final = 1000
-
-
-def start_log(program: str) -> QueueListener:
-    """Send the log to stderr, from a thread of its own; lines for which there is no room are lost.
-
-    Returns:
-        What writes the lines; stop it at the end, so that the last ones are written.
-    """
-    # A line that cannot be written must not become another line that cannot be written.
-    logging.raiseExceptions = False
-    lines: queue.Queue[logging.LogRecord] = queue.Queue(_MOST_LINES)
-    stderr = logging.StreamHandler()
-    stderr.setFormatter(logging.Formatter(f"{program}: %(message)s"))
-    root = logging.getLogger()
-    root.setLevel(logging.WARNING)
-    logging.getLogger("shapechanger").setLevel(logging.INFO)
-    root.addHandler(QueueHandler(lines))
-    listener = QueueListener(lines, stderr)
-    listener.start()
-    return listener
-
+__all__ = ["Daemon", "main"]
 
 _log = logging.getLogger(__name__)
 
-_BEAT_S: Final = 0.05  # The supervisor wants one each 100 ms.
-_RECORDER_S: Final = 1.0  # How often everybody is told how the recording goes.
+_HEARTBEAT_S: Final = 0.05  # The supervisor expects one each 100 ms.
+_RECORDER_S: Final = 1.0  # Period of the recorder's reports.
+_MAX_LOG_LINES: Final = 1000
 
 
 class Daemon:
-    """A robot's daemon, from its start to its end.
+    """The daemon of a robot, from start to end.
 
     Args:
-        plan: What it needs to know.
-        clock: Where time comes from.
-        guard_fd: Socket to the guard; this object owns it.
-        heartbeat_fd: Socket to the supervisor; None without one. This object owns it.
-        ready_fd: Where to tell the port once it is known; None for nowhere.
+        plan: Settings of the daemon.
+        clock: The robot's clock.
+        guard_fd: Socket to the guard, which this object owns.
+        heartbeat_fd: Socket to the supervisor, which this object owns; None without one.
+        ready_fd: Descriptor that the port is written to; None for none.
     """
 
     def __init__(
@@ -86,26 +64,26 @@ class Daemon:
         self._plan = plan
         self._clock = clock
         self._ended = asyncio.Event()
-        self._heard = asyncio.Event()  # The guard has said something, or never will.
+        self._guard_heard = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
-        self._port = GuardLink(
+        self._guard = GuardLink(
             guard_fd,
             on_state=self._on_state,
             on_lost=lambda: self.end("The guard is gone."),
         )
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._cockpit = SessionHub(plan, clock.now_ns, self._port.send, self._call)
+        self._hub = SessionHub(plan, clock.now_ns, self._guard.send, self._call)
         self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
 
     async def run(self) -> str:
-        """Serve until told to end.
+        """Serve until `end` is called.
 
         Returns:
-            Why it ended, in words; empty if it was asked to.
+            The reason why it ended; "" if it was asked to.
 
         Raises:
-            RobotError: If it cannot begin.
+            RobotError: If it cannot start.
         """
         plan = self._plan
         loop = self._loop = asyncio.get_running_loop()
@@ -114,28 +92,30 @@ class Daemon:
         tls, fingerprint = None, b""
         if plan.certificate:
             tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
-        time = Timekeeper(self._clock, self._cockpit, self._port.drain)
-        server = Server(self._cockpit, time, Authenticator(key, fingerprint), tls)
-        tasks = [asyncio.create_task(work) for work in (self._beat(), self._tell_recording())]
-        self._port.attach(loop)
+        time = Timekeeper(self._clock, self._hub, self._guard.drain)
+        server = Server(self._hub, time, Authenticator(key, fingerprint), tls)
+        tasks = [
+            asyncio.create_task(work) for work in (self._heartbeats(), self._report_recorder())
+        ]
+        self._guard.attach(loop)
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
-            # Who looks at once would see a robot of which nothing is known. Where time waits for
-            # somebody who looks, the guard says nothing before.
+            # The first client must not see a robot of unknown state. Where time moves in steps,
+            # the guard reports nothing before the first step.
             if not time.in_steps:
-                await self._heard.wait()
+                await self._guard_heard.wait()
             if not self._ended.is_set():
                 port = await server.start()
-                self._say_ready(port, fingerprint)
+                self._report_ready(port, fingerprint)
                 announcement = self._announcement(port, fingerprint)
                 if announcement is not None:
                     await announcement.start()
             await self._ended.wait()
         finally:
-            # The guard stops first: it sees the end of this socket.
-            self._port.close()
-            self._cockpit.recorder.end()
+            # First of all the guard stops the robot, when it sees this socket close.
+            self._guard.close()
+            self._hub.recorder.end()
             if camera is not None:
                 await asyncio.to_thread(camera.close)
             await server.close()
@@ -144,45 +124,44 @@ class Daemon:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await asyncio.to_thread(self._cockpit.recorder.close)
-            await asyncio.to_thread(self._cockpit.library.close)
+            await asyncio.to_thread(self._hub.recorder.close)
+            await asyncio.to_thread(self._hub.library.close)
         return self._why
 
     def end(self, why: str = "") -> None:
-        """Stop serving."""
+        """Stop serving; the first reason counts."""
         self._why = self._why or why
         self._ended.set()
-        self._heard.set()
+        self._guard_heard.set()
 
     def _on_state(self, state: GuardState) -> None:
-        self._cockpit.on_state(state)
-        self._heard.set()
+        self._hub.on_state(state)
+        self._guard_heard.set()
 
-    async def _beat(self) -> None:
-        """Show the supervisor that the event loop turns."""
+    async def _heartbeats(self) -> None:
         if self._heartbeat_fd is not None:
-            await send_heartbeats(self._heartbeat_fd, _BEAT_S)
+            await send_heartbeats(self._heartbeat_fd, _HEARTBEAT_S)
             self.end("The supervisor is gone.")
 
-    async def _tell_recording(self) -> None:
+    async def _report_recorder(self) -> None:
         while True:
             await asyncio.sleep(_RECORDER_S)
-            self._cockpit.recorder.tick()
+            self._hub.recorder.tick()
 
     def _call(self, work: Callable[[], None]) -> None:
-        """Run something in the thread of the event loop, from any other one."""
+        """Run a function in the event loop's thread, from any other thread."""
         if self._loop is not None:
-            with contextlib.suppress(RuntimeError):  # The loop has ended, and the thread not yet.
+            with contextlib.suppress(RuntimeError):  # The loop ended before the thread.
                 self._loop.call_soon_threadsafe(work)
 
     def _camera(self, plan: CameraPlan) -> FrameReader:
-        """Start to read the camera; of what piles up while the loop is busy, the newest counts."""
+        """Start to read the camera. While the loop is busy, only the newest frame is kept."""
         newest: Latest[Frame] = Latest()
 
         def collect() -> None:
             frame = newest.take()
             if frame is not None:
-                self._cockpit.on_frame(frame)
+                self._hub.on_frame(frame)
 
         def deliver(frame: Frame) -> None:
             newest.put(frame)
@@ -190,7 +169,7 @@ class Daemon:
 
         def report(text: str) -> None:
             _log.warning("Camera: %s", text)
-            self._call(lambda: self._cockpit.event("camera", text))
+            self._call(lambda: self._hub.event("camera", text))
 
         now_ns = self._clock.now_ns if self._plan.clock == "real" else None
         reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)
@@ -198,7 +177,7 @@ class Daemon:
         return reader
 
     def _announcement(self, port: int, fingerprint: bytes) -> Announcement | None:
-        """What lets the network know of the robot; None where nobody else reaches it, or shall."""
+        """Return the announcement on the network, or None where it is unwanted or pointless."""
         plan = self._plan
         if not plan.discovery:
             return None
@@ -207,8 +186,8 @@ class Daemon:
             return None
         return Announcement(plan, port, fingerprint)
 
-    def _say_ready(self, port: int, fingerprint: bytes) -> None:
-        """Tell people, and whoever started this, where the robot is."""
+    def _report_ready(self, port: int, fingerprint: bytes) -> None:
+        """Report the port in the log, and to the process that started this one."""
         plan = self._plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.robot, Address(plan.host, port), secured)
@@ -223,28 +202,27 @@ class Daemon:
                 partial.write_bytes(line)
                 partial.replace(plan.ready_file)
         except OSError as error:
-            # Nobody is told, and the robot serves all the same.
-            _log.warning("The port cannot be told: %s", error)
+            _log.warning("The port cannot be reported, but the robot is served: %s", error)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the daemon; the exit status."""
+    """Run the daemon, and return the exit status."""
     parser = argparse.ArgumentParser(prog="shapechanger.robot.daemon", description=__doc__)
     parser.add_argument("--plan-fd", type=int, required=True)
     parser.add_argument("--guard-fd", type=int, required=True)
     parser.add_argument("--heartbeat-fd", type=int)
     parser.add_argument("--ready-fd", type=int)
-    asked = parser.parse_args(arguments)
-    serve_plan = read_plan_fd(asked.plan_fd)
-    os.close(asked.plan_fd)
-    send_lifeline(asked.guard_fd)
-    log = start_log("daemon")
+    options = parser.parse_args(arguments)
+    serve_plan = read_plan_fd(options.plan_fd)
+    os.close(options.plan_fd)
+    send_lifeline(options.guard_fd)
+    log = _start_log()
     try:
         plan = DaemonPlan.from_dict(serve_plan.daemon)
         source, argument = serve_plan.hardware
         clock = connect(source, argument).clock
         run_early()
-        why = asyncio.run(_run(plan, clock, asked))
+        why = asyncio.run(_run(plan, clock, options))
     except ShapechangerError as error:
         why = str(error)
     if why:
@@ -253,9 +231,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if why else 0
 
 
-async def _run(plan: DaemonPlan, clock: Clock, asked: argparse.Namespace) -> str:
-    daemon = Daemon(plan, clock, asked.guard_fd, asked.heartbeat_fd, asked.ready_fd)
+async def _run(plan: DaemonPlan, clock: Clock, options: argparse.Namespace) -> str:
+    daemon = Daemon(plan, clock, options.guard_fd, options.heartbeat_fd, options.ready_fd)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, daemon.end)
     return await daemon.run()
+
+
+def _start_log() -> QueueListener:
+    """Log to stderr from a separate thread, so that a full disk or a stuck pipe delays nothing.
+
+    Lines that do not fit into the queue are lost. Stop the returned listener at the end, to write
+    the last lines.
+    """
+    # A line that cannot be written must not cause another line.
+    logging.raiseExceptions = False
+    lines: queue.Queue[logging.LogRecord] = queue.Queue(_MAX_LOG_LINES)
+    stderr = logging.StreamHandler()
+    stderr.setFormatter(logging.Formatter("daemon: %(message)s"))
+    root = logging.getLogger()
+    root.setLevel(logging.WARNING)
+    logging.getLogger("shapechanger").setLevel(logging.INFO)
+    root.addHandler(QueueHandler(lines))
+    listener = QueueListener(lines, stderr)
+    listener.start()
+    return listener

@@ -1,4 +1,4 @@
-"""Records what is driven, as an episode on the robot's disk; it waits for nothing."""
+"""Recorder: pairs commands with observations, and writes the steps as an episode."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
+
+import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
@@ -20,53 +22,42 @@ from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
 
-__all__ = [
-    "DISK_TOO_SLOW",
-    "EpisodeProgress",
-    "EpisodeThread",
-    "Recorder",
-    "StepBuilder",
-    "StepWithFrame",
-]
+__all__ = ["DISK_TOO_SLOW", "EpisodeThread", "Recorder", "StepBuilder", "StepWithFrame"]
 
-_WINDOW: Final = 64  # Observations of one client; a command answers one that is younger.
+_log = logging.getLogger(__name__)
+
+DISK_TOO_SLOW: Final = "The disk is too slow: recording ended, and the steps so far are kept."
+
+_WINDOW: Final = 64  # Observations of one client; a command answers a younger one.
+_MAX_JOBS: Final = 256  # Over ten seconds of steps at 20 Hz: memory cards pause for seconds.
+_MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
+_CLOSE_S: Final = 5.0
+_NOT_RECORDING: Final = "Nothing is being recorded."
+
+_Post = Callable[[RobotMessage], None]
 
 
-@dataclass(frozen=True, slots=True)
-class StepWithFrame:
-    """A step and its picture.
+class StepWithFrame(NamedTuple):
+    """A step and its frame.
 
     Attributes:
         step: The step.
-        jpeg: The picture; None for that of the step before, or without a camera.
+        jpeg: The frame; None if it is that of the step before, or there is no camera.
     """
 
     step: Step
     jpeg: bytes | None
 
 
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """What one client was sent.
-
-    Attributes:
-        observation: The observation.
-        frame: The newest picture then, whether or not it was sent to this client just then.
-    """
+class _Seen(NamedTuple):
+    """An observation that one client was sent, and the newest frame at that time."""
 
     observation: Observation
     frame: NumberedFrame | None
 
 
-@dataclass(frozen=True, slots=True)
-class _Decided:
-    """A step of which nobody knows yet what the outputs did.
-
-    Attributes:
-        session: Number of the connection that decided it.
-        seen: What it was decided on.
-        step: The step so far.
-    """
+class _Decided(NamedTuple):
+    """A step whose applied outputs are not known yet, by the number of its session."""
 
     session: int
     seen: _Seen
@@ -76,13 +67,13 @@ class _Decided:
 class StepBuilder:
     """Makes a step of each observation that is answered by a command.
 
-    A step is complete with the next observation of the same client, which tells what the outputs
-    did. Of two commands that answer the same observation the later one counts. A command that
-    answers something older than the step before makes none: time never runs backwards in an
-    episode.
+    The next observation of the same client completes a step, because it reports the applied
+    outputs. Of two commands that answer the same observation the later one counts. A command that
+    answers an observation older than that of the last step is ignored, so that time never runs
+    backwards in an episode.
 
     Args:
-        wall_ns: Gives the Unix time.
+        wall_ns: Returns the Unix time, ns.
     """
 
     def __init__(self, wall_ns: Callable[[], int] = time.time_ns) -> None:
@@ -95,68 +86,64 @@ class StepBuilder:
     def observed(
         self, session: int, observation: Observation, frame: NumberedFrame | None
     ) -> StepWithFrame | None:
-        """A client is sent an observation.
+        """Note an observation that is sent to a client.
 
         Args:
-            session: Number of its connection.
-            observation: What it is sent.
-            frame: The newest picture.
+            session: Number of the connection.
+            observation: The observation.
+            frame: The newest frame, whether or not it was sent to this client.
 
         Returns:
-            The step that this completes; None for none.
+            The step that this completes, or None.
         """
-        window = self._seen.setdefault(session, deque(maxlen=_WINDOW))
-        window.append(_Seen(observation, frame))
+        self._seen.setdefault(session, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
         decided = self._decided
         if decided is None or decided.session != session:
             return None
         if observation.mine:
-            self._decided = replace(
-                decided,
-                step=replace(
-                    decided.step,
-                    applied=observation.action_applied or None,
-                    stop_reason=observation.stop_reason,
-                ),
+            step = replace(
+                decided.step,
+                applied=observation.action_applied or None,
+                stop_reason=observation.stop_reason,
             )
+            self._decided = decided._replace(step=step)
         return self.complete()
 
     def decided(
-        self, who: ClientIdentity, answers: int, action: tuple[float, ...], now_ns: int
+        self, client: ClientIdentity, answers: int, action: tuple[float, ...], now_ns: int
     ) -> StepWithFrame | None:
-        """A client has commanded.
+        """Note a command of a client.
 
         Args:
-            who: Who it is.
-            answers: `seq` of the observation that it was decided on.
-            action: What was decided.
-            now_ns: When it arrived, of the robot's time.
+            client: The client.
+            answers: `seq` of the observation that the command answers.
+            action: The values of the command.
+            now_ns: Arrival time on the robot's clock, ns.
 
         Returns:
-            The step before, which this completes; None for none.
+            The previous step, which this completes, or None.
         """
-        window = self._seen.get(who.session, ())
+        window = self._seen.get(client.session, ())
         seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
-        if seen is None or self._is_past(who.session, seen):
+        if seen is None or self._is_past(client.session, seen):
             return None
         before = self._decided
-        again = before is not None and before.session == who.session and before.seen is seen
+        again = before is not None and before.session == client.session and before.seen is seen
         completed = None if again else self.complete()
-        observation = seen.observation
         step = Step(
             action=action,
-            driver=who.role,
-            wanted=observation.suggested or None,
-            state=observation.state,
-            captured_ns=observation.captured_ns,
+            driver=client.role,
+            wanted=seen.observation.suggested or None,
+            state=seen.observation.state,
+            captured_ns=seen.observation.captured_ns,
             decided_ns=now_ns,
             wall_ns=self._wall_ns(),
         )
-        self._decided = self._newest = _Decided(who.session, seen, step)
+        self._decided = self._newest = _Decided(client.session, seen, step)
         return completed
 
     def complete(self) -> StepWithFrame | None:
-        """The step that waits for what the outputs did, with what is known of that."""
+        """Return the pending step with the outputs known so far, or None."""
         decided, self._decided = self._decided, None
         if decided is None:
             return None
@@ -166,11 +153,11 @@ class StepBuilder:
         return StepWithFrame(decided.step, jpeg)
 
     def forget(self, session: int) -> None:
-        """A client has left."""
+        """Drop the observations of a client that left."""
         self._seen.pop(session, None)
 
     def _is_past(self, session: int, seen: _Seen) -> bool:
-        """Whether something was seen before what the newest step was decided on."""
+        """Return True if an observation is older than that of the newest step."""
         newest = self._newest
         if newest is None or newest.seen is seen:
             return False
@@ -180,46 +167,17 @@ class StepBuilder:
         return ours.captured_ns < theirs.captured_ns
 
 
-DISK_TOO_SLOW: Final = "The disk is too slow: recording has ended, and what was recorded is kept."
-
-_MAX_JOBS: Final = 256
-"""Steps that may wait: more than ten seconds at 20 Hz, since memory cards pause for seconds."""
-
-_MAX_BYTES: Final = 16 << 20
-"""Bytes of pictures that may wait."""
-
-_Job = Callable[[EpisodeWriter], str]
-_Then = Callable[[str], None]
-
-
-@dataclass(frozen=True, slots=True)
-class EpisodeProgress:
-    """How far it is.
-
-    Attributes:
-        episode: Id of the episode; empty before it has begun.
-        steps: Steps that were written.
-        dropped: How many of them were undone.
-        seconds: From the first step to the newest that counts, s.
-        marks: Marks that were set.
-    """
-
-    episode: str = ""
-    steps: int = 0
-    dropped: int = 0
-    seconds: float = 0.0
-    marks: int = 0
-
-
 class EpisodeThread:
-    """Writes one episode, from its beginning to its end, in the order in which it was told.
+    """Thread that writes one episode, in the order of the calls.
 
     Args:
         folder: Folder of the recordings.
-        header: What the episode is of.
-        report: Called in the thread when it has "begun" and when it has "ended"; with what went
-            wrong, in a sentence, or "".
-        after: The one before, which is waited for; None for none.
+        header: Header of the episode.
+        report: Called in the thread with "begun" and with "ended", and the error or "".
+        after: The previous thread, to wait for; None for none.
+
+    Attributes:
+        progress: State of the episode; `recording` and `text` are the recorder's to set.
     """
 
     def __init__(
@@ -229,82 +187,92 @@ class EpisodeThread:
         report: Callable[[Literal["begun", "ended"], str], None],
         after: EpisodeThread | None = None,
     ) -> None:
-        self.progress = EpisodeProgress()
-        """How far it is; a new object each time."""
+        self.progress = RecorderState()
         self._folder = folder
         self._header = header
         self._report = report
         self._after = after
         self._outcome = ""
         self._ending = False
-        self._jobs: deque[tuple[_Job, int, _Then | None]] = deque()
+        self._jobs: deque[tuple[Callable[[EpisodeWriter], None], int]] = deque()
         self._bytes = 0
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def add(self, seen: StepWithFrame) -> bool:
-        """Write a step; whether the disk keeps up. If not, the episode ends here."""
+    def add(self, step: StepWithFrame) -> bool:
+        """Write a step. Return False if the disk is too slow, which ends the episode."""
 
-        def write(writer: EpisodeWriter) -> str:
-            writer.add(seen.step, seen.jpeg)
-            return ""
+        def write(writer: EpisodeWriter) -> None:
+            writer.add(step.step, step.jpeg)
+            self._note(writer)
 
-        return self._put(write, len(seen.jpeg or b""))
+        return self._put(write, len(step.jpeg or b""))
 
-    def mark(self, text: str, then: _Then) -> None:
+    def mark(self, text: str, then: Callable[[str], None]) -> None:
         """Mark the newest step.
 
         Args:
-            text: What the mark says.
-            then: Called in the thread with why that cannot be done, or "".
+            text: Text of the mark.
+            then: Called in the thread with the reason for a refusal, or "".
         """
 
-        def write(writer: EpisodeWriter) -> str:
-            if not writer.steps:
-                return "There is no step yet that could be marked."
-            writer.mark(text)
-            return ""
+        def write(writer: EpisodeWriter) -> None:
+            if writer.steps:
+                writer.mark(text)
+            self._note(writer)
+            then("" if writer.steps else "There is no step to mark yet.")
 
-        self._put(write, len(text), then)
+        self._put(write, len(text))
 
-    def undo(self, seconds: float, then: _Then) -> None:
-        """Drop the newest steps; arguments as those of `mark`."""
-        self._put(lambda w: "" if w.undo(seconds) else "There is nothing to undo.", 0, then)
+    def undo(self, seconds: float, then: Callable[[str], None]) -> None:
+        """Drop the newest steps.
+
+        Args:
+            seconds: How far back, s.
+            then: Called in the thread with the reason for a refusal, or "".
+        """
+
+        def write(writer: EpisodeWriter) -> None:
+            dropped = writer.undo(seconds)
+            self._note(writer)
+            then("" if dropped else "There is nothing to undo.")
+
+        self._put(write, 0)
 
     def end(self, outcome: str = "") -> None:
-        """Close the episode once everything is written."""
+        """Close the episode once all steps are written."""
         with self._changed:
             if not self._ending:
                 self._outcome, self._ending = outcome, True
                 self._changed.notify()
 
     def join(self, timeout_s: float | None = None) -> bool:
-        """Wait until it has ended; whether it has."""
+        """Wait for the end. Return False on a timeout."""
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
-    def _put(self, job: _Job, size: int, then: _Then | None = None) -> bool:
+    def _put(self, job: Callable[[EpisodeWriter], None], size: int) -> bool:
         with self._changed:
             if self._ending:
                 return True
             fits = len(self._jobs) < _MAX_JOBS and self._bytes + size <= _MAX_BYTES
             if fits:
-                self._jobs.append((job, size, then))
+                self._jobs.append((job, size))
                 self._bytes += size
             else:
                 self._outcome, self._ending = DISK_TOO_SLOW, True
             self._changed.notify()
             return fits
 
-    def _next(self) -> tuple[_Job, int, _Then | None] | None:
-        """The next job; None when all are done and no more come."""
+    def _next(self) -> Callable[[EpisodeWriter], None] | None:
+        """Return the next job, or None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._ending)
             if not self._jobs:
                 return None
-            job = self._jobs.popleft()
-            self._bytes -= job[1]
+            job, size = self._jobs.popleft()
+            self._bytes -= size
             return job
 
     def _run(self) -> None:
@@ -317,7 +285,7 @@ class EpisodeThread:
         except ShapechangerError as error:
             trouble = str(error)
         except Exception as error:
-            trouble = f"Recording broke: {error!r}."
+            trouble = f"Recording failed: {error!r}."
             raise
         finally:
             with self._changed:
@@ -330,13 +298,9 @@ class EpisodeThread:
             self._note(writer)
             self._report("begun", "")
             while (job := self._next()) is not None:
-                work, _, then = job
-                refusal = work(writer)
-                self._note(writer)
-                if then is not None:
-                    then(refusal)
+                job(writer)
         except BaseException as error:
-            # On a disk that is full this may fail, too; every step is there all the same, and
+            # On a full disk this may fail too. All steps are there all the same, and
             # `shapechanger demos repair` closes the episode.
             with contextlib.suppress(ShapechangerError):
                 writer.close(str(error) or "an error")
@@ -344,87 +308,71 @@ class EpisodeThread:
         writer.close(self._outcome)
 
     def _note(self, writer: EpisodeWriter) -> None:
-        self.progress = EpisodeProgress(
-            writer.path.name, writer.steps, writer.dropped, writer.seconds, writer.marks
+        self.progress = RecorderState(
+            episode=writer.path.name,
+            steps=writer.steps,
+            dropped=writer.dropped,
+            seconds=writer.seconds,
+            marks=writer.marks,
         )
 
 
-_log = logging.getLogger(__name__)
-
-_CLOSED_WITHIN_S: Final = 5.0
-_NOT_ON: Final = "Nothing is being recorded."
-
-_Tell = Callable[[RobotMessage], None]
-
-
 class Recorder:
-    """Records one episode at a time, whoever commands meanwhile.
+    """Records one episode at a time, with any client in control. It never waits for the disk.
 
-    Steps are recorded while the outputs may move; a robot that stands disarmed teaches nothing.
+    Steps are recorded while the robot is armed.
 
     Args:
-        plan: What the robot is, and where its recordings are.
-        tell: Tells everybody something.
-        call: Runs a function in the thread of the connections; may be called from any thread.
+        plan: Settings of the daemon.
+        broadcast: Sends a message to all clients.
+        call: Runs a function in the event loop's thread, from any other thread.
     """
 
     def __init__(
-        self, plan: DaemonPlan, tell: _Tell, call: Callable[[Callable[[], None]], None]
+        self, plan: DaemonPlan, broadcast: _Post, call: Callable[[Callable[[], None]], None]
     ) -> None:
         self._plan = plan
-        self._tell = tell
+        self._broadcast = broadcast
         self._call = call
-        self._limits = _limits(Layout.from_json(plan.action_layout))
-        self._scribe: EpisodeThread | None = None
-        self._pairing: StepBuilder | None = None
+        features = Layout.from_json(plan.action_layout).features
+        self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
+        self._thread: EpisodeThread | None = None
+        self._builder: StepBuilder | None = None
         self._text = ""
 
     @property
     def can_record(self) -> bool:
-        """Whether there is a place to keep recordings."""
+        """True if there is a folder for recordings."""
         return bool(self._plan.recordings)
 
     @property
     def on(self) -> bool:
-        """Whether it records."""
-        return self._pairing is not None
-
-    @property
-    def episode(self) -> str:
-        """Id of the episode that is being recorded; empty for none, or none yet."""
-        return self._scribe.progress.episode if self._scribe is not None and self.on else ""
+        """True while an episode is recorded."""
+        return self._builder is not None
 
     def state(self) -> RecorderState:
-        """How it goes."""
-        if self._scribe is None:
-            return RecorderState(text=self._text)
-        now = self._scribe.progress
-        return RecorderState(
-            episode=now.episode,
-            recording=self.on,
-            steps=now.steps,
-            dropped=now.dropped,
-            seconds=now.seconds,
-            marks=now.marks,
-            text=self._text,
-        )
+        """Return the state of the recorder."""
+        progress = RecorderState() if self._thread is None else self._thread.progress
+        return msgspec.structs.replace(progress, recording=self.on, text=self._text)
 
-    def begin(self, who: ClientIdentity, name: str, driver: str, tell: _Tell) -> str:
+    def begin(self, client: ClientIdentity, name: str, driver: str, post: _Post) -> str:
         """Begin an episode.
 
         Args:
-            who: The person who wants it.
-            name: What it is about, for people to read.
-            driver: Who commands now, for people to read.
-            tell: Tells that person something.
+            client: The person who asks for it.
+            name: Title of the episode.
+            driver: Name of the client in control.
+            post: Sends a message to that person; errors of the disk come later.
 
         Returns:
-            Why that cannot be, in words; "" if it begins now. What the disk says is told later.
+            The reason for a refusal, or "".
         """
         if not self.can_record:
             return "This robot was served without a folder for recordings."
         if self.on:
-            return f"It is being recorded already: {self.episode or 'it begins now'}."
+            return (
+                f"An episode is being recorded already: {self.state().episode or 'it starts now'}."
+            )
         plan = self._plan
         header = EpisodeHeader(
             action_layout=plan.action_layout,
@@ -433,121 +381,116 @@ class Recorder:
             control_hz=plan.control_hz,
             robot=plan.robot,
             body=plan.body,
-            driver=driver or who.name,
+            driver=driver or client.name,
             clock=plan.clock,
             source="shapechanger robot",
-            notes={"name": name, "recorded_by": who.name},
+            notes={"name": name, "recorded_by": client.name},
         )
         self._text = ""
-        self._pairing = StepBuilder()
+        self._builder = StepBuilder()
 
         def report(what: Literal["begun", "ended"], trouble: str) -> None:
-            self._call(lambda: self._reported(scribe, what, trouble, tell))
+            self._call(lambda: self._reported(thread, what, trouble, post))
 
-        # What it reports is heard in this thread, and so not before it is there.
-        scribe = EpisodeThread(Path(plan.recordings), header, report, self._scribe)
-        self._scribe = scribe
+        # Reports are handled in the event loop's thread, and so after this assignment.
+        thread = EpisodeThread(Path(plan.recordings), header, report, self._thread)
+        self._thread = thread
         return ""
 
     def end(self, text: str = "") -> str:
         """End the episode.
 
         Args:
-            text: Why it ends by itself, in a sentence; "" where a person ends it.
+            text: Why it ends by itself, a sentence; "" where a person ends it.
 
         Returns:
-            Why that cannot be, in words; "" if it ends now.
+            The reason for a refusal, or "".
         """
-        if self._scribe is None or self._pairing is None:
-            return _NOT_ON
-        self._write(self._pairing.complete())
-        self._pairing = None
+        if self._thread is None or self._builder is None:
+            return _NOT_RECORDING
+        self._write(self._builder.complete())
+        self._builder = None
         self._text = self._text or text
-        self._scribe.end(text)
+        self._thread.end(text)
         return ""
 
-    def mark(self, text: str, tell: _Tell) -> str:
-        """Mark the newest step; returns why that cannot be, or ""."""
-        if self._scribe is None or self._pairing is None:
-            return _NOT_ON
-        self._write(self._pairing.complete())
-        self._scribe.mark(text, self._then(tell))
+    def mark(self, text: str, post: _Post) -> str:
+        """Mark the newest step. Return the reason for a refusal, or ""."""
+        if self._thread is None or self._builder is None:
+            return _NOT_RECORDING
+        self._write(self._builder.complete())
+        self._thread.mark(text, self._then(post))
         return ""
 
-    def undo(self, seconds: float, tell: _Tell) -> str:
-        """Drop the newest steps; returns why that cannot be, or ""."""
-        if self._scribe is None or self._pairing is None:
-            return _NOT_ON
-        self._write(self._pairing.complete())
-        self._scribe.undo(seconds, self._then(tell))
+    def undo(self, seconds: float, post: _Post) -> str:
+        """Drop the newest steps. Return the reason for a refusal, or ""."""
+        if self._thread is None or self._builder is None:
+            return _NOT_RECORDING
+        self._write(self._builder.complete())
+        self._thread.undo(seconds, self._then(post))
         return ""
 
     def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
-        """A client is sent an observation."""
-        if self._pairing is not None:
-            self._write(self._pairing.observed(session, observation, frame))
+        """Note an observation that is sent to a client; see `StepBuilder.observed`."""
+        if self._builder is not None:
+            self._write(self._builder.observed(session, observation, frame))
 
     def decided(
-        self, who: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
+        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
     ) -> None:
-        """Whoever commands has said what to do, in answer to which observation."""
-        if self._pairing is None:
+        """Note a command, clipped as the guard clips it; see `StepBuilder.decided`."""
+        if self._builder is None:
             return
         action = tuple(
             min(max(value, low), high)
             for value, (low, high) in zip(values, self._limits, strict=True)
         )
-        self._write(self._pairing.decided(who, answers, action, now_ns))
+        self._write(self._builder.decided(client, answers, action, now_ns))
 
     def forget(self, session: int) -> None:
-        """A client has left."""
-        if self._pairing is not None:
-            self._pairing.forget(session)
+        """Drop the observations of a client that left."""
+        if self._builder is not None:
+            self._builder.forget(session)
 
     def tick(self) -> None:
-        """Tell everybody how it goes; to be called once a second."""
+        """Report the state to all clients while recording; called once a second."""
         if self.on:
-            self._tell(self.state())
+            self._broadcast(self.state())
 
     def close(self) -> None:
-        """End, and wait until the disk has everything, but not for ever."""
+        """End the episode, and wait for the disk, up to a limit."""
         self.end()
-        if self._scribe is not None:
-            self._scribe.join(_CLOSED_WITHIN_S)
+        if self._thread is not None:
+            self._thread.join(_CLOSE_S)
 
-    def _write(self, seen: StepWithFrame | None) -> None:
-        if seen is None or self._scribe is None or self._scribe.add(seen):
+    def _write(self, step: StepWithFrame | None) -> None:
+        if step is None or self._thread is None or self._thread.add(step):
             return
-        # The thread says so, too, once the disk lets it go.
-        self._pairing, self._text = None, DISK_TOO_SLOW
-        self._tell(self.state())
+        # The thread reports this too, once the disk responds.
+        self._builder, self._text = None, DISK_TOO_SLOW
+        self._broadcast(self.state())
 
-    def _then(self, tell: _Tell) -> Callable[[str], None]:
-        """What is done with the answer of the thread to one person's wish."""
+    def _then(self, post: _Post) -> Callable[[str], None]:
+        """Return a handler for the thread's answer to a request of one person."""
 
         def answer(refusal: str) -> None:
             if refusal:
-                tell(Refused(reason=refusal))
+                post(Refused(reason=refusal))
             else:
-                self._tell(self.state())
+                self._broadcast(self.state())
 
         return lambda refusal: self._call(lambda: answer(refusal))
 
     def _reported(
-        self, scribe: EpisodeThread, what: Literal["begun", "ended"], trouble: str, tell: _Tell
+        self, thread: EpisodeThread, what: Literal["begun", "ended"], trouble: str, post: _Post
     ) -> None:
         if trouble:
             _log.warning("Recorder: %s", trouble)
-        if scribe is not self._scribe:
-            return  # The next episode has begun already, and everybody was told.
+        if thread is not self._thread:
+            return  # The next episode has begun already, and its state was reported.
         if what == "ended":
-            self._pairing = None
+            self._builder = None
             self._text = self._text or trouble
-            if trouble and not scribe.progress.episode:
-                tell(Refused(reason=trouble))  # It did not even begin.
-        self._tell(self.state())
-
-
-def _limits(layout: Layout) -> tuple[tuple[float, float], ...]:
-    """The lowest and the highest value of each number of an action: the guard clips to them."""
-    return tuple((f.low, f.high) for f in layout.features for _ in range(f.size))
+            if trouble and not thread.progress.episode:
+                post(Refused(reason=trouble))  # The episode could not even begin.
+        self._broadcast(self.state())

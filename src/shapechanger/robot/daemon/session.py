@@ -1,10 +1,9 @@
-"""One connection: who it is, and what is done with what it says. Bytes in, messages out."""
+"""Session of one client, without its socket: bytes in, messages out."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
@@ -38,9 +37,9 @@ from shapechanger.link.messages import (
     Welcome,
     decode_client_message,
 )
-from shapechanger.robot.daemon.control import ClientIdentity, ControlLease
+from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.library import Answer, RecordingLibrary
+from shapechanger.robot.daemon.library import Answer
 from shapechanger.robot.daemon.limits import (
     MESSAGES_PER_S,
     MessageRate,
@@ -49,78 +48,11 @@ from shapechanger.robot.daemon.limits import (
     printable,
 )
 from shapechanger.robot.daemon.observation import build_observation
-from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import Order
 
-__all__ = ["Authenticator", "RecordingRequests", "Session", "WrongKey"]
+__all__ = ["Authenticator", "Session", "WrongKey"]
 
-
-class RecordingRequests:
-    """Passes the wishes of one client on, if it may have them.
-
-    Args:
-        recorder: Records what is driven.
-        library: Knows what was recorded.
-        lease: Who commands.
-        outbox: What the client is to be told.
-        tell: Puts a message there.
-    """
-
-    def __init__(
-        self,
-        recorder: Recorder,
-        library: RecordingLibrary,
-        lease: ControlLease,
-        outbox: Outbox,
-        tell: Callable[[RobotMessage], None],
-    ) -> None:
-        self._recorder = recorder
-        self._library = library
-        self._lease = lease
-        self._outbox = outbox
-        self._tell = tell
-        self._asking = False
-
-    def hear(
-        self, message: Record | Mark | Undo | Browse | Fetch | Judge, who: ClientIdentity
-    ) -> None:
-        """Do what the client says, or tell it why not."""
-        if not isinstance(message, Browse | Fetch) and who.role != "person":
-            self._tell(Refused(reason="Only a person records on this robot, and judges that."))
-            return
-        match message:
-            case Record():
-                refusal = self._record(message, who)
-            case Mark():
-                refusal = self._recorder.mark(printable(message.text), self._tell)
-            case Undo():
-                refusal = self._recorder.undo(message.seconds, self._tell)
-            case Browse() | Fetch() | Judge():
-                refusal = self._ask(message)
-        if refusal:
-            self._tell(Refused(reason=refusal))
-
-    def _record(self, message: Record, who: ClientIdentity) -> str:
-        if not message.on:
-            return self._recorder.end()
-        held = self._lease.holder
-        driver = "" if held is None else held.name
-        return self._recorder.begin(who, printable(message.name), driver, self._tell)
-
-    def _ask(self, question: Browse | Fetch | Judge) -> str:
-        """Ask the library; an answer may be large, so the next question waits until it has left."""
-        if self._asking or self._outbox.holds(Recordings, Piece):
-            return "Ask one question about recordings at a time."
-        self._asking = True
-        self._library.ask(question, self._answered)
-        return ""
-
-    def _answered(self, answer: Answer) -> None:
-        self._asking = False
-        self._tell(answer)
-
-
-_LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps overflow out of sums.
+_LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps sums from overflowing.
 
 
 class WrongKey(RobotRefused):
@@ -128,10 +60,10 @@ class WrongKey(RobotRefused):
 
 
 class Authenticator:
-    """What a client must show to be let in.
+    """Checks that a client holds the robot's key.
 
     Args:
-        key: The key; empty for none.
+        key: The key; empty to accept every client.
         certificate: Fingerprint of the certificate; empty without TLS.
     """
 
@@ -146,110 +78,113 @@ class Authenticator:
 
     @property
     def is_open(self) -> bool:
-        """Whether everybody is let in."""
+        """True if the robot has no key and accepts every client."""
         return not self._key
 
-    def lets_in(self, hello: Hello, nonce: bytes) -> bool:
-        """Whether the client holds the key."""
+    def accepts(self, hello: Hello, nonce: bytes) -> bool:
+        """Return True if the proof in `hello` answers `nonce` with the right key."""
         if self.is_open:
             return True
         return is_proof(hello.proof, self._key, nonce, self._certificate, hello.role)
 
 
 class Session:
-    """One connection, without its socket.
+    """Session of one client, without its socket.
 
     Args:
-        number: Its number, never used twice.
-        cockpit: What all connections share.
-        door: What the client must show.
-        rate: How much it may say.
+        number: Number of the connection, never used twice.
+        hub: State that all connections share.
+        authenticator: Checks the client's proof.
+        rate: Limits how many messages the client may send.
 
     Attributes:
-        outbox: What it is told besides observations.
-        told: Set when there is something in the outbox.
-        news: Set when there may be an observation to send.
-        credit: Whether the client waits for an observation.
+        outbox: Messages for the client, other than observations.
+        posted: Set when the outbox has a message.
+        updated: Set when an observation may be due.
+        credit: True while the client waits for an observation.
+        overflow: Reason to disconnect a client that does not read its messages; "" if it does.
     """
 
     def __init__(
-        self, number: int, cockpit: SessionHub, door: Authenticator, rate: MessageRate | None = None
+        self,
+        number: int,
+        hub: SessionHub,
+        authenticator: Authenticator,
+        rate: MessageRate | None = None,
     ) -> None:
         self.outbox = Outbox()
-        self.told = asyncio.Event()
-        self.news = asyncio.Event()
+        self.posted = asyncio.Event()
+        self.updated = asyncio.Event()
         self.credit = False
+        self.overflow = ""
         self._number = number
-        self._cockpit = cockpit
-        self._door = door
+        self._hub = hub
+        self._authenticator = authenticator
         self._rate = MessageRate() if rate is None else rate
         self._nonce = new_nonce()
         self._hello: Hello | None = None
-        self._who = ClientIdentity(number, "", "program")
-        self._sent = SentObservations(cockpit.plan.max_observation_age_ms)
+        self._client = ClientIdentity(number, "", "program")
+        self._sent = SentObservations(hub.plan.max_observation_age_ms)
         self._command_seq = -1
         self._suggestion_seq = -1
-        self._desk = RecordingRequests(
-            cockpit.recorder, cockpit.library, cockpit.lease, self.outbox, self.tell
-        )
         self._observation_seq = 0
         self._frame_seq = 0
-        self._overflow = ""
+        self._awaits_library = False
 
     @property
-    def who(self) -> ClientIdentity:
-        """Who it is; without a name before it said hello."""
-        return self._who
+    def client(self) -> ClientIdentity:
+        """Identity of the client; its name is empty before its hello."""
+        return self._client
 
     @property
     def pace(self) -> Pace:
-        """Who keeps the time."""
+        """Whether the robot's clock or the client sets the pace."""
         return "realtime" if self._hello is None else self._hello.pace
 
     @property
     def has_new_frame(self) -> bool:
-        """Whether there is a picture that the client wants and was not sent."""
-        newest = self._cockpit.newest
+        """True if there is a frame that the client wants and has not been sent."""
+        newest = self._hub.newest
         wants = self._hello is not None and self._hello.frames
         return wants and newest is not None and newest.seq != self._frame_seq
 
     def challenge(self) -> Challenge:
-        """The first message to the client."""
-        return Challenge(version=VERSION, nonce=self._nonce, robot=self._cockpit.plan.robot)
+        """Return the first message to the client."""
+        return Challenge(version=VERSION, nonce=self._nonce, robot=self._hub.plan.robot)
 
     def introduce(self, data: bytes) -> Welcome:
-        """Let the client in, by its first message.
+        """Authenticate the client by its first message.
 
         Raises:
-            WrongKey: If it does not hold the key.
-            RobotRefused: If it speaks another version, or there is no place.
-            LinkError: If this is no greeting.
+            WrongKey: If the client does not hold the key.
+            RobotRefused: If its version differs, or too many clients are connected.
+            LinkError: If the message is not a hello.
         """
         hello = decode_client_message(data)
         if not isinstance(hello, Hello) or self._hello is not None:
             raise LinkError("The first message must be a hello.")
         if hello.version != VERSION:
             raise RobotRefused(
-                f"The robot speaks version {VERSION} of the link, and you speak {hello.version}: "
+                f"The robot uses version {VERSION} of the link, and this client {hello.version}: "
                 "install the same version of shapechanger on both."
             )
-        if not self._door.lets_in(hello, self._nonce):
+        if not self._authenticator.accepts(hello, self._nonce):
             raise WrongKey(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
         name = printable(hello.name) or f"{hello.role} {self._number}"
-        self._who = ClientIdentity(self._number, name, hello.role)
-        self._cockpit.join(self)
+        self._client = ClientIdentity(self._number, name, hello.role)
+        self._hub.join(self)
         self._hello = hello
-        if (recorded := self._cockpit.recorder.state()).episode:
-            self.tell(recorded)
+        if (recorded := self._hub.recorder.state()).episode:
+            self.post(recorded)
         return self._welcome()
 
     def receive(self, data: bytes) -> None:
-        """Do what the client says.
+        """Handle a message of the client.
 
         Raises:
-            LinkError: If the connection must end, and why.
+            LinkError: If the connection must end, with the reason.
         """
         if self._hello is None:
             raise LinkError("The first message must be a hello.")
@@ -261,9 +196,9 @@ class Session:
             case Acknowledge():
                 self._give_credit()
             case Take():
-                self._cockpit.take(self._who)
+                self._hub.take(self._client)
             case Release():
-                self._cockpit.release(self._who, f"{self._who.name} gave the command back")
+                self._hub.release(self._client, f"{self._client.name} released it")
             case Arm():
                 self._arm(message)
             case Disarm():
@@ -271,176 +206,189 @@ class Session:
             case EmergencyStop():
                 self._emergency(message)
             case Ping():
-                self.tell(Pong(token=message.token, now_ns=self._cockpit.now_ns()))
+                self.post(Pong(token=message.token, now_ns=self._hub.now_ns()))
             case Suggest():
                 self._suggest(message)
             case Record() | Mark() | Undo() | Browse() | Fetch() | Judge():
-                self._desk.hear(message, self._who)
+                self._refuse(self._recording(message))
             case Hello():
-                raise LinkError("You said hello already.")
-        if self._overflow:
-            raise LinkError(self._overflow)
+                raise LinkError("The hello was sent already.")
+        if self.overflow:
+            raise LinkError(self.overflow)
 
     def count(self) -> None:
         """Count a message.
 
         Raises:
-            RobotRefused: If there are too many.
+            RobotRefused: If the client exceeds its rate.
         """
         if not self._rate.spend():
-            raise RobotRefused(
-                f"You say too much: {MESSAGES_PER_S:.0f} messages a second are allowed."
-            )
+            raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
 
     def close(self) -> None:
-        """The connection has ended."""
-        self._cockpit.leave(self._number)
+        """End the session."""
+        self._hub.leave(self._number)
 
-    def tell(self, message: RobotMessage) -> None:
-        """Put a message in the outbox; one that does not read is noticed by its connection."""
+    def post(self, message: RobotMessage) -> None:
+        """Queue a message; a full queue sets `overflow`, which ends the connection."""
         try:
             self.outbox.put(message)
         except LinkError as error:
-            self._overflow = str(error)
-        self.told.set()
+            self.overflow = str(error)
+        self.posted.set()
 
-    @property
-    def overflow(self) -> str:
-        """Why the connection must end, because the client does not read; empty if it does."""
-        return self._overflow
-
-    def notice(self) -> None:
-        """There is a new state or picture."""
-        self.news.set()
+    def notify(self) -> None:
+        """Handle a new state or frame."""
+        self.updated.set()
 
     def observe(self) -> Observation:
-        """The observation that leaves now; it costs the credit."""
-        cockpit, now_ns = self._cockpit, self._cockpit.now_ns()
+        """Build the observation to send now, which uses up the credit."""
+        hub, now_ns = self._hub, self._hub.now_ns()
         self._observation_seq += 1
         frames = self._hello is not None and self._hello.frames
         observation = build_observation(
             seq=self._observation_seq,
             now_ns=now_ns,
-            reader=cockpit.reader,
-            state=cockpit.state,
-            newest=cockpit.newest,
+            reader=hub.reader,
+            state=hub.state,
+            newest=hub.newest,
             frame_sent=self._frame_seq if frames else None,
-            lease=cockpit.lease.number,
-            command_ns=cockpit.command_ns(),
-            holder=cockpit.lease.holder,
-            mine=cockpit.lease.holds(self._number),
-            commanded=cockpit.commanded(),
-            suggested=cockpit.suggested(),
+            lease=hub.lease.number,
+            command_ns=hub.command_ns(),
+            holder=hub.lease.holder,
+            mine=hub.lease.holds(self._number),
+            commanded=hub.commanded(),
+            suggested=hub.suggested(),
         )
         self._sent.add(observation.seq, now_ns)
-        cockpit.recorder.observed(self._number, observation, cockpit.newest)
+        hub.recorder.observed(self._number, observation, hub.newest)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
-            self._rate.give_back()  # The robot kept the pace, however fast that was.
+            self._rate.give_back()  # The robot set the pace, however fast.
         self.credit = False
         return observation
 
-    def _command(self, command: Command) -> None:
-        now_ns = self._cockpit.now_ns()
-        refusal = self._refusal_to_listen(command)
-        if not refusal:
-            refusal = self._nonsense(command.values)
-            if refusal:
-                # The one before is no longer what the client wants. What is refused for being late
-                # says nothing about that, and what is old must not stop what is newer.
-                self._cockpit.halt()
-            else:
-                refusal = self._sent.refusal(command.answers, now_ns)
-        self._command_seq = max(self._command_seq, command.seq)
-        if refusal:
-            self.tell(Refused(reason=refusal, seq=command.seq))
-        else:
-            self._cockpit.command(command, now_ns)
-        self._give_credit()
-
-    def _suggest(self, suggestion: Suggest) -> None:
-        refusal = ""
-        if self._cockpit.lease.holds(self._number):
-            refusal = "You command: say what to do by a command."
-        elif suggestion.seq <= self._suggestion_seq:
-            refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
-        refusal = refusal or self._nonsense(suggestion.values)
-        if not refusal:
-            refusal = self._sent.refusal(suggestion.answers, self._cockpit.now_ns())
-        self._suggestion_seq = max(self._suggestion_seq, suggestion.seq)
-        if refusal:
-            self.tell(Refused(reason=refusal, seq=suggestion.seq))
-        else:
-            self._cockpit.suggest(self._who, suggestion.values)
-        self._give_credit()
-
-    def _refusal_to_listen(self, command: Command) -> str:
-        """Why a command does not count, whatever it says; empty when it does."""
-        if not self._cockpit.lease.holds(self._number):
-            return "You do not command; take the command first."
-        if command.seq <= self._command_seq:
-            return f"Command {command.seq} is not newer than {self._command_seq}."
-        return ""
-
-    def _nonsense(self, values: tuple[float, ...]) -> str:
-        """What is wrong with the values of a command, in words; empty for nothing."""
-        if len(values) != self._cockpit.action_size:
-            return (
-                f"A command of this robot has {self._cockpit.action_size} values, "
-                f"this one has {len(values)}."
-            )
-        if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in values):
-            return "A value is no finite number."
-        return ""
+    def _refuse(self, reason: str, seq: int | None = None) -> None:
+        """Report a refusal, unless `reason` is empty."""
+        if reason:
+            self.post(Refused(reason=reason, seq=seq))
 
     def _give_credit(self) -> None:
         self.credit = True
-        self.news.set()
+        self.updated.set()
+
+    def _command(self, command: Command) -> None:
+        now_ns = self._hub.now_ns()
+        refusal = ""
+        if not self._hub.lease.holds(self._number):
+            refusal = "You do not have control; take it first."
+        elif command.seq <= self._command_seq:
+            refusal = f"Command {command.seq} is not newer than {self._command_seq}."
+        elif refusal := self._values_refusal(command.values):
+            # The previous command is no longer what the client wants. A late or repeated command
+            # proves nothing of that kind, and must not stop a newer one.
+            self._hub.halt()
+        else:
+            refusal = self._sent.refusal(command.answers, now_ns)
+        self._command_seq = max(self._command_seq, command.seq)
+        self._refuse(refusal, command.seq)
+        if not refusal:
+            self._hub.command(command, now_ns)
+        self._give_credit()
+
+    def _suggest(self, suggestion: Suggest) -> None:
+        if self._hub.lease.holds(self._number):
+            refusal = "You have control: send a command in place of a suggestion."
+        elif suggestion.seq <= self._suggestion_seq:
+            refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
+        else:
+            refusal = self._values_refusal(suggestion.values) or self._sent.refusal(
+                suggestion.answers, self._hub.now_ns()
+            )
+        self._suggestion_seq = max(self._suggestion_seq, suggestion.seq)
+        self._refuse(refusal, suggestion.seq)
+        if not refusal:
+            self._hub.suggest(self._client, suggestion.values)
+        self._give_credit()
+
+    def _values_refusal(self, values: tuple[float, ...]) -> str:
+        """Return the fault in the values of a command, or ""."""
+        if len(values) != self._hub.action_size:
+            return f"A command of this robot has {self._hub.action_size} values, got {len(values)}."
+        if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in values):
+            return f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
+        return ""
 
     def _arm(self, arm: Arm) -> None:
-        refusal = self._refusal_to_arm()
-        if not refusal and (late := self._sent.refusal(arm.answers, self._cockpit.now_ns())):
+        refusal = self._arm_refusal()
+        if not refusal and (late := self._sent.refusal(arm.answers, self._hub.now_ns())):
             refusal = f"Not armed. {late}"
         if refusal:
-            self.tell(Refused(reason=refusal))
+            self._refuse(refusal)
             return
-        # The guard knows of each emergency stop, and this process only of those it was told.
-        person = self._who.role == "person"
-        self._cockpit.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
+        # The guard knows every emergency stop; this process only those that were reported to it.
+        person = self._client.role == "person"
+        self._hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
-    def _refusal_to_arm(self) -> str:
-        """Why this client must not arm, in words; empty when it may."""
-        state, is_person = self._cockpit.state, self._who.role == "person"
-        if self._cockpit.lease.holder is None:
-            return "Nobody commands; take the command first."
-        if is_person:
+    def _arm_refusal(self) -> str:
+        """Return the reason why this client must not arm, or ""."""
+        state = self._hub.state
+        if self._hub.lease.holder is None:
+            return "No client has control; take control first."
+        if self._client.role == "person":
             return ""
-        if self._cockpit.plan.arming != "anyone":
-            return "Only a person arms this robot."
+        if self._hub.plan.arming != "anyone":
+            return "Only a person can arm this robot."
         if state is not None and state.emergency:
-            return "Only a person ends an emergency stop."
-        if not self._cockpit.lease.holds(self._number):
-            return "Only who commands, or a person, arms this robot."
+            return "Only a person can end an emergency stop."
+        if not self._hub.lease.holds(self._number):
+            return "Only the client in control, or a person, can arm this robot."
         return ""
 
     def _disarm(self) -> None:
-        if self._who.role != "person" and not self._cockpit.lease.holds(self._number):
-            self.tell(
-                Refused(
-                    reason="Only who commands, or a person, disarms this robot; "
-                    "anyone may stop it with an emergency stop."
-                )
+        if self._client.role != "person" and not self._hub.lease.holds(self._number):
+            self._refuse(
+                "Only the client in control, or a person, can disarm this robot; any client can "
+                "stop it with an emergency stop."
             )
             return
-        self._cockpit.give_order(Order(kind="disarm", reason=f"{self._who.name} disarmed"))
+        self._hub.give_order(Order(kind="disarm", reason=f"{self._client.name} disarmed"))
 
     def _emergency(self, stop: EmergencyStop) -> None:
-        reason = f"{self._who.name}: {printable(stop.reason) or 'stop'}"
-        self._cockpit.give_order(Order(kind="emergency", reason=reason))
+        reason = f"{self._client.name}: {printable(stop.reason) or 'stop'}"
+        self._hub.give_order(Order(kind="emergency", reason=reason))
+
+    def _recording(self, message: Record | Mark | Undo | Browse | Fetch | Judge) -> str:
+        """Handle a request about recordings. Return the reason for a refusal, or ""."""
+        if not isinstance(message, Browse | Fetch) and self._client.role != "person":
+            return "Only a person can record on this robot, and judge recordings."
+        recorder = self._hub.recorder
+        match message:
+            case Record(on=False):
+                return recorder.end()
+            case Record():
+                held = self._hub.lease.holder
+                driver = "" if held is None else held.name
+                return recorder.begin(self._client, printable(message.name), driver, self.post)
+            case Mark():
+                return recorder.mark(printable(message.text), self.post)
+            case Undo():
+                return recorder.undo(message.seconds, self.post)
+            case Browse() | Fetch() | Judge():
+                # An answer may be large, so the next question waits until it has left.
+                if self._awaits_library or self.outbox.holds(Recordings, Piece):
+                    return "Ask one question about recordings at a time."
+                self._awaits_library = True
+                self._hub.library.ask(message, self._library_answered)
+                return ""
+
+    def _library_answered(self, answer: Answer) -> None:
+        self._awaits_library = False
+        self.post(answer)
 
     def _welcome(self) -> Welcome:
-        plan = self._cockpit.plan
+        plan = self._hub.plan
         return Welcome(
             robot=plan.robot,
             body=plan.body,
@@ -455,5 +403,5 @@ class Session:
             arming=plan.arming,
             clock=plan.clock,
             session=self._number,
-            can_record=self._cockpit.recorder.can_record,
+            can_record=self._hub.recorder.can_record,
         )

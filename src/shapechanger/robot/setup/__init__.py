@@ -1,4 +1,4 @@
-"""Setting a robot up: what the doctor looks for, and what a new robot gets."""
+"""Setup of a robot: checks, calibration, zeros of joints and tendons, and the systemd unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From what a person saw while an output was jogged to changes of its profile; pure."""
+"""Calibration: profile changes from what a person found while an output was jogged."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ PULSES: Final = {
     "servo": ("left_us", "centre_us", "right_us"),
     "esc": ("backward_us", "neutral_us", "forward_us"),
 }
-"""The settings of each driver that are widths of pulses, at -1, 0 and 1."""
+"""Settings of each driver that are pulse widths, at -1, 0 and 1."""
 
-# A servo must not be driven against its stop while it is jogged: makers state 500 to 2500 us as the
-# whole range that standard servos understand, and 900 to 2100 us as what most of them reach.
+# A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
+# full range of standard servos, and 900 to 2100 us as what most of them reach.
 _NARROWEST_US: Final = 600
 _WIDEST_US: Final = 2400
 
 
 @dataclass(frozen=True, slots=True)
 class JogResult:
-    """What a person found by jogging a servo or a controller.
+    """Values that a person found by jogging a servo or a motor controller.
 
     Attributes:
-        low: Value at which it was full left, or just not turning backward any further.
-        middle: Value at which it was straight, or surely at rest.
-        high: Value at which it was full right, or at its fastest.
+        low: Value at full left, or at the fastest backward.
+        middle: Value at straight ahead, or at rest.
+        high: Value at full right, or at the fastest forward.
     """
 
     low: float
@@ -48,10 +48,10 @@ class JogResult:
 
 
 def with_widest_pulses(output: OutputPlan) -> OutputPlan:
-    """The same output with the widest pulses there are, to jog in; its middle stays.
+    """Return the output with the widest pulse range, for jogging; its middle stays.
 
     Raises:
-        RobotError: If it sends no pulses.
+        RobotError: If the output sends no pulses.
     """
     low, _, high = _keys(output)
     turned = _number(output, low) > _number(output, high)
@@ -61,10 +61,10 @@ def with_widest_pulses(output: OutputPlan) -> OutputPlan:
 
 
 def reading(output: OutputPlan, value: float) -> str:
-    """What an output does at a value, in the unit of its settings, for people to read.
+    """Describe an output at a value, in the unit of its settings.
 
     Args:
-        output: A servo, a controller or a motor.
+        output: A servo, a motor controller or a motor.
         value: -1 to 1.
     """
     if output.driver in PULSES:
@@ -74,11 +74,11 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
-    """What to write for an output that was jogged, by dotted name; whole microseconds.
+    """Return the changes for a jogged output, whole microseconds by dotted name.
 
     Args:
-        output: The output as it was while it was jogged.
-        found: What was found.
+        output: The output with the settings that it had while jogging.
+        found: The values that were found.
 
     Raises:
         RobotError: If the middle does not lie between the ends.
@@ -86,27 +86,28 @@ def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
     keys = _keys(output)
     jogged = PulseRange(*(_number(output, key) for key in keys))
     widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
-    PulseRange(*map(float, widths))  # Says in words what cannot be.
+    PulseRange(*map(float, widths))  # Checks the order.
     return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}
 
 
 def motor_changes(
     output: OutputPlan, went: Literal["forward", "backward"], starts_at: float
 ) -> dict[str, Any]:
-    """What to write for a motor, by dotted name.
+    """Return the changes for a motor, by dotted name.
 
     Args:
         output: The motor.
-        went: Which way it went when it was told forward.
-        starts_at: Duty at which it began to move, 0 to 1.
+        went: Direction in which it turned at a forward command.
+        starts_at: Duty at which it began to turn, 0 to 1.
 
     Raises:
-        RobotError: If the duty cannot be one.
+        RobotError: If the duty is out of range.
     """
     full = _number(output, "full")
     if not 0.0 <= starts_at < full:
         raise RobotError(
-            f"{output.name} cannot start at a duty of {starts_at:g}: its full duty is {full:g}."
+            f"{output.name} must start at a duty from 0 to below its full duty of {full:g}, got "
+            f"{starts_at:g}."
         )
     changes: dict[str, Any] = {f"output.{output.name}.start": round(starts_at, 2)}
     if went == "backward":
@@ -118,20 +119,20 @@ def motor_changes(
 def wheel_changes(
     sensor: str, wheel_m: float, pushed_m: float, measured_m: float
 ) -> dict[str, float]:
-    """What to write for an encoder after the robot was pushed a known way.
+    """Return the changes for an encoder after the robot was pushed a known distance.
 
     Args:
         sensor: Name of the encoder.
-        wheel_m: Way of one turn as it is in the profile, m.
-        pushed_m: How far it was pushed, m.
-        measured_m: How far it went by the encoder, m; backward counts down.
+        wheel_m: Distance of one turn in the profile, m.
+        pushed_m: Distance that the robot was pushed, m.
+        measured_m: Distance measured by the encoder, m; negative for backward.
 
     Raises:
         RobotError: If the encoder counted nothing, or backward.
     """
     if measured_m <= 0.0:
         raise RobotError(
-            f"{sensor} counted {measured_m:g} m for {pushed_m:g} m forward: look at its wires, and "
+            f"{sensor} measured {measured_m:g} m for {pushed_m:g} m forward: check its wires, and "
             "swap its pins `a` and `b` if it counts backward."
         )
     return {f"sensor.{sensor}.wheel_m": round(wheel_m * pushed_m / measured_m, 4)}
@@ -139,7 +140,7 @@ def wheel_changes(
 
 def _keys(output: OutputPlan) -> tuple[str, str, str]:
     if output.driver not in PULSES:
-        raise RobotError(f"{output.name} is a {output.driver}, which sends no pulses.")
+        raise RobotError(f"The driver of {output.name}, {output.driver}, sends no pulses.")
     return PULSES[output.driver]
 
 
@@ -147,4 +148,4 @@ def _number(output: OutputPlan, key: str) -> float:
     value = output.settings[key]
     if isinstance(value, int | float):
         return float(value)
-    raise RobotError(f"{key} of {output.name} is no number.")
+    raise RobotError(f"{key} of {output.name} must be a number, got {value!r}.")

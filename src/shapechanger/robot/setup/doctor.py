@@ -1,7 +1,6 @@
-"""What keeps a robot from being safe or from working, found before it drives.
+"""Checks of a robot's computer, drivers and settings, before it drives.
 
-Nothing here moves an output. Each check says in a sentence what it found and, where something is
-missing, what to do.
+No check moves an output. Each returns a sentence, with a remedy where something must be fixed.
 """
 
 from __future__ import annotations
@@ -12,15 +11,16 @@ import re
 import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
-from shapechanger.errors import ShapechangerError
+from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
-from shapechanger.robot.setup.finding import Finding
+from shapechanger.robot.hardware import RealHardware
 
-if TYPE_CHECKING:  # The drivers need gpiozero, and whether it is there is looked at first.
+if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600
 
 __all__ = ["Finding", "examine_robot", "unit_name", "uses_pins"]
@@ -29,6 +29,23 @@ _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
 _NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
 _CAMERA_S: Final = 5.0
 _STRICT: Final = re.compile(r"^\s*dtparam\s*=\s*([^#]*,)?strict_gpiod(=(on|1|true))?\s*(,|#|$)")
+_FAST_HZ: Final = 400_000
+_BAUD: Final = re.compile(r"^\s*dtparam\s*=\s*(?:[^#]*,)?i2c(?:_arm)?_baudrate=(\d+)", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Result of one check.
+
+    Attributes:
+        check: Name of the check.
+        level: "good", "missing" for something to fix, "unknown" for what cannot be checked here.
+        sentence: The result, and the remedy.
+    """
+
+    check: str
+    level: Literal["good", "missing", "unknown"]
+    sentence: str
 
 
 def examine_robot(
@@ -40,16 +57,16 @@ def examine_robot(
     profile: Path | None = None,
     encoders: Callable[[SensorPlan], As5600] | None = None,
 ) -> Iterator[Finding]:
-    """Look at everything that the robot's safety and work depend on.
+    """Check all that the robot's safety and function depend on.
 
     Args:
-        guard: Its outputs, sensors and limits.
-        camera: Its camera, if it has one.
-        port: Port that it will be reached at.
+        guard: Outputs, sensors and limits of the robot.
+        camera: Its camera, or None.
+        port: Port of its server.
         root: Root of the file system, for tests.
         look: Opens the camera.
-        profile: The robot's profile, which the systemd unit must name; None to leave that out.
-        encoders: Reaches the encoders of its joints; None for this machine's bus.
+        profile: The robot's profile, which the systemd unit must name; None to skip this check.
+        encoders: Opens the encoders of its joints; None for this machine's bus.
     """
     yield _computer(root)
     yield _strict_gpiod(root)
@@ -61,13 +78,18 @@ def examine_robot(
     if camera is not None:
         yield _camera(camera, look)
     free = _port(port)
-    yield from _encoders(guard, root, encoders, served=free.level != "good")
+    yield from _encoders(guard, root, encoders or _real_encoders, served=free.level != "good")
     yield free
 
 
 def unit_name(robot: str) -> str:
-    """Name of a robot's systemd unit, so that a computer may serve several robots."""
+    """Return the name of a robot's systemd unit; one computer may serve several robots."""
     return f"shapechanger-{_NOT_IN_UNITS.sub('-', robot)}.service"
+
+
+def uses_pins(output: OutputPlan) -> bool:
+    """Return True if an output is on the computer's own pins, and not on a bus."""
+    return output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
 
 
 def _computer(root: Path) -> Finding:
@@ -76,7 +98,7 @@ def _computer(root: Path) -> Finding:
         return Finding(
             "computer",
             "unknown",
-            "This is no Raspberry Pi: `serve --twin` runs the robot on simulated pins here.",
+            "This is not a Raspberry Pi: `serve --twin` runs the robot on simulated pins here.",
         )
     return Finding("computer", "good", path.read_text().strip("\0\n ") + ".")
 
@@ -84,9 +106,11 @@ def _computer(root: Path) -> Finding:
 def _strict_gpiod(root: Path) -> Finding:
     path = _config(root)
     if path is None:
-        return Finding("strict_gpiod", "unknown", "There is no config.txt of a Raspberry Pi here.")
+        return Finding("strict_gpiod", "unknown", "This machine has no Raspberry Pi config.txt.")
     if any(_STRICT.match(line) for line in path.read_text().splitlines()):
-        return Finding("strict_gpiod", "good", f"{path} sets it: pins of the dead go low.")
+        return Finding(
+            "strict_gpiod", "good", f"{path} sets it: the pins of a process that dies go low."
+        )
     return Finding(
         "strict_gpiod",
         "missing",
@@ -96,7 +120,7 @@ def _strict_gpiod(root: Path) -> Finding:
 
 
 def _config(root: Path) -> Path | None:
-    """The config.txt of a Raspberry Pi."""
+    """Return the config.txt of a Raspberry Pi."""
     paths = [root / name for name in _CONFIGS]
     return next((path for path in paths if path.exists()), None)
 
@@ -107,13 +131,13 @@ def _unit(robot: str, profile: Path | None, root: Path) -> Finding:
         return Finding(
             "systemd",
             "missing",
-            f"{path} is not there, so nothing starts the robot again, or makes its pins safe, when "
-            "it crashes: `shapechanger robot init` writes one beside the profile; copy it there.",
+            f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
+            "safe: `shapechanger robot init` writes it beside the profile; copy it there.",
         )
     text = path.read_text()
     lacks = [
-        words
-        for words, pattern in (
+        setting
+        for setting, pattern in (
             ("Restart=always", r"^Restart=always\s*$"),
             ("ExecStopPost=… robot safe-pins", r"^ExecStopPost=.*robot safe-pins"),
         )
@@ -131,20 +155,20 @@ def _unit(robot: str, profile: Path | None, root: Path) -> Finding:
 
 def _one_shot(guard: GuardPlan) -> Finding:
     if all(output.driver == "dynamixel" for output in guard.outputs):
-        sentence = "Each servo has a watchdog of its own, and lets go when its bus is silent."
+        sentence = "Each servo has its own watchdog, and releases when its bus is silent."
         return Finding("enable line", "good", sentence)
     if guard.enable_pin is None:
         return Finding(
             "enable line",
             "missing",
-            "The profile names no [enable] pin: if guard and supervisor are killed together, only "
+            "The profile has no [enable] pin: if guard and supervisor are killed together, only "
             "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
         )
     return Finding(
         "enable line",
         "good",
         f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors lose "
-        "their power. Measure that once: nothing here can see it.",
+        "power. Measure that once, because it cannot be checked here.",
     )
 
 
@@ -154,14 +178,14 @@ def _output_enable(guard: GuardPlan) -> Iterator[Finding]:
             yield Finding(
                 "output enable",
                 "missing",
-                f"{output.name} hangs on a PCA9685 that keeps its last pulse for ever: wire OE to "
+                f"{output.name} is on a PCA9685 that keeps its last pulse for ever: wire OE to "
                 "a pin with a pull-up and name it as output_enable.",
             )
             return
 
 
 def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
-    """Whether the device files are there for this user."""
+    """Check that this user can open the device files."""
     wanted: dict[str, str] = {}
     if any(uses_pins(output) for output in guard.outputs):
         wanted["dev/gpiochip0"] = "gpio"
@@ -179,9 +203,9 @@ def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
             yield Finding(
                 "devices",
                 "missing",
-                f"{path} is not there: enable it with `sudo raspi-config` (Interface Options)."
+                f"{path} does not exist: enable it with `sudo raspi-config` (Interface Options)."
                 if group != "dialout"
-                else f"{path} is not there: plug in the adapter of the servo bus.",
+                else f"{path} does not exist: plug in the adapter of the servo bus.",
             )
         elif not os.access(path, os.R_OK | os.W_OK):
             yield Finding(
@@ -194,47 +218,21 @@ def _devices(guard: GuardPlan, root: Path) -> Iterator[Finding]:
 
 
 def _latency_timers(guard: GuardPlan, root: Path) -> Iterator[Finding]:
-    """Whether adapters hand on at once what servos say."""
+    """Check that the adapters pass on the servos' answers at once."""
     for device in {str(o.settings["device"]) for o in guard.outputs if o.driver == "dynamixel"}:
         path = root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
         if not path.exists():
-            sentence = (
-                f"{device} says nothing of a latency timer; it must be 1 ms where it has one."
-            )
+            sentence = f"{device} reports no latency timer; if it has one, it must be 1 ms."
             yield Finding("latency timer", "unknown", sentence)
         elif (ms := path.read_text().strip()) != "1":
             yield Finding(
                 "latency timer",
                 "missing",
-                f"The adapter at {device} waits for {ms} ms before it hands on what the servos "
-                f"say: `echo 1 | sudo tee {path}`.",
+                f"The adapter at {device} delays the servos' answers by {ms} ms: "
+                f"`echo 1 | sudo tee {path}`.",
             )
         else:
-            yield Finding("latency timer", "good", f"That of {device} is 1 ms.")
-
-
-def _encoders(
-    guard: GuardPlan,
-    root: Path,
-    connect: Callable[[SensorPlan], As5600] | None,
-    *,
-    served: bool,
-) -> Iterator[Finding]:
-    """How the encoders at the joints are, where their bus can be opened."""
-    sensors = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
-    if not sensors or importlib.util.find_spec("gpiozero") is None:
-        return
-    from shapechanger.robot.setup.zeros import bus_speed, examine_encoders, real_encoders
-
-    yield bus_speed(_config(root))
-    for sensor in sensors:
-        if os.access(root / f"dev/i2c-{sensor.settings['bus']}", os.R_OK | os.W_OK):
-            yield from examine_encoders(sensor, connect or real_encoders, served=served)
-
-
-def uses_pins(output: OutputPlan) -> bool:
-    """Whether an output is on the computer's own pins, and not on a bus."""
-    return output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
+            yield Finding("latency timer", "good", f"The latency timer of {device} is 1 ms.")
 
 
 def _packages(guard: GuardPlan, camera: CameraPlan | None) -> Iterator[Finding]:
@@ -265,13 +263,79 @@ def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> Finding:
         try:
             frame = reader.submit(camera.read).result(_CAMERA_S)
         except TimeoutError:
-            sentence = f"{plan.driver} gave no picture within {_CAMERA_S:g} s."
+            sentence = f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
             return Finding("camera", "missing", sentence)
         except ShapechangerError as error:
             return Finding("camera", "missing", f"{plan.driver}: {error}")
         finally:
-            camera.close()  # Ends a `read` that still waits, too.
-    return Finding("camera", "good", f"{plan.driver} gave a picture of {len(frame.jpeg)} bytes.")
+            camera.close()  # Also ends a `read` that still waits.
+    return Finding("camera", "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes.")
+
+
+def _encoders(
+    guard: GuardPlan, root: Path, connect: Callable[[SensorPlan], As5600], *, served: bool
+) -> Iterator[Finding]:
+    """Check the encoders at the joints, where their bus can be opened."""
+    sensors = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
+    if not sensors or importlib.util.find_spec("gpiozero") is None:
+        return
+    yield _bus_speed(_config(root))
+    for plan in sensors:
+        if not os.access(root / f"dev/i2c-{plan.settings['bus']}", os.R_OK | os.W_OK):
+            continue
+        if served:
+            # The guard then has the multiplexer to itself: a channel opened by another process
+            # would give it the angle of another joint.
+            sentence = "The robot may be served now, and its encoders were left alone."
+            yield Finding("encoders", "unknown", sentence)
+            continue
+        try:
+            sensor = connect(plan)
+        except RobotError as error:
+            yield Finding("encoders", "missing", str(error))
+            continue
+        try:
+            for encoder in sensor.encoders:
+                yield _encoder(sensor, encoder.joint)
+        finally:
+            sensor.close()
+
+
+def _real_encoders(plan: SensorPlan) -> As5600:
+    from shapechanger.robot.drivers.as5600 import connect_encoders
+
+    return connect_encoders(plan, RealHardware())
+
+
+def _encoder(sensor: As5600, joint: str) -> Finding:
+    (encoder,) = (one for one in sensor.encoders if one.joint == joint)
+    try:
+        measured = sensor.measure(encoder)
+    except RobotError as error:
+        return Finding("encoders", "missing", str(error))
+    if not measured.detects_magnet:
+        sentence = f"The encoder of {joint} detects no magnet: fit one above the chip."
+        return Finding("encoders", "missing", sentence)
+    if measured.too_weak or measured.too_strong:
+        where = "far from" if measured.too_weak else "near to"
+        return Finding("encoders", "missing", f"The magnet of {joint} is too {where} its encoder.")
+    return Finding("encoders", "good", f"The encoder of {joint} detects its magnet.")
+
+
+def _bus_speed(config: Path | None) -> Finding:
+    """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
+    if config is None:
+        sentence = f"The bus should have {_FAST_HZ} bits per second, which cannot be read here."
+        return Finding("I2C speed", "unknown", sentence)
+    rates = _BAUD.findall(config.read_text())
+    if rates and int(rates[-1]) >= _FAST_HZ:
+        return Finding("I2C speed", "good", f"{config} sets {rates[-1]} bits per second.")
+    return Finding(
+        "I2C speed",
+        "missing",
+        f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
+        f"`dtparam=i2c_arm_baudrate={_FAST_HZ}` to {config} and restart the computer.",
+    )
 
 
 def _port(port: int) -> Finding:
@@ -281,6 +345,8 @@ def _port(port: int) -> Finding:
             probe.bind(("", port))
         except OSError as error:
             return Finding(
-                "port", "missing", f"Port {port} cannot be used ({error.strerror}): is it served?"
+                "port",
+                "missing",
+                f"Port {port} cannot be used ({error.strerror}). Is the robot served already?",
             )
     return Finding("port", "good", f"Port {port} is free.")

@@ -1,4 +1,4 @@
-"""The systemd unit of a robot: starts it with the computer, and leaves its pins safe."""
+"""systemd unit of a robot, which starts it with the computer and keeps its pins safe."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _TEMPLATE: Final = Path(__file__).parent / "robot.service"
 def unit_text(
     robot: str, profile: Path, program: str, user: str, credentials: Path | None = None
 ) -> str:
-    """The unit for a profile.
+    """Return the text of the unit for a profile.
 
     Args:
         robot: Name of the robot.
-        profile: The robot's profile.
-        program: The command `shapechanger`, with its folder.
-        user: Who runs it; a member of the groups gpio, i2c and video.
-        credentials: Folder of the key and the certificate, if not the robot's own.
+        profile: Its profile.
+        program: Path of the command `shapechanger`.
+        user: User that runs it, a member of the groups gpio, i2c and video.
+        credentials: Folder of the key and the certificate; None for the default.
     """
     text = _TEMPLATE.read_text(encoding="utf-8")
     values = {
@@ -43,15 +43,15 @@ def unit_text(
 
 
 def write_unit(robot: str, profile: Path, credentials: Path | None = None) -> tuple[Path, bool]:
-    """Write the unit beside a profile; one that is there already stays.
+    """Write the unit beside a profile; an existing file stays.
 
     Args:
         robot: Name of the robot.
-        profile: Its profile, which need not be there yet.
-        credentials: Folder of its key and certificate, if not its own.
+        profile: Its profile, which need not exist yet.
+        credentials: Folder of its key and certificate; None for the default.
 
     Returns:
-        The file, and whether it was written.
+        The file, and True if it was written now.
 
     Raises:
         OutputError: If it cannot be written.

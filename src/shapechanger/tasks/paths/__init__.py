@@ -1,7 +1,7 @@
-"""Paths that a fingertip follows: shapes, functions of time, and tables of where it was.
+"""Paths that a fingertip follows: shapes, functions of time, and recorded tables.
 
 The frame is the finger's: x distal, y radial, z dorsal, in metres from the knuckle (the MCP joint);
-time is in seconds. Whether a finger reaches a path is for the env to say.
+time is in seconds. The env checks whether a finger reaches a path.
 
 >>> from shapechanger.tasks.paths import as_path
 >>> path = as_path({"kind": "circle", "radius": 0.01, "hz": 1.0})

@@ -1,4 +1,4 @@
-"""A path: where a point should be at any time, and how fast it goes there."""
+"""Path of a point over time, and checks of the numbers that define it."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _DIMENSIONS: Final = (3,)
 
 
 def finite(what: str, value: Any) -> float:
-    """A number that is one.
+    """Return a finite number.
 
     Args:
-        what: What to call it.
-        value: As it was given.
+        what: Its name, for the message.
+        value: The value.
 
     Raises:
-        PathError: If it is no number, or not finite.
+        PathError: If it is not a finite number.
     """
     if not _is_number(value) or not math.isfinite(value):
         raise PathError(f"{what} must be a finite number, got {value!r}.")
@@ -50,14 +50,14 @@ def finite(what: str, value: Any) -> float:
 
 
 def positive(what: str, value: Any) -> float:
-    """A number above 0.
+    """Return a finite number above 0.
 
     Args:
-        what: What to call it.
-        value: As it was given.
+        what: Its name, for the message.
+        value: The value.
 
     Raises:
-        PathError: If it is no number, not finite or not above 0.
+        PathError: If it is not a finite number above 0.
     """
     if not _is_number(value) or not (math.isfinite(value) and value > 0.0):
         raise PathError(f"{what} must be a finite number above 0, got {value!r}.")
@@ -65,14 +65,14 @@ def positive(what: str, value: Any) -> float:
 
 
 def vector(what: str, value: Any) -> Vector:
-    """Three numbers.
+    """Return three finite numbers.
 
     Args:
-        what: What to call them.
-        value: As they were given: a tuple, a list or an array of shape (3,).
+        what: Their name, for the message.
+        value: A tuple, a list or an array of shape (3,).
 
     Raises:
-        PathError: If they are not three, no numbers or not finite.
+        PathError: If they are not three finite numbers.
     """
     try:
         numbers = np.asarray(value, dtype=np.float64)
@@ -95,17 +95,17 @@ Points = NDArray[np.float64]
 """Positions in m, or their derivatives by time, shape (n, 3)."""
 
 CLOSED_M: Final = 1e-4
-"""How far from its beginning a path may end that counts as closed, m."""
+"""Largest distance between the two ends of a closed path, m."""
 
 
 class PathMotion(Protocol):
-    """How a point moves from 0 s until its path ends, or begins again."""
+    """Motion of a point from 0 s to the end of its path or period."""
 
     def derivative(self, t: Times, order: int) -> Points:
-        """Position, velocity or acceleration.
+        """Return position, velocity or acceleration.
 
         Args:
-            t: Times from 0 to the end, both included, s, shape (n,).
+            t: Times from 0 to the end, inclusive, s, shape (n,).
             order: 0 for positions in m, 1 for m/s, 2 for m/s².
 
         Returns:
@@ -116,16 +116,16 @@ class PathMotion(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class FingertipPath:
-    """A path that a fingertip follows; the functions of this package make them.
+    """Path that a fingertip follows; create it with the functions of this package.
 
-    A closed path repeats for ever, to both sides of 0 s. Another one begins at 0 s and ends at
-    `duration_s`: before and after the point stays where it begins and ends.
+    A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`;
+    before and after, the point rests at its ends.
 
     Attributes:
-        motion: How the point moves meanwhile.
-        duration_s: How long once round takes, or the path until it ends, s, above 0; infinite for
-            a function that goes on for ever without repeating itself.
-        closed: Whether it repeats.
+        motion: Motion of the point.
+        duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
+            endless function.
+        closed: Whether it is periodic.
     """
 
     motion: PathMotion
@@ -134,25 +134,25 @@ class FingertipPath:
 
     @property
     def period_s(self) -> float | None:
-        """After how long it repeats, s; None for a path that does not."""
+        """Period, s; None for an open path."""
         return self.duration_s if self.closed else None
 
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Where the point is.
+        """Return the position of the point.
 
         Args:
             t: Times, s, finite, of any shape and sign.
 
         Returns:
-            Positions in the frame of the finger, m: the shape of `t` and three more, (..., 3).
+            Positions in the finger's frame, m, shape (..., 3).
 
         Raises:
-            PathError: If a time is not finite, or a function has no position to it.
+            PathError: If a time is not finite, or a function returns no position for it.
         """
         return self._derivative(t, 0)
 
     def velocity(self, t: ArrayLike) -> NDArray[np.float64]:
-        """How fast the point moves, and whither; 0 before a path begins and after it ended.
+        """Return the velocity of the point; 0 before an open path begins and after it ends.
 
         Args:
             t: Times, s, finite, of any shape and sign.
@@ -166,7 +166,7 @@ class FingertipPath:
         return self._derivative(t, 1)
 
     def acceleration(self, t: ArrayLike) -> NDArray[np.float64]:
-        """How the velocity changes; 0 before a path begins and after it ended.
+        """Return the acceleration of the point; 0 before an open path begins and after it ends.
 
         Args:
             t: Times, s, finite, of any shape and sign.
@@ -182,7 +182,7 @@ class FingertipPath:
     def _derivative(self, t: ArrayLike, order: int) -> NDArray[np.float64]:
         times = np.asarray(t, dtype=np.float64)
         if not np.isfinite(times).all():
-            raise PathError("A path is asked for finite times in s, got NaN or infinity.")
+            raise PathError("Times of a path must be finite, got NaN or infinity.")
         flat = times.ravel()
         within = np.mod(flat, self.duration_s) if self.closed else flat.clip(0.0, self.duration_s)
         points = self.motion.derivative(within, order)
@@ -194,41 +194,43 @@ class FingertipPath:
 def sample(
     path: FingertipPath, hz: float, duration_s: float | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times and points of a path, evenly and from end to end.
+    """Sample a path at even times from its beginning to its end.
 
     Args:
-        path: What is sampled.
-        hz: Samples in a second, above 0. Where they do not fit into the time they come a little
-            closer together, so that beginning and end are both among them.
-        duration_s: How long, s, above 0; once round, or until the path ends, if left out.
+        path: The path.
+        hz: Samples per second, above 0; rounded up so that both ends are included.
+        duration_s: Duration, s, above 0; by default one period, or until the path ends.
 
     Returns:
         Times from 0 on, s, shape (n,), and positions, m, shape (n, 3), with n at least 2.
 
     Raises:
-        PathError: If `hz` or `duration_s` is no finite number above 0, or is left out for a path
-            that goes on for ever.
+        PathError: If `hz` or `duration_s` is not a finite number above 0, or the duration of an
+            endless path is missing.
     """
     hz = positive("hz", hz)
     length = path.duration_s if duration_s is None else positive("duration_s", duration_s)
     if math.isinf(length):
-        raise PathError("This path neither ends nor repeats: say for how long, with duration_s.")
+        raise PathError("This path neither ends nor repeats, so it needs duration_s.")
     steps = max(1, math.ceil(length * hz - 1e-9))  # 1.1 s at 50 Hz are 55.00000000000001 steps.
     times = np.linspace(0.0, length, steps + 1)
     return times, path.at(times)
 
 
 FASTEST_MPS: Final = 2.0
-"""The fastest that a path may be, m/s: a fingertip 0.1 m from its knuckle turns at 20 rad/s."""
+"""Speed limit of paths, m/s: a fingertip 0.1 m from its knuckle at 20 rad/s.
+
+A faster path is a jump, or has wrong units.
+"""
 
 
 def jumps(distance_m: float, seconds: float) -> bool:
-    """Whether that distance, m, at least 0, in that time, s, at least 0, is a jump."""
+    """Return whether a distance, m, is too far for a time, s."""
     return distance_m > FASTEST_MPS * seconds
 
 
 def too_fast(distance_m: float, seconds: float) -> str:
-    """What to say of a jump of that distance, m, in that time, s: the end of a sentence."""
+    """Return the end of a sentence about a distance, m, that is too far for a time, s."""
     return (
         f"the point moves {distance_m:.3g} m in {seconds:.3g} s, and no fingertip is faster than "
         f"{FASTEST_MPS:g} m/s"

@@ -1,7 +1,6 @@
-"""Circle, figure eight, line and a curve in three dimensions: closed, smooth, and known exactly.
+"""Circle, figure eight, line and a three-dimensional curve: closed, smooth and known exactly.
 
-Where nothing else is asked for they lie before the pulp of a bent index finger, in the plane in
-which it bends.
+By default they lie in front of the pulp of a bent index finger, in the plane in which it bends.
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ __all__ = ["Harmonics", "circle", "curve_3d", "figure_eight", "line"]
 
 @dataclass(frozen=True, slots=True)
 class Harmonics:
-    """A Fourier series.
+    """Motion as a Fourier series.
 
     At the angle a = 2π `hz` t + `phase` the point is at
     `centre` + Σ (cos(k a) `cosines[k - 1]` + sin(k a) `sines[k - 1]`), with k = 1, 2, …
 
     Attributes:
-        hz: Rounds in a second, above 0.
-        phase: Where on the round it begins, rad.
-        centre: The middle over time, m.
-        cosines: What goes with the cosine of each multiple of the angle, m.
-        sines: What goes with its sine, m; as many.
+        hz: Periods per second, above 0.
+        phase: Phase at 0 s, rad.
+        centre: Mean position, m.
+        cosines: Coefficients of the cosines, m.
+        sines: Coefficients of the sines, m; as many.
     """
 
     hz: float
@@ -50,10 +49,15 @@ class Harmonics:
     sines: tuple[Vector, ...]
 
     def derivative(self, t: Times, order: int) -> Points:
-        """Position, velocity or acceleration, as `Motion` says, at times of any size and sign."""
+        """Return position, velocity or acceleration, as in `PathMotion`, at any times.
+
+        Args:
+            t: Times, s, shape (n,).
+            order: 0, 1 or 2.
+        """
         multiples = np.arange(1.0, len(self.cosines) + 1.0)
         rates = math.tau * self.hz * multiples  # rad/s, shape (k,).
-        # Each derivative of a sine or cosine is a quarter of a turn ahead, and grows by the rate.
+        # Each derivative of a sine or cosine is a quarter turn ahead, times the rate.
         angles = rates * t[:, None] + self.phase * multiples + order * math.pi / 2.0
         grown = rates**order
         points = (grown * np.cos(angles)) @ np.array(self.cosines)
@@ -78,17 +82,17 @@ def circle(
     normal: Vector = _RADIAL,
     phase: float = 0.0,
 ) -> FingertipPath:
-    """A circle, at a steady speed.
+    """Return a circle at constant speed.
 
-    It begins on its distal side (on its dorsal side, if `normal` points along x) and goes round
-    `normal` as a right hand's fingers go round its thumb: with the usual one palmar first.
+    It begins on its distal side (on its dorsal side if `normal` points along x) and turns around
+    `normal` by the right-hand rule: by default towards the palm first.
 
     Args:
         radius: m, above 0.
         centre: m, in the frame of the finger.
-        hz: Rounds in a second, above 0.
-        normal: At a right angle to its plane; of any length but 0.
-        phase: How much further on it begins, rad.
+        hz: Turns per second, above 0.
+        normal: Normal of its plane, of any length except 0.
+        phase: Phase at 0 s, rad.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
@@ -105,18 +109,18 @@ def figure_eight(
     normal: Vector = _RADIAL,
     phase: float = 0.0,
 ) -> FingertipPath:
-    """A figure eight that lies on its side: the lemniscate of Gerono.
+    """Return a horizontal figure eight: the lemniscate of Gerono.
 
-    It begins where it crosses itself, towards its distal loop. Seen from where `normal` points to,
-    it goes round the distal loop clockwise and round the other one counter-clockwise.
+    It begins at its crossing, towards its distal loop. Seen against `normal`, it runs clockwise
+    around the distal loop and counter-clockwise around the other.
 
     Args:
         size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
             wide.
-        centre: Where it crosses itself, m, in the frame of the finger.
-        hz: Rounds in a second, above 0: both loops are one round.
-        normal: At a right angle to its plane; of any length but 0.
-        phase: How much further on it begins, rad.
+        centre: Place of the crossing, m, in the finger's frame.
+        hz: Periods per second, above 0; one period covers both loops.
+        normal: Normal of its plane, of any length except 0.
+        phase: Phase at 0 s, rad.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
@@ -158,18 +162,18 @@ def curve_3d(
     normal: Vector = _RADIAL,
     phase: float = 0.0,
 ) -> FingertipPath:
-    """A figure eight that is bent out of its plane: a Lissajous curve in three dimensions.
+    """Return a figure eight bent out of its plane: a three-dimensional Lissajous curve.
 
-    It is `figure_eight`, with both loops bent towards `normal` and the crossing away from it.
+    Compared with `figure_eight`, both loops are bent towards `normal`, and the crossing away.
 
     Args:
         size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
             wide.
-        depth: How far it reaches along `normal`, m, above 0: half of it to each side.
-        centre: The middle, m, in the frame of the finger.
-        hz: Rounds in a second, above 0: both loops are one round.
-        normal: At a right angle to the plane out of which it is bent; of any length but 0.
-        phase: How much further on it begins, rad.
+        depth: Its extent along `normal`, m, above 0: half of it to each side.
+        centre: The middle, m, in the finger's frame.
+        hz: Periods per second, above 0; one period covers both loops.
+        normal: Normal of the plane out of which it is bent, of any length except 0.
+        phase: Phase at 0 s, rad.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
@@ -183,11 +187,11 @@ def curve_3d(
 
 
 def _axes(normal: Vector) -> _Axes:
-    """Along, across and out of the plane: right-handed, and along is as near to x as it can be."""
+    """Return unit vectors along, across and out of a plane: right-handed, the first close to x."""
     out: NDArray[np.float64] = np.array(vector("The normal of a plane", normal))
     if not out.any():
         raise PathError("The normal of a plane must not be (0, 0, 0): it has no direction.")
-    out /= np.abs(out).max()  # First, as the square of a small number may be 0.
+    out /= np.abs(out).max()  # First, because the square of a small number may be 0.
     out /= np.linalg.norm(out)
     along: NDArray[np.float64] = np.array([1.0, 0.0, 0.0])
     along -= out[0] * out
@@ -206,7 +210,19 @@ def _closed(
     cosines: list[NDArray[np.float64]],
     sines: list[NDArray[np.float64]],
 ) -> FingertipPath:
-    """A path of oscillations, unless no finger is so fast."""
+    """Return a closed path of oscillations around a centre.
+
+    Args:
+        what: Name of the shape, for messages.
+        hz: Periods per second.
+        phase: Phase at 0 s, rad.
+        centre: Mean position, m.
+        cosines: Coefficients of the cosines, m.
+        sines: Coefficients of the sines, m.
+
+    Raises:
+        PathError: If an argument is out of its range, or the path too fast.
+    """
     n = max(len(cosines), len(sines))
     hz = positive(f"The hz of a {what}", hz)
     motion = Harmonics(

@@ -1,4 +1,4 @@
-"""A path that is a function of the user's."""
+"""Paths from functions, CSV files, names and settings."""
 
 from __future__ import annotations
 
@@ -47,26 +47,30 @@ _SHORTEST_S: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """Motion as a function says; its derivatives come from differences.
+    """Motion by a function, with derivatives by differences.
 
     Attributes:
-        function: Takes a time in s, gives x, y and z in m.
-        duration_s: Up to where it may be asked, s, above 0; infinite for always.
+        function: Maps a time in s to x, y and z in m.
+        duration_s: End of its domain, s, above 0; infinite for none.
     """
 
     function: Callable[[float], ArrayLike]
     duration_s: float
 
     def derivative(self, t: Times, order: int) -> Points:
-        """Position, velocity or acceleration, as `Motion` says.
+        """Return position, velocity or acceleration, as in `PathMotion`.
+
+        Args:
+            t: Times, s, shape (n,).
+            order: 0, 1 or 2.
 
         Raises:
-            PathError: If the function gives something else than three finite numbers.
+            PathError: If the function does not return three finite numbers.
         """
         if order == 0:
             return np.array([self.point(float(now)) for now in t]).reshape(-1, 3)
-        # A polynomial through five points around the time: at both ends the time is not in their
-        # middle, as the function may know nothing beyond.
+        # A polynomial through five points around the time. At both ends of the domain the time is
+        # not in their middle.
         step = min(_STEP_S, self.duration_s / 4.0)
         middle = t.clip(2.0 * step, self.duration_s - 2.0 * step)
         nodes = (middle + step * _NODES[:, None]).clip(0.0, self.duration_s)
@@ -80,10 +84,10 @@ class Function:
         return np.einsum("kn,kj,jnd->nd", powers[order] / step**order, _COEFFICIENTS, values)
 
     def point(self, t: float) -> Points:
-        """Where the point is at one time, m, shape (3,).
+        """Return the position at one time, m, shape (3,).
 
         Raises:
-            PathError: If the function gives something else than three finite numbers.
+            PathError: If the function does not return three finite numbers.
         """
         given = self.function(t)
         try:
@@ -92,8 +96,8 @@ class Function:
             point = np.empty(0)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise PathError(
-                "The function of a path must give three finite numbers (x, y, z) in m, and at "
-                f"{t:.6g} s it gave {given!r}."
+                "The function of a path must return three finite numbers (x, y, z) in m, and at "
+                f"{t:.6g} s it returned {given!r}."
             )
         return point
 
@@ -103,29 +107,27 @@ def from_callable(
     duration_s: float | None = None,
     period_s: float | None = None,
 ) -> FingertipPath:
-    """A path that a function describes.
+    """Create a path from a function of time.
 
-    It is tried out here, 500 times in a second and 10 000 times at most, and again where it is
-    least smooth; so a jump of a hundredth of a millimetre is found, but one that hides in a
-    rough function may not be. Velocity and acceleration come from differences over 4 ms, for which
-    the function should be smooth.
+    The function is sampled 500 times per second, at most 10 000 times, and more densely where it is
+    least smooth. This finds jumps of 0.01 mm, except in rough functions. Velocity and acceleration
+    are differences over 4 ms, so the function should be smooth at that scale.
 
     Args:
-        function: Takes a time in s, from 0 to the end, and gives x, y and z in the frame of the
-            finger, m. The same time must always give the same point.
-        duration_s: When the path ends, s, above 0: after that the point stays.
-        period_s: After how long it repeats, s, above 0: the point must be back, within 0.1 mm.
-            Only one of the two; with neither, the path goes on for ever, and its first 10 s are
-            tried out.
+        function: Maps a time in s, from 0 to the end, to x, y and z in the finger's frame, m. It
+            must be deterministic.
+        duration_s: End of the path, s, above 0; the point rests there afterwards.
+        period_s: Period, s, above 0; the point must be back after it, within 0.1 mm. Give only one
+            of the two; without either, the path is endless, and its first 10 s are checked.
 
     Raises:
-        PathError: If it gives something else than three finite numbers, jumps, is faster than
-            `FASTEST_MPS`, or is not back after `period_s`; if a time is no finite number above 0,
-            or both are given.
+        PathError: If the function does not return three finite numbers, jumps, is faster than
+            `FASTEST_MPS`, or is not back after `period_s`; if a time is not a finite number above
+            0, or both are given.
     """
     if duration_s is not None and period_s is not None:
         raise PathError(
-            "A path ends after duration_s or repeats after period_s, got both: leave one out."
+            "A path ends after duration_s or repeats after period_s; give only one of them."
         )
     length = math.inf
     if duration_s is not None:
@@ -138,15 +140,15 @@ def from_callable(
         apart = math.dist(motion.point(0.0), motion.point(length))
         if apart > CLOSED_M:
             raise PathError(
-                f"After its period of {length:.6g} s the path is {apart * 1e3:.3g} mm from where "
-                f"it began, and {CLOSED_M * 1e3:g} mm are allowed: give another period_s, or its "
-                "end as duration_s."
+                f"After its period of {length:.6g} s the path is {apart * 1e3:.3g} mm from its "
+                f"beginning, and {CLOSED_M * 1e3:g} mm are allowed: give another period_s, or "
+                "duration_s for an open path."
             )
     return FingertipPath(motion, length, closed=period_s is not None)
 
 
 def _require_continuous(motion: Function) -> None:
-    """Try a function out.
+    """Check a function for jumps.
 
     Raises:
         PathError: If it jumps.
@@ -165,10 +167,15 @@ def _require_continuous(motion: Function) -> None:
 
 
 def _require_no_jump(motion: Function, start: float, end: float) -> None:
-    """Look closer and closer at where it goes furthest: only a jump stays as far.
+    """Bisect an interval towards its largest change: only a jump does not shrink.
+
+    Args:
+        motion: The motion.
+        start: Beginning of the interval, s.
+        end: End of the interval, s.
 
     Raises:
-        PathError: If it does.
+        PathError: If it contains a jump.
     """
     first, last = motion.point(start), motion.point(end)
     while True:
@@ -187,12 +194,15 @@ def _require_no_jump(motion: Function, start: float, end: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spline:
-    """Cubic pieces that meet with the same velocity and acceleration; `through` makes one.
+    """Cubic spline with continuous velocity and acceleration; create it with `through`.
+
+    Formulas and names follow Press et al., Numerical Recipes, 3rd edition (2007), sections 2.4 and
+    3.3.
 
     Attributes:
         knots: Times of the points, s, increasing from 0, shape (n,), with n at least 3.
         points: m, shape (n, 3).
-        bends: Accelerations at the points, m/s², shape (n, 3); in between they change linearly.
+        bends: Accelerations at the points, m/s², shape (n, 3); linear in between.
     """
 
     knots: Times = field(repr=False)
@@ -201,13 +211,13 @@ class Spline:
 
     @classmethod
     def through(cls, knots: Times, points: Points, periodic: bool) -> Spline:
-        """The smoothest curve through points.
+        """Return the spline through points.
 
         Args:
             knots: Their times, s, increasing from 0, shape (n,), with n at least 3.
-            points: m, shape (n, 3). Of a periodic spline the last is the first.
-            periodic: Whether velocity and acceleration are the same at both ends, as of a closed
-                path; otherwise both ends have no acceleration ("natural").
+            points: m, shape (n, 3). For a periodic spline the last equals the first.
+            periodic: Whether velocity and acceleration are equal at both ends; otherwise the
+                acceleration is 0 there ("natural" spline).
         """
         knots, points = knots.copy(), points.copy()
         bends = _bends(knots, points, periodic)
@@ -216,10 +226,15 @@ class Spline:
         return cls(knots, points, bends)
 
     def derivative(self, t: Times, order: int) -> Points:
-        """Position, velocity or acceleration, as `Motion` says."""
+        """Return position, velocity or acceleration, as in `PathMotion`.
+
+        Args:
+            t: Times, s, shape (n,).
+            order: 0, 1 or 2.
+        """
         piece = (np.searchsorted(self.knots, t, side="right") - 1).clip(0, len(self.knots) - 2)
         h = (self.knots[piece + 1] - self.knots[piece])[:, None]
-        b = (t - self.knots[piece])[:, None] / h  # How much of the piece is over, 0 to 1.
+        b = (t - self.knots[piece])[:, None] / h  # Elapsed fraction of the piece, 0 to 1.
         a = 1.0 - b
         y0, y1 = self.points[piece], self.points[piece + 1]
         m0, m1 = self.bends[piece], self.bends[piece + 1]
@@ -231,18 +246,20 @@ class Spline:
 
 
 def _bends(knots: Times, points: Points, periodic: bool) -> Points:
-    """Accelerations at the knots with which the pieces meet at one velocity, m/s², shape (n, 3).
+    """Return the accelerations at the knots that make the velocity continuous, m/s², (n, 3).
 
     Inside, h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] - slope[i-1]). The
-    accelerations at both ends are one unknown: 0 in a natural spline; in a periodic one the same
-    equation holds across the seam, where all others depend on the unknown linearly.
+    acceleration at both ends is one unknown: 0 in a natural spline; in a periodic one the same
+    equation holds across the seam, on which all others depend linearly.
     """
     h = np.diff(knots)
     slopes = np.diff(points, axis=0) / h[:, None]
-    right = np.zeros((len(h) - 1, 4))  # Three of the points, one of the unknown at the ends.
+    right = np.zeros(
+        (len(h) - 1, 4)
+    )  # Three columns for the points, one for the unknown at the ends.
     right[:, :3] = 6.0 * np.diff(slopes, axis=0)
     right[0, 3] -= h[0]
-    right[-1, 3] -= h[-1]  # Of three points the inner one has the unknown at both sides.
+    right[-1, 3] -= h[-1]  # With three points, the inner one has the unknown on both sides.
     solved = _tridiagonal(2.0 * (h[:-1] + h[1:]), h[1:-1], right)
     alone, influence = solved[:, :3], solved[:, 3:]
     end = np.zeros(3)
@@ -255,11 +272,11 @@ def _bends(knots: Times, points: Points, periodic: bool) -> Points:
 def _tridiagonal(
     diagonal: NDArray[np.float64], beside: NDArray[np.float64], right: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Solve symmetric equations in which each unknown knows only its neighbours.
+    """Solve a symmetric tridiagonal system.
 
     Args:
-        diagonal: Shape (n,); each larger than the numbers beside it together.
-        beside: Between an unknown and the next, shape (n - 1,).
+        diagonal: Shape (n,); each larger than the sum of the numbers beside it.
+        beside: Off-diagonal, shape (n - 1,).
         right: Right-hand sides, shape (n, k).
 
     Returns:
@@ -283,22 +300,22 @@ _GAP: Final = 5.0  # Times the median step.
 
 
 def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
-    """The path in a CSV file.
+    """Read a path from a CSV file.
 
-    Its first line names the columns `t`, `x`, `y` and `z`, in any order: time in s, position in the
-    frame of the finger in m. The steps in time may differ. Between the rows the path is a cubic
-    spline: velocity and acceleration are continuous. Time counts from the first row. A path that
-    ends within 0.1 mm of where it begins is closed, and repeats: the spline is periodic, and goes
-    through the middle of its first and last point. Another one ends with its last row.
+    The first line names the columns `t`, `x`, `y` and `z`, in any order: time in s, position in the
+    finger's frame in m. Time steps may vary. A cubic spline connects the rows, with continuous
+    velocity and acceleration. Time counts from the first row. A path that ends within 0.1 mm of its
+    beginning is closed: its spline is periodic, and passes through the middle of the first and last
+    point. An open path ends with its last row.
 
     Args:
-        path: The file, in UTF-8. Empty lines are skipped.
+        path: The file, in UTF-8; empty lines are skipped.
 
     Raises:
-        PathError: If the file cannot be read, lacks a column, has another one or one twice, or has
-            fewer than three rows; if a cell is no finite number; if time runs backwards or stands
-            still; if a step in time is more than five times the median one; if the point is faster
-            than `FASTEST_MPS`. The sentence names the line.
+        PathError: If the file cannot be read, has missing, unknown or repeated columns, or fewer
+            than three rows; if a cell is not a finite number; if time does not increase; if a time
+            step is more than five times the median; or if the point is faster than `FASTEST_MPS`.
+            The message names the line.
     """
     name = os.fspath(path)
     lines, rows = _rows(name, _text(name))
@@ -317,15 +334,15 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
 
 def _text(name: str) -> str:
     try:
-        return pathlib.Path(name).read_text(encoding="utf-8-sig")  # Spreadsheets write the mark.
+        return pathlib.Path(name).read_text("utf-8-sig")  # Spreadsheets write a mark.
     except OSError as error:
         raise PathError(f"{name} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        raise PathError(f"{name} is no text in UTF-8: {error.reason}.") from error
+        raise PathError(f"{name} is not UTF-8 text: {error.reason}.") from error
 
 
 def _rows(name: str, text: str) -> tuple[list[int], list[list[float]]]:
-    """Line numbers and rows of t, x, y, z."""
+    """Return line numbers, and rows of t, x, y and z."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     lines: list[int] = []
     rows: list[list[float]] = []
@@ -345,22 +362,22 @@ def _rows(name: str, text: str) -> tuple[list[int], list[list[float]]]:
             )
             lines.append(reader.line_num)
     except csv.Error as error:
-        raise PathError(f"{name}, line {reader.line_num}, is no line of a CSV: {error}.") from error
+        raise PathError(f"{name}, line {reader.line_num}, is not valid CSV: {error}.") from error
     if order is None:
         raise PathError(f"{name} is empty: {_HEADER}.")
     return lines, rows
 
 
 def _order(found: Sequence[str], where: str) -> list[int]:
-    """Where in a line t, x, y and z are."""
+    """Return the columns of t, x, y and z."""
     missing = [name for name in _COLUMNS if name not in found]
     surplus = [name for name in found if name not in _COLUMNS]
     twice = [name for name in _COLUMNS if found.count(name) > 1]
-    said = [f"lacks {', '.join(missing)}"] if missing else []
-    said += [f"has {', '.join(map(repr, surplus))} too much"] if surplus else []
-    said += [f"has {', '.join(twice)} twice"] if twice else []
-    if said:
-        raise PathError(f"{where} {' and '.join(said)}: {_HEADER}.")
+    problems = [f"lacks {', '.join(missing)}"] if missing else []
+    problems += [f"has the unknown columns {', '.join(map(repr, surplus))}"] if surplus else []
+    problems += [f"has {', '.join(twice)} twice"] if twice else []
+    if problems:
+        raise PathError(f"{where} {' and '.join(problems)}: {_HEADER}.")
     return [found.index(name) for name in _COLUMNS]
 
 
@@ -368,14 +385,22 @@ def _number(cell: str, column: str, where: str) -> float:
     try:
         number = float(cell)
     except ValueError as error:
-        raise PathError(f"{where}: {column} is {cell!r}, which is no number.") from error
+        raise PathError(f"{where}: {column} is {cell!r}, which is not a number.") from error
     if not math.isfinite(number):
         raise PathError(f"{where}: {column} is {cell!r}, which is not finite.")
     return number
 
 
 def _require_steady(times: Times, where: Sequence[str]) -> None:
-    """Refuse time that does not run on, and gaps in it; `where` names each row."""
+    """Refuse times that do not increase, and gaps.
+
+    Args:
+        times: Times of the rows, s.
+        where: File and line of each row, for messages.
+
+    Raises:
+        PathError: If time stands still, runs backwards or has a gap.
+    """
     steps = np.diff(times)
     for i in np.flatnonzero(steps <= 0.0).tolist():
         how = "stands still" if steps[i] == 0.0 else "runs backwards"
@@ -383,13 +408,22 @@ def _require_steady(times: Times, where: Sequence[str]) -> None:
     median = float(np.median(steps))
     for i in np.flatnonzero(steps > _GAP * median).tolist():
         raise PathError(
-            f"{where[i + 1]}: {steps[i]:.3g} s have passed since the row before, a gap: the median "
-            f"is {median:.3g} s, and {_GAP:g} times as much is allowed."
+            f"{where[i + 1]}: the time step of {steps[i]:.3g} s is a gap: the median is "
+            f"{median:.3g} s, and {_GAP:g} times as much is allowed."
         )
 
 
 def _require_slow(times: Times, points: Points, where: Sequence[str]) -> None:
-    """Refuse jumps; `where` names each row."""
+    """Refuse jumps.
+
+    Args:
+        times: Times of the rows, s.
+        points: Their points, m.
+        where: File and line of each row, for messages.
+
+    Raises:
+        PathError: If the point is faster than `FASTEST_MPS`.
+    """
     for i in range(1, len(where)):
         seconds, distance = float(times[i] - times[i - 1]), math.dist(points[i], points[i - 1])
         if jumps(distance, seconds):
@@ -399,7 +433,7 @@ def _require_slow(times: Times, points: Points, where: Sequence[str]) -> None:
 
 
 PathSource = FingertipPath | str | PurePath | Mapping[str, Any] | Callable[[float], ArrayLike]
-"""A path, its name, a CSV file, a name with settings, or a function of time."""
+"""A path, the name of a shape, a CSV file, a name with settings, or a function of time."""
 
 _MAKERS: Final[dict[str, Callable[..., FingertipPath]]] = {
     "circle": circle,
@@ -416,26 +450,25 @@ _FILE: Final = ".csv"
 
 
 def as_path(value: PathSource) -> FingertipPath:
-    """A path, however it was given.
+    """Return a path from any of its sources.
 
     Args:
         value: A path; the name of a shape, one of `KINDS`; a mapping with that name as "kind" and
             with arguments of the function that makes the shape, such as
             `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a file that ends in .csv,
-            as `from_csv` reads it; or a function, as `from_callable` takes it, which goes on for
-            ever.
+            as `from_csv` reads it; or a function for `from_callable`, endless.
 
     Raises:
         UnknownName: If there is no such shape, or it has no such setting.
-        PathError: If it is none of these, or no path can be made of it.
+        PathError: If it is none of these, or the path is invalid.
     """
-    given: Any = value  # What a type checker knows, a notebook may not.
+    given: Any = value  # May be anything where nothing checks types.
     if isinstance(given, FingertipPath):
         return given
     if isinstance(given, (str, PurePath)) and str(given).lower().endswith(_FILE):
         return from_csv(given)
     if isinstance(given, PurePath):
-        raise PathError(f"A path is read from a file that ends in {_FILE}, got {str(given)!r}.")
+        raise PathError(f"A path file must end in {_FILE}, got {str(given)!r}.")
     if isinstance(given, str):
         return _maker(given)()
     if isinstance(given, Mapping):
@@ -443,7 +476,7 @@ def as_path(value: PathSource) -> FingertipPath:
     if callable(given):
         return from_callable(cast("Callable[[float], ArrayLike]", given))
     raise PathError(
-        f"A path is one of {', '.join(KINDS)}, such a name with settings, a {_FILE} file or a "
+        f"A path must be one of {', '.join(KINDS)}, such a name with settings, a {_FILE} file or a "
         f"function of time, got {given!r}."
     )
 
@@ -451,7 +484,7 @@ def as_path(value: PathSource) -> FingertipPath:
 def _with_settings(settings: dict[Any, Any]) -> FingertipPath:
     if _KIND not in settings:
         raise PathError(
-            f'A path with settings has the key "{_KIND}", one of {", ".join(KINDS)}, got '
+            f'A path with settings needs the key "{_KIND}", one of {", ".join(KINDS)}, got '
             f"{settings!r}."
         )
     kind = str(settings.pop(_KIND))

@@ -1,4 +1,4 @@
-"""How the numbers of two bodies correspond, so that a policy can cross from one to the other.
+"""Maps between the observations and actions of two bodies, matched by name.
 
 >>> from shapechanger.layout import Feature, Layout
 >>> short = Layout((Feature("hip/angle", "rad"),))

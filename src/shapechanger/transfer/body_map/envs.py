@@ -1,4 +1,4 @@
-"""Body maps between Gymnasium envs, and the target env as a source policy sees it."""
+"""Body maps of Gymnasium envs, and the wrapper that gives a target env the source's spaces."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ def body_map(
     otherwise: RuleLike = Zero(),  # noqa: B008 - frozen, so sharing it is safe.
     units: Units = "same",
 ) -> BodyMap:
-    """Match the features of two envs by name, see `BodyMap.between`.
+    """Match the features of two envs by name; see `BodyMap.between`.
 
     Args:
-        source_env: The env that a policy was learned on.
-        target_env: The env that it is to act in.
-        rules: For a name or a glob its rule.
-        observation_rules: The same for source observation features only.
-        action_rules: The same for target action features only.
-        otherwise: What to do with a feature that nothing matches.
-        units: What the action numbers keep: their value, or the torque they give.
+        source_env: The env that a policy was trained in.
+        target_env: The env that it acts in.
+        rules: Rules by name or glob.
+        observation_rules: Rules of source observation features only.
+        action_rules: Rules of target action features only.
+        otherwise: The rule of features that nothing matches.
+        units: What the action numbers preserve: their value, or the torque.
 
     Raises:
         MapError: If an env publishes no layouts, or the two cannot be mapped.
-        UnknownName: If a rule fits no feature, or takes one that is not there.
+        UnknownName: If a rule matches no feature, or copies one that does not exist.
     """
     return BodyMap.between(
         _published(source_env, "observation_layout"),
@@ -66,31 +66,38 @@ def wrap(
     observation_space: Box | None = None,
     action_space: Box | None = None,
 ) -> MappedEnv:
-    """The target env with the source's spaces, see `MappedEnv`."""
+    """Give a target env the source's spaces; see `MappedEnv`.
+
+    Args:
+        target_env: The target env.
+        body_map: Map between the bodies.
+        observation_space: As in `MappedEnv`.
+        action_space: As in `MappedEnv`.
+    """
     return MappedEnv(
         target_env, body_map, observation_space=observation_space, action_space=action_space
     )
 
 
 class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
-    """A target env in which a policy of the source acts unchanged.
+    """Target env in which a policy of the source acts unchanged.
 
-    Its observations are what the source body would sense, in float64; its actions are the
-    source's. Rewards, ends and infos are those of the target.
+    Observations are those of the source body, in float64; actions are the source's. Rewards,
+    terminations and infos are those of the target.
 
     Attributes:
-        body_map: How the two bodies correspond.
+        body_map: Map between the two bodies.
 
     Args:
         env: The target env.
-        body_map: How the bodies correspond; as JSON too, so that a spec can be written down.
-            Gymnasium cannot write down a spec that holds spaces.
+        body_map: Map between the bodies, or its JSON, so that Gymnasium can serialise the spec; it
+            cannot serialise spaces.
         observation_space: The source's, shape (source_observation.size,); by default a float64
             box with the ranges of its layout.
         action_space: The source's, shape (source_action.size,); by default a float32 box.
 
     Raises:
-        SpaceMismatch: If a space has not the size of its layout.
+        SpaceMismatch: If a space does not have the size of its layout.
     """
 
     def __init__(
@@ -125,23 +132,23 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
     @property
     def observation_layout(self) -> Layout:
-        """What the numbers of an observation mean: the source's layout."""
+        """The source's observation layout."""
         return self.body_map.source_observation
 
     @property
     def action_layout(self) -> Layout:
-        """What the numbers of an action mean: the source's layout."""
+        """The source's action layout."""
         return self.body_map.source_action
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Start an episode of the target env."""
+        """Reset the target env."""
         observation, info = self.env.reset(seed=seed, options=options)
         return self._sensed(observation), info
 
     def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Act on the target as the source's action says.
+        """Step the target env with an action of the source.
 
         Args:
             action: An action of the source, shape (source_action.size,).
@@ -155,28 +162,33 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
 
 def _published(env: gym.Env[Any, Any], name: str) -> Layout:
-    """The layout that an env, or the outermost wrapper that has one, publishes."""
+    """The layout that an env, or its outermost wrapper with one, publishes."""
     try:
         layout = env.get_wrapper_attr(name)
     except AttributeError:
         layout = None
     if not isinstance(layout, Layout):
         raise MapError(
-            f"{env} publishes no {name}: give {type(env.unwrapped).__name__} a property of that "
-            "name, which is a shapechanger.layout.Layout."
+            f"{env} publishes no {name}: add a property of that name and of type "
+            f"shapechanger.layout.Layout to {type(env.unwrapped).__name__}."
         )
     return layout
 
 
 def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
-    """The space, if it is flat and of the size of its layout.
+    """Return the space if it is flat and of the size of its layout.
+
+    Args:
+        which: Name of the space in messages, such as "target observation".
+        space: The space.
+        layout: Its layout.
 
     Raises:
         SpaceMismatch: If it is not.
     """
     if not isinstance(space, Box) or space.shape != (layout.size,):
         raise SpaceMismatch(
-            f"The {which} layout holds {layout.size} numbers: "
-            f"the space must be a Box of the shape ({layout.size},), and is {space}."
+            f"The layout of the {which} has {layout.size} numbers, so its space must be a Box of "
+            f"shape ({layout.size},), not {space}."
         )
     return cast("Box[Any]", space)

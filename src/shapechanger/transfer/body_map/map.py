@@ -1,4 +1,4 @@
-"""How the observations and actions of two bodies correspond."""
+"""`BodyMap`: the map between the observations and actions of two bodies."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import MapError
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import matching as toml
-from shapechanger.transfer.body_map.matching import Units, check_patterns, constant_rule, resolve
+from shapechanger.transfer.body_map.matching import (
+    Units,
+    check_patterns,
+    constant_rule,
+    read_toml,
+    resolve,
+    write_toml,
+)
 from shapechanger.transfer.body_map.rules import (
     BY_DEFAULT,
     SAME_NAME,
@@ -36,7 +42,12 @@ __all__ = ["BodyMap", "MapRow", "compose_entries", "invert_entries"]
 
 
 def compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
-    """Replace each feature that `outer` takes by what `inner` fills it with."""
+    """Replace each feature that `outer` copies by its rule in `inner`.
+
+    Args:
+        outer: Entries of the second map.
+        inner: Entries of the first map.
+    """
     filled_by = {entry.feature: entry for entry in inner}
     result: list[MapEntry] = []
     for entry in outer:
@@ -53,34 +64,39 @@ def compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tup
 def invert_entries(
     side: Side, entries: Sequence[MapEntry], otherwise: RuleLike
 ) -> tuple[MapEntry, ...]:
-    """For each feature of `side.over` a rule over `side.into`.
+    """Return for each feature of `side.over` a rule over `side.into`.
+
+    Args:
+        side: The half of the map.
+        entries: Its entries.
+        otherwise: The rule of a feature that no entry copies.
 
     Raises:
-        MapError: If a feature is taken more than once, and by none of the same name.
+        MapError: If a feature is copied more than once, but not under its own name.
     """
-    takers: dict[str, list[tuple[MapEntry, float]]] = {}
+    copies: dict[str, list[tuple[MapEntry, float]]] = {}
     for entry in entries:
         if isinstance(entry.rule, Copy):
-            takers.setdefault(entry.rule.feature, []).append((entry, entry.rule.scale))
+            copies.setdefault(entry.rule.feature, []).append((entry, entry.rule.scale))
     return tuple(
-        _backwards(feature, takers.get(feature.name, []), otherwise) for feature in side.over
+        _backwards(feature, copies.get(feature.name, []), otherwise) for feature in side.over
     )
 
 
 def _backwards(
-    feature: Feature, takers: list[tuple[MapEntry, float]], otherwise: RuleLike
+    feature: Feature, copies: list[tuple[MapEntry, float]], otherwise: RuleLike
 ) -> MapEntry:
-    """The entry that gives `feature` back from what took it."""
-    if not takers:
+    """Recover `feature` from its copies."""
+    if not copies:
         return MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT)
-    namesakes = [taker for taker in takers if taker[0].feature == feature.name]
-    if len(takers) > 1 and not namesakes:
-        names = " and ".join(repr(entry.feature) for entry, _ in takers)
+    namesakes = [taker for taker in copies if taker[0].feature == feature.name]
+    if len(copies) > 1 and not namesakes:
+        names = " and ".join(repr(entry.feature) for entry, _ in copies)
         raise MapError(
-            f"{feature.name!r} is taken by {names}, and none of them bears its name: "
-            "the way back is not unique."
+            f"{feature.name!r} is copied to {names}, none of which has its name: "
+            "the inverse is not unique."
         )
-    entry, scale = (namesakes or takers)[0]
+    entry, scale = (namesakes or copies)[0]
     return MapEntry(feature.name, Copy(entry.feature, 1.0 / scale), entry.why)
 
 
@@ -90,8 +106,8 @@ class MapRow(NamedTuple):
     Attributes:
         side: "observation" or "action".
         entry: The feature that is filled.
-        rule: What fills it, in words.
-        why: Where the rule came from.
+        rule: Its rule as text.
+        why: Origin of the rule.
     """
 
     side: SideName
@@ -101,25 +117,24 @@ class MapRow(NamedTuple):
 
 
 class BodyMap(msgspec.Struct, frozen=True, dict=True):
-    """What lets a policy learned in a source body act in a target body.
+    """Map that lets a policy of a source body act in a target body.
 
-    The policy senses what it knows: each source observation feature is filled from target
-    observation features. What it does reaches the target: each target action feature is filled
-    from source action features. So both halves are affine:
+    Each source observation feature is filled from target observation features, and each target
+    action feature from source action features. Both halves are affine:
 
         o_source = M o_target + c        a_target = clip(N a_source + d)
 
     Attributes:
-        source_observation: What the source body senses.
-        target_observation: What the target body senses.
-        source_action: What the source body moves.
-        target_action: What the target body moves.
+        source_observation: Layout of the source's observations.
+        target_observation: Layout of the target's observations.
+        source_action: Layout of the source's actions.
+        target_action: Layout of the target's actions.
         observation: One rule for each feature of `source_observation`, in order.
         action: One rule for each feature of `target_action`, in order.
 
     Raises:
-        MapError: If a feature has no rule, or takes a block of another shape.
-        UnknownName: If a rule takes a feature that is not there.
+        MapError: If a feature has no rule, or copies a block of another shape.
+        UnknownName: If a rule copies a feature that does not exist.
     """
 
     source_observation: Layout
@@ -149,29 +164,28 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     ) -> BodyMap:
         """Match the features of two bodies by name.
 
-        A rule under the exact name of a feature comes first, then the partner of the same name,
-        then the first glob that fits, then `otherwise`.
+        A rule under the exact name of a feature takes precedence, then the partner of the same
+        name, then the first glob that matches, then `otherwise`.
 
         Args:
-            source_observation: What the source body senses.
-            target_observation: What the target body senses.
-            source_action: What the source body moves.
-            target_action: What the target body moves.
-            rules: For a name or a glob its rule, where names are those of source observation and
-                of target action features. A rule is a `Copy`, `Zero`, `Hold` or `Learn`, or one of
-                "zero", "hold" (the middle of the range), "learn" and "copy NAME"; the stars of
-                NAME are what the wildcards of the glob stood for, as in
-                `{"foot_*/motor": "copy ankle_*/motor"}`.
-            observation_rules: The same for source observation features only; they come first.
-            action_rules: The same for target action features only; they come first.
-            otherwise: What to do with a feature that nothing matches.
-            units: "same" hands on action numbers as they are. "torque" scales them by source gain
-                over target gain, so that they push as hard as they did in the source.
+            source_observation: Layout of the source's observations.
+            target_observation: Layout of the target's observations.
+            source_action: Layout of the source's actions.
+            target_action: Layout of the target's actions.
+            rules: Rules by name or glob of source observation and target action features. A rule is
+                a `Copy`, `Zero`, `Hold` or `Learn`, or one of "zero", "hold" (the middle of the
+                range), "learn" and "copy NAME"; stars in NAME stand for what the wildcards of the
+                glob matched, as in `{"foot_*/motor": "copy ankle_*/motor"}`.
+            observation_rules: Rules of source observation features only; they take precedence.
+            action_rules: Rules of target action features only; they take precedence.
+            otherwise: The rule of features that nothing matches.
+            units: "same" passes action numbers on unchanged. "torque" scales them by source gain
+                over target gain, so that they give the same torque as in the source.
 
         Raises:
             MapError: If a partner has another unit or shape, if a rule changes nothing, or if no
                 name occurs in both bodies.
-            UnknownName: If a rule fits no feature, or takes one that is not there.
+            UnknownName: If a rule matches no feature, or copies one that does not exist.
         """
         shared = dict(rules or {})
         on_observation, on_action = dict(observation_rules or {}), dict(action_rules or {})
@@ -197,7 +211,12 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def identity(cls, observation: Layout, action: Layout) -> BodyMap:
-        """The map of a body onto itself that changes nothing."""
+        """Return the identity map of a body.
+
+        Args:
+            observation: Layout of its observations.
+            action: Layout of its actions.
+        """
         return cls(
             source_observation=observation,
             target_observation=observation,
@@ -208,10 +227,10 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def adapt_observation(self, target_observation: ArrayLike) -> NDArray[Any]:
-        """What the source body would sense.
+        """Return the observation of the source body.
 
         Args:
-            target_observation: What the target body senses, shape (..., target_observation.size).
+            target_observation: Shape (..., target_observation.size).
 
         Returns:
             Shape (..., source_observation.size): float32 for float32, float64 for float64.
@@ -222,10 +241,10 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         return self._observation_gather(target_observation)
 
     def adapt_action(self, source_action: ArrayLike) -> NDArray[Any]:
-        """What the target body is to do, within its bounds.
+        """Return the action of the target body, clipped to its bounds.
 
         Args:
-            source_action: What the policy does, shape (..., source_action.size).
+            source_action: Shape (..., source_action.size).
 
         Returns:
             Shape (..., target_action.size): float32 for float32, float64 for float64.
@@ -258,9 +277,12 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         return _read_only(self._action_gather.offset)
 
     def then(self, following: BodyMap) -> BodyMap:
-        """The map from this source to the target of `following`.
+        """Compose: the map from this source to the target of `following`.
 
-        The body in the middle drops out, and with it the bounds of its actions.
+        The action bounds of the body in the middle no longer apply.
+
+        Args:
+            following: A map whose source is the target of this one.
 
         Raises:
             MapError: If the target of this map and the source of `following` mean different things.
@@ -277,16 +299,15 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
-        """The map from this target back to this source.
+        """Invert: the map from this target back to this source.
 
-        A feature that was taken once goes back; of one that was taken several times the feature of
-        the same name gives it back.
+        A feature that was copied several times is recovered from the copy of the same name.
 
         Args:
-            otherwise: What to do with a feature that was not taken: zero, hold or learn.
+            otherwise: The rule of a feature that was not copied: zero, hold or learn.
 
         Raises:
-            MapError: If a feature was taken several times, and by none of its name.
+            MapError: If a feature was copied several times, but not under its own name.
         """
         return BodyMap(
             source_observation=self.target_observation,
@@ -298,18 +319,21 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def with_symmetry(self, symmetry: Symmetry) -> BodyMap:
-        """The map through a symmetry of the source or the target, such as its mirror image.
+        """Return the map through a symmetry of the source or the target, such as its mirror image.
 
-        A policy of the source then acts as its mirror image would. For a symmetry that suits both
-        bodies the one of the source is meant.
+        A policy of the source then acts as its mirror image. A symmetry that fits both bodies is
+        applied to the source.
+
+        Args:
+            symmetry: The symmetry.
 
         Raises:
             MapError: If the symmetry belongs to neither body.
         """
-        if symmetry.suits(self.source_observation, self.source_action):
-            return _turned(symmetry, self.source_observation, self.source_action).then(self)
-        if symmetry.suits(self.target_observation, self.target_action):
-            return self.then(_turned(symmetry, self.target_observation, self.target_action))
+        if symmetry.fits(self.source_observation, self.source_action):
+            return _symmetry_map(symmetry, self.source_observation, self.source_action).then(self)
+        if symmetry.fits(self.target_observation, self.target_action):
+            return self.then(_symmetry_map(symmetry, self.target_observation, self.target_action))
         where = same_meaning(symmetry.observation_layout, self.source_observation) or same_meaning(
             symmetry.action_layout, self.source_action
         )
@@ -319,7 +343,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def table(self) -> tuple[MapRow, ...]:
-        """Each feature that is filled, its rule in words, and where that came from."""
+        """List each feature that is filled, its rule as text, and the origin of the rule."""
         sides: tuple[tuple[SideName, tuple[MapEntry, ...]], ...] = (
             ("observation", self.observation),
             ("action", self.action),
@@ -331,7 +355,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def __str__(self) -> str:
-        """The table, one line for each feature."""
+        """Format the table, one line for each feature."""
         rows = [MapRow._fields, *self.table()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return "\n".join(
@@ -340,13 +364,13 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def __repr__(self) -> str:
-        """How many features are filled by which rule."""
+        """Count the rules by kind."""
         return (
             f"BodyMap(observation: {_counted(self.observation)}; action: {_counted(self.action)})"
         )
 
     def to_json(self) -> str:
-        """The map with its four layouts as JSON."""
+        """Write the map with its four layouts as JSON."""
         return msgspec.json.encode(self).decode()
 
     @classmethod
@@ -354,7 +378,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         """Read what `to_json` wrote.
 
         Raises:
-            MapError: If the text is no map.
+            MapError: If the text is not a body map.
         """
         try:
             return msgspec.json.decode(text, type=cls)
@@ -362,8 +386,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             raise MapError(f"This is not a body map: {error}.") from error
 
     def to_toml(self) -> str:
-        """The rules as TOML, for a person to read and change; the layouts are not in it."""
-        return toml.write(self.observation, self.action)
+        """Write the rules as TOML, without the layouts, for editing by hand."""
+        return write_toml(self.observation, self.action)
 
     @classmethod
     def from_toml(
@@ -374,13 +398,20 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         source_action: Layout,
         target_action: Layout,
     ) -> BodyMap:
-        """Build a map by the rules of a TOML text, see `shapechanger.transfer.body_map.matching`.
+        """Build a map from rules in TOML; see `shapechanger.transfer.body_map.matching`.
+
+        Args:
+            text: The rules.
+            source_observation: Layout of the source's observations.
+            target_observation: Layout of the target's observations.
+            source_action: Layout of the source's actions.
+            target_action: Layout of the target's actions.
 
         Raises:
-            MapError: If the text is no TOML, or asks for what does not exist.
-            UnknownName: If a rule fits no feature, or takes one that is not there.
+            MapError: If the text is not TOML, or a rule does not fit.
+            UnknownName: If a rule matches no feature, or copies one that does not exist.
         """
-        wanted = toml.read(text)
+        wanted = read_toml(text)
         built = cls.between(
             source_observation,
             target_observation,
@@ -397,7 +428,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         observation = source_observation if of_source else target_observation
         action = source_action if of_source else target_action
         symmetry = mirror(observation, action, swap=wanted.symmetry.swap, flip=wanted.symmetry.flip)
-        turned = _turned(symmetry, observation, action)
+        turned = _symmetry_map(symmetry, observation, action)
         return turned.then(built) if of_source else built.then(turned)
 
     @property
@@ -425,16 +456,13 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         where = same_meaning(first, second)
         if where:
             raise MapError(
-                f"These maps do not meet: between the target {name} of the first and the source "
-                f"{name} of the second {where}."
+                f"These maps cannot be composed: between the target {name} of the first and the "
+                f"source {name} of the second, {where}."
             )
 
 
-def _turned(symmetry: Symmetry, observation: Layout, action: Layout) -> BodyMap:
-    """A symmetry as a map from a body to itself.
-
-    The policy p acts as g⁻¹ p(g o), where g is the symmetry: if p walks, that does too.
-    """
+def _symmetry_map(symmetry: Symmetry, observation: Layout, action: Layout) -> BodyMap:
+    """Return a symmetry g as a map from a body to itself: the policy p acts as g⁻¹ p(g o)."""
     return BodyMap(
         source_observation=observation,
         target_observation=observation,
@@ -448,7 +476,7 @@ def _turned(symmetry: Symmetry, observation: Layout, action: Layout) -> BodyMap:
 def _missing(
     shared: Mapping[str, RuleLike], special: Mapping[str, RuleLike]
 ) -> dict[str, RuleLike]:
-    """The shared rules that no special rule stands in for."""
+    """The shared rules that no special rule overrides."""
     return {pattern: rule for pattern, rule in shared.items() if pattern not in special}
 
 

@@ -1,4 +1,25 @@
-"""Which rule each feature gets: by its exact name, by its namesake, by a pattern, or by default."""
+"""Resolve the rules of a body map: by exact name, same name, pattern or default; and as TOML.
+
+The TOML form:
+
+    units = "same"                      # or "torque"
+    otherwise = "zero"                  # or "hold", "learn", { hold = 0.6 }
+
+    [observation]                       # source observation features, or globs of them
+    "foot_*/angle" = { hold = 0.6 }     # or "hold": the middle of the range
+
+    [action]                            # target action features, or globs of them
+    "foot_1/motor" = { take = "ankle_1/motor", scale = 0.5 }
+    "foot_2/motor" = "learn"
+    "foot_[34]/motor" = "copy ankle_*/motor"
+
+    [symmetry]                          # the map of the mirror image
+    of = "source"                       # or "target"
+    swap = { "*_1" = "*_4", front_left_leg = "right_back_leg" }
+    flip = ["hip_*"]
+
+Each part may be left out. Features with the same name in both bodies need no line.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +48,15 @@ from shapechanger.transfer.body_map.rules import (
 )
 
 __all__ = [
+    "MapText",
     "MirrorText",
     "Resolution",
-    "Text",
     "Units",
     "check_patterns",
     "constant_rule",
-    "read",
+    "read_toml",
     "resolve",
-    "write",
+    "write_toml",
 ]
 
 Units = Literal["same", "torque"]
@@ -46,11 +67,11 @@ _SPELLED: Final[dict[str, Rule]] = {"zero": Zero(), "learn": Learn()}
 
 
 class Resolution(NamedTuple):
-    """The rules of one side, and what became of the patterns.
+    """The rules of one side, and the patterns that gave them.
 
     Attributes:
         entries: One for each feature that is filled.
-        fitting: The patterns that fit the name of a feature.
+        fitting: The patterns that match a feature.
         used: The patterns that gave a feature its rule.
     """
 
@@ -62,17 +83,18 @@ class Resolution(NamedTuple):
 def resolve(
     side: Side, rules: Mapping[str, RuleLike], otherwise: RuleLike, units: Units
 ) -> Resolution:
-    """Give each feature of `side.into` its rule.
+    """Resolve the rule of each feature of `side.into`.
 
     Args:
-        side: What is filled, and from what.
-        rules: For a name or a glob its rule; the first glob that fits is the one that counts.
-        otherwise: The rule of what is left: zero, hold or learn.
-        units: What a scale of 1 keeps, see `BodyMap.between`.
+        side: The half of the map.
+        rules: Rules by name or glob; the first glob that matches counts. A key that is the exact
+            name of a feature is no glob.
+        otherwise: The rule of the remaining features: zero, hold or learn.
+        units: What a scale of 1 preserves, see `BodyMap.between`.
 
     Raises:
-        MapError: If a rule does not suit its feature, or nothing matches.
-        UnknownName: If a rule takes a feature that is not there.
+        MapError: If a rule does not fit its feature, or nothing matches.
+        UnknownName: If a rule copies a feature that does not exist.
     """
     entries: list[MapEntry] = []
     fitting: set[str] = set()
@@ -99,18 +121,23 @@ def resolve(
         used.add(pattern)
         rule = _suited(_read(rules[pattern], pattern, feature, side), feature, side, units)
         entries.append(MapEntry(feature.name, rule, f"rule {pattern!r}"))
-    _refuse_strangers(side, entries)
+    _require_match(side, entries)
     return Resolution(tuple(entries), frozenset(fitting), frozenset(used))
 
 
 def check_patterns(
     patterns: Iterable[str], sides: Iterable[Side], resolutions: Iterable[Resolution]
 ) -> None:
-    """See that each pattern gave at least one feature its rule.
+    """Check that each pattern gave at least one feature its rule.
+
+    Args:
+        patterns: The patterns.
+        sides: The halves that they apply to.
+        resolutions: The resolution of each half.
 
     Raises:
-        UnknownName: If a pattern fits no feature of any of `sides`.
-        MapError: If each feature that it fits has its rule from elsewhere.
+        UnknownName: If a pattern matches no feature of any side.
+        MapError: If each feature that it matches has its rule from elsewhere.
     """
     sides, resolutions = tuple(sides), tuple(resolutions)
     for pattern in patterns:
@@ -119,16 +146,20 @@ def check_patterns(
             raise UnknownName(kind, pattern, [name for side in sides for name in side.into.names])
         if not any(pattern in resolution.used for resolution in resolutions):
             raise MapError(
-                f"The rule {pattern!r} changes nothing: each feature that it fits has a partner "
-                "of the same name or an earlier rule; name a feature exactly to overrule that."
+                f"The rule {pattern!r} changes nothing: each feature that it matches has a partner "
+                "of the same name or an earlier rule; name a feature exactly to override that."
             )
 
 
 def constant_rule(like: RuleLike, feature: Feature) -> Rule:
-    """Read a rule that takes nothing, for a feature that is left over.
+    """Read a rule that copies nothing, for a remaining feature.
+
+    Args:
+        like: The rule.
+        feature: The feature.
 
     Raises:
-        MapError: If it is not zero, hold or learn, or holds what the feature never is.
+        MapError: If it is not zero, hold or learn, or the constant is outside the range.
     """
     match like:
         case "hold":
@@ -144,72 +175,76 @@ def constant_rule(like: RuleLike, feature: Feature) -> Rule:
             return like
         case _:
             raise MapError(
-                f"What is left over gets one rule, 'zero', 'hold' or 'learn', and not {like!r}."
+                f"The rule of the remaining features is 'zero', 'hold' or 'learn', not {like!r}."
             )
 
 
 def _read(like: RuleLike, pattern: str, feature: Feature, side: Side) -> Rule:
-    """The rule that was meant for `feature` under `pattern`."""
+    """Read the rule of `pattern` for `feature`."""
     match like:
         case Copy(name, scale):
             pass
         case Zero() | Hold() | Learn() | "hold" | "zero" | "learn":
             return constant_rule(like, feature)
-        case words if words.startswith(_COPY):
-            name, scale = words.removeprefix(_COPY).strip(), 1.0
-        case _:
+        case str() if like.startswith(_COPY):
+            name, scale = like.removeprefix(_COPY).strip(), 1.0
+        case str():
             known = ("zero", "hold", "learn", "copy NAME")
             raise MapError(f"{feature.name}: {UnknownName('rule', like, known)}")
+        case _:
+            raise MapError(
+                f"The rule {pattern!r} is {like!r}: give 'zero', 'hold', 'learn', 'copy NAME', "
+                "or a Copy, Zero, Hold or Learn of shapechanger.transfer.body_map."
+            )
     return Copy(name if name in side.over else expand_template(name, pattern, feature.name), scale)
 
 
 def _suited(rule: Rule, feature: Feature, side: Side, units: Units) -> Rule:
-    """The rule with its scale in the units asked for, once it is seen to suit the feature."""
+    """Return the rule with its scale in the requested units, if it fits the feature."""
     if not isinstance(rule, Copy):
         return rule
-    conversion = _conversion(rule.scale, side.taken(rule.feature), feature, side, units)
+    conversion = _conversion(rule.scale, side.copied(rule.feature), feature, side, units)
     return Copy(rule.feature, rule.scale * conversion)
 
 
-def _conversion(scale: float, taken: Feature, feature: Feature, side: Side, units: Units) -> float:
-    """What a number of `taken` is multiplied by, besides its scale, to be one of `feature`."""
+def _conversion(scale: float, copied: Feature, feature: Feature, side: Side, units: Units) -> float:
+    """Factor, besides the scale, that converts a number of `copied` to one of `feature`."""
     if units == "torque" and side.name == "action":
-        if taken.gain_unit != feature.gain_unit:
+        if copied.gain_unit != feature.gain_unit:
             raise MapError(
-                f"One unit of {taken.name!r} gives {taken.gain:g} {taken.gain_unit or '(unknown)'}"
-                f" and one of {feature.name!r} {feature.gain:g} "
+                f"One unit of {copied.name!r} gives {copied.gain:g} "
+                f"{copied.gain_unit or '(unknown)'} and one of {feature.name!r} {feature.gain:g} "
                 f"{feature.gain_unit or '(unknown)'}: units='torque' cannot make them equal; "
                 "use units='same'."
             )
-        if taken.gain_unit:
-            return taken.gain / feature.gain
-    if taken.unit != feature.unit and abs(scale) == 1.0:
+        if copied.gain_unit:
+            return copied.gain / feature.gain
+    if copied.unit != feature.unit and abs(scale) == 1.0:
         raise MapError(
-            f"The {side.into_kind} {feature} cannot take the {side.over_kind} {taken} as it is, "
-            f"for the units differ: give {feature.name!r} a rule of its own, "
-            "with the scale that converts them."
+            f"The {side.into_kind} {feature} cannot copy the {side.over_kind} {copied}, because "
+            f"the units differ: give {feature.name!r} a rule with the scale that converts them."
         )
     return 1.0
 
 
-def _refuse_strangers(side: Side, entries: Iterable[MapEntry]) -> None:
-    """Refuse a side on which nothing matches and somebody has not said what to do about it."""
+def _require_match(side: Side, entries: Iterable[MapEntry]) -> None:
+    """Refuse a side on which nothing matches and not every feature has an explicit rule."""
     entries = tuple(entries)
     if any(isinstance(entry.rule, Copy) for entry in entries):
         return
     if all(entry.why != BY_DEFAULT for entry in entries):
-        return  # Each feature was given its rule in so many words.
+        return  # Each feature has an explicit rule.
     into, over = side.into.names, side.over.names
     example = f"copy {over[0]}" if over else "hold"
     raise MapError(
-        f"These {side.name} spaces cannot be mapped, for no name occurs in both: the "
+        f"These {side.name} spaces cannot be mapped, because no name occurs in both: the "
         f"{side.into_kind}s are {_listed(into)}; the {side.over_kind}s are {_listed(over)}. "
         f"Write a rule for each, such as rules={{{into[0]!r}: {example!r}}}."
     )
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    """The first names in one line."""
+    """Join the first names."""
     more = len(names) - _MOST_NAMES_LISTED
     shown = ", ".join(names[:_MOST_NAMES_LISTED]) or "none"
     return f"{shown} and {more} more" if more > 0 else shown
@@ -221,12 +256,12 @@ _Read = TypeVar("_Read")
 
 
 class MirrorText(NamedTuple):
-    """The mirror that a text asks for.
+    """The symmetry of a map in TOML.
 
     Attributes:
-        of: Whose mirror image it is.
-        swap: For an element its partner on the other side.
-        flip: Globs of elements whose coordinate changes its sign.
+        of: The body that is mirrored.
+        swap: Partner of each element on the other side.
+        flip: Globs of elements whose coordinate changes sign.
     """
 
     of: Literal["source", "target"]
@@ -234,15 +269,15 @@ class MirrorText(NamedTuple):
     flip: tuple[str, ...]
 
 
-class Text(NamedTuple):
-    """What a text asks for, before it meets two bodies.
+class MapText(NamedTuple):
+    """A map in TOML, before it is resolved for two bodies.
 
     Attributes:
-        units: What a scale of 1 keeps.
-        otherwise: The rule of features that nothing matches.
+        units: What a scale of 1 preserves.
+        otherwise: The rule of the remaining features.
         observation: Rules of source observation features.
         action: Rules of target action features.
-        symmetry: The mirror that the map goes through, if any.
+        symmetry: The symmetry, if any.
     """
 
     units: Units
@@ -252,21 +287,21 @@ class Text(NamedTuple):
     symmetry: MirrorText | None
 
 
-def read(text: str) -> Text:
-    """Read a map that a person wrote.
+def read_toml(text: str) -> MapText:
+    """Parse a map in TOML.
 
     Raises:
-        MapError: If it is no TOML, or holds a key, a word or a type that means nothing here.
+        MapError: If it is no TOML, or has an unknown key, word or type.
     """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise MapError(f"This is not TOML: {error}.") from error
-    _check_keys("key", table, Text._fields)
+    _check_keys("key", table, MapText._fields)
     observation = _as("observation", table.get("observation", {}), dict[str, Any])
     action = _as("action", table.get("action", {}), dict[str, Any])
     units = _as("units", table.get("units", "same"), str)
-    return Text(
+    return MapText(
         units=_one_of("units", units, ("same", "torque")),
         otherwise=_rule("otherwise", table.get("otherwise", "zero")),
         observation={name: _rule(name, value) for name, value in observation.items()},
@@ -275,14 +310,19 @@ def read(text: str) -> Text:
     )
 
 
-def write(observation: Iterable[MapEntry], action: Iterable[MapEntry]) -> str:
-    """The text that gives these rules; a partner of the same name has no line."""
+def write_toml(observation: Iterable[MapEntry], action: Iterable[MapEntry]) -> str:
+    """Write rules as TOML; a partner of the same name has no line.
+
+    Args:
+        observation: Entries of the source observation.
+        action: Entries of the target action.
+    """
     lines = ['units = "same"', 'otherwise = "zero"']
     for heading, entries in (("observation", observation), ("action", action)):
-        told = [entry for entry in entries if entry.rule != Copy(entry.feature)]
-        if told:
+        explicit = [entry for entry in entries if entry.rule != Copy(entry.feature)]
+        if explicit:
             lines += ["", f"[{heading}]"]
-            lines += [f"{_quoted(entry.feature)} = {_value(entry.rule)}" for entry in told]
+            lines += [f"{_quoted(entry.feature)} = {_value(entry.rule)}" for entry in explicit]
     return "\n".join(lines) + "\n"
 
 
@@ -299,12 +339,12 @@ def _value(rule: Rule) -> str:
 
 
 def _quoted(name: str) -> str:
-    """A basic string of TOML: as JSON writes it, but for the one control character JSON lets by."""
+    """A basic string of TOML: JSON, with the one control character that JSON does not escape."""
     return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _rule(name: str, value: object) -> RuleLike:
-    """A rule as it stands behind a name."""
+    """Parse the value of a rule."""
     if isinstance(value, str):
         if not value.startswith("copy "):
             _one_of(name, value, (*_WORDS, "copy NAME"))
@@ -316,8 +356,8 @@ def _rule(name: str, value: object) -> RuleLike:
     if table.keys() in ({"take"}, {"take", "scale"}):
         return Copy(_as(name, table["take"], str), _as(name, table.get("scale", 1.0), float))
     raise MapError(
-        f'{name!r} is to be {{ take = "NAME" }}, {{ take = "NAME", scale = NUMBER }} or '
-        f"{{ hold = NUMBER }}, and not a table of {', '.join(table) or 'nothing'}."
+        f'{name!r} must be {{ take = "NAME" }}, {{ take = "NAME", scale = NUMBER }} or '
+        f"{{ hold = NUMBER }}, not a table of {', '.join(table) or 'nothing'}."
     )
 
 
@@ -333,7 +373,7 @@ def _mirror(value: object) -> MirrorText:
 
 
 def _as(name: str, value: object, kind: type[_Read]) -> _Read:
-    """The value, if it has the type that belongs here."""
+    """Convert a value to its type."""
     try:
         return msgspec.convert(value, type=kind)
     except msgspec.ValidationError as error:
@@ -341,7 +381,7 @@ def _as(name: str, value: object, kind: type[_Read]) -> _Read:
 
 
 def _one_of(name: str, word: str, known: Sequence[str]) -> Any:
-    """The word, if it is one of those known."""
+    """Return the word if it is known."""
     if word not in known:
         raise MapError(f"{name}: {UnknownName('word', word, known)}")
     return word

@@ -1,10 +1,10 @@
-"""The four rules by which one number of a body follows from the numbers of another.
+"""The four rules of a body map, its entries, and their arithmetic.
 
-No rule adds an offset to what it takes, so two rules in a row are one rule again.
+No rule adds an offset to what it copies, so two rules in a row are one rule again.
 
->>> substituted(Take("shin", 2.0), Take("shank", -1.5))
-Take(feature='shank', scale=-3.0)
->>> substituted(Take("shin", 2.0), Hold(0.5))
+>>> compose_rules(Copy("shin", 2.0), Copy("shank", -1.5))
+Copy(feature='shank', scale=-3.0)
+>>> compose_rules(Copy("shin", 2.0), Hold(0.5))
 Hold(value=1.0)
 """
 
@@ -45,14 +45,13 @@ __all__ = [
 
 
 class Copy(msgspec.Struct, frozen=True, tag="take", omit_defaults=True):
-    """Take the number of another feature, times a scale.
+    """Copy another feature, times a scale.
 
-    A partner of the same name, a copied sibling and a mirror partner are all this rule.
+    Partners of the same name, copied siblings and mirror partners all use this rule.
 
     Attributes:
-        feature: Name of the feature that is taken; a block is copied as a whole.
-        scale: What the number is multiplied by, finite and not zero; -1 for a mirror partner whose
-            coordinate changes sign.
+        feature: Name of the feature that is copied; a block is copied as a whole.
+        scale: Factor, finite and not zero; -1 for a mirror partner whose coordinate changes sign.
 
     Raises:
         MapError: If the scale is zero or not finite.
@@ -74,10 +73,10 @@ class Zero(msgspec.Struct, frozen=True, tag="zero"):
 
 
 class Hold(msgspec.Struct, frozen=True, tag="hold"):
-    """Always the same number.
+    """A constant.
 
     Attributes:
-        value: That number, in the unit of the feature that it fills; finite.
+        value: The constant, in the unit of the feature that it fills; finite.
 
     Raises:
         MapError: If the value is not finite.
@@ -91,17 +90,17 @@ class Hold(msgspec.Struct, frozen=True, tag="hold"):
 
 
 class Learn(msgspec.Struct, frozen=True, tag="learn"):
-    """0 until it is trained: a transplanted policy gets fresh weights here."""
+    """0 until trained: a transplanted policy gets new weights here."""
 
 
 Rule = Copy | Zero | Hold | Learn
 
 RuleLike = Rule | str
-"""A rule, or one in words: "zero", "hold" (the middle of the range), "learn", "copy NAME"."""
+"""A rule, or its short form: "zero", "hold" (the middle of the range), "learn", "copy NAME"."""
 
 
 def describe_rule(rule: Rule) -> str:
-    """The rule as a person would say it, such as `hip_4/angle times -1`."""
+    """Return a rule as text, such as `hip_4/angle times -1`."""
     match rule:
         case Copy(feature, scale):
             return feature if scale == 1.0 else f"{feature} times {scale:g}"
@@ -114,7 +113,12 @@ def describe_rule(rule: Rule) -> str:
 
 
 def compose_rules(outer: Copy, inner: Rule) -> Rule:
-    """The one rule that does `inner` and then scales the result as `outer` does."""
+    """Return the rule that applies `inner` and then the scale of `outer`.
+
+    Args:
+        outer: The rule applied last.
+        inner: The rule of the feature that `outer` copies.
+    """
     match inner:
         case Copy(feature, scale):
             return Copy(feature, outer.scale * scale)
@@ -128,15 +132,18 @@ _TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
 
 
 def expand_template(template: str, pattern: str, name: str) -> str:
-    """Replace each `*` of `template`, in order, by what a wildcard of `pattern` fits in `name`.
+    """Replace each `*` of `template`, in order, by what a wildcard of `pattern` matches in `name`.
+
+    >>> expand_template("ankle_*/motor", "foot_*/motor", "foot_2/motor")
+    'ankle_2/motor'
 
     Args:
-        template: A name with stars; one without is given back as it is.
-        pattern: A glob that fits `name`; `?` and `[...]` count as wildcards too.
-        name: The name that `pattern` fits.
+        template: A name with stars; one without is returned unchanged.
+        pattern: A glob that matches `name`; `?` and `[...]` are wildcards too.
+        name: The name.
 
     Raises:
-        MapError: If the template has stars, and not as many as the pattern has wildcards.
+        MapError: If the template has stars, but not as many as the pattern has wildcards.
     """
     if "*" not in template:
         return template
@@ -152,7 +159,7 @@ def expand_template(template: str, pattern: str, name: str) -> str:
 
 
 def _as_group(token: str) -> str:
-    """One token of a glob as a regular expression; a wildcard becomes a group."""
+    """Translate one token of a glob to a regular expression; a wildcard becomes a group."""
     if token == "*":
         return "(.*)"
     if token == "?":
@@ -173,12 +180,12 @@ BY_DEFAULT: Final = "default"
 class MapEntry:
     """One feature and the rule that fills it.
 
-    Two entries are equal if they do the same; where a rule came from is a remark.
+    Equality ignores `why`.
 
     Attributes:
         feature: Name of the feature that is filled.
-        rule: What fills it.
-        why: Where the rule came from: "same name", "rule 'foot_*'", "default" or "symmetry".
+        rule: The rule.
+        why: Origin of the rule: "same name", "rule 'foot_*'", "default" or "symmetry".
     """
 
     feature: str
@@ -187,7 +194,7 @@ class MapEntry:
 
 
 class Side(NamedTuple):
-    """Which layout is filled, and from which.
+    """One half of a map: a layout that is filled, and the one that it is filled from.
 
     Attributes:
         name: "observation" or "action".
@@ -201,18 +208,18 @@ class Side(NamedTuple):
 
     @property
     def into_kind(self) -> str:
-        """What a feature of `into` is called in a message."""
+        """Name of a feature of `into` in messages."""
         owner = "source" if self.name == "observation" else "target"
         return f"{owner} {self.name} feature"
 
     @property
     def over_kind(self) -> str:
-        """What a feature of `over` is called in a message."""
+        """Name of a feature of `over` in messages."""
         owner = "target" if self.name == "observation" else "source"
         return f"{owner} {self.name} feature"
 
-    def taken(self, name: str) -> Feature:
-        """The feature of `over` that a rule takes.
+    def copied(self, name: str) -> Feature:
+        """Return the feature of `over` that a rule copies.
 
         Raises:
             UnknownName: If there is none.
@@ -223,11 +230,15 @@ class Side(NamedTuple):
 
 
 def check_entries(side: Side, entries: tuple[MapEntry, ...]) -> None:
-    """See that each feature has its one rule, in order, and that what is taken exists and fits.
+    """Check that each feature has one rule, in order, and that copied features exist and fit.
+
+    Args:
+        side: The half of the map.
+        entries: Its entries.
 
     Raises:
-        MapError: If a feature has no rule, is out of place, or takes a block of another shape.
-        UnknownName: If a rule takes a feature that is not there.
+        MapError: If a feature has no rule, is out of order, or copies a block of another shape.
+        UnknownName: If a rule copies a feature that does not exist.
     """
     filled = tuple(entry.feature for entry in entries)
     if filled != side.into.names:
@@ -237,18 +248,18 @@ def check_entries(side: Side, entries: tuple[MapEntry, ...]) -> None:
         )
     for feature, entry in zip(side.into, entries, strict=True):
         if isinstance(entry.rule, Copy):
-            taken = side.taken(entry.rule.feature)
-            if taken.shape != feature.shape:
+            copied = side.copied(entry.rule.feature)
+            if copied.shape != feature.shape:
                 raise MapError(
-                    f"{feature.name!r} has the shape {feature.shape} and cannot take "
-                    f"{taken.name!r}, which has the shape {taken.shape}."
+                    f"{feature.name!r} has the shape {feature.shape} and cannot copy "
+                    f"{copied.name!r}, which has the shape {copied.shape}."
                 )
 
 
 def same_meaning(left: Layout, right: Layout) -> str:
-    """Empty if the numbers of both layouts mean the same; otherwise where they first differ.
+    """Return where the meaning of two layouts first differs; empty if nowhere.
 
-    Ranges may differ, since a longer leg only widens them; names, order, units, shapes and gains
+    Ranges may differ, because a longer leg only widens them; names, order, units, shapes and gains
     may not.
     """
     for place, (a, b) in enumerate(zip(left, right, strict=False)):
@@ -263,17 +274,17 @@ def same_meaning(left: Layout, right: Layout) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Gather:
-    """What fills each number of a flat vector.
+    """Vectorised form of one half of a map.
 
-    A number that is taken with scale 1 is copied to the last bit.
+    A number that is copied with scale 1 is bitwise equal.
 
     Attributes:
-        kind: What the vectors that go in are, for messages.
-        n_over: How many numbers go in.
-        rows: Places that are taken from the input, shape (n_taken,).
-        columns: For each of them the place in the input, shape (n_taken,).
-        scale: For each of them the factor, shape (n_taken,).
-        offset: The constant at every place, 0 where it is taken, shape (n_into,).
+        kind: Kind of the input vectors, for messages.
+        n_over: Size of the input.
+        rows: Output indices that are copied, shape (n_copied,).
+        columns: Their input indices, shape (n_copied,).
+        scale: Their factors, shape (n_copied,).
+        offset: Constant of each output, 0 where it is copied, shape (n_into,).
     """
 
     kind: str
@@ -285,7 +296,7 @@ class Gather:
 
     @classmethod
     def of(cls, side: Side, entries: Sequence[MapEntry]) -> Gather:
-        """The arithmetic of one half of a map."""
+        """Compile one half of a map."""
         into, over = side.into.slices, side.over.slices
         rows: list[int] = []
         columns: list[int] = []
@@ -295,9 +306,9 @@ class Gather:
             place = into[entry.feature]
             match entry.rule:
                 case Copy(feature, factor):
-                    taken = over[feature]
+                    copied = over[feature]
                     rows += range(place.start, place.stop)
-                    columns += range(taken.start, taken.stop)
+                    columns += range(copied.start, copied.stop)
                     scale += [factor] * (place.stop - place.start)
                 case Hold(value):
                     offset[place] = value
@@ -313,7 +324,7 @@ class Gather:
         )
 
     def __call__(self, values: ArrayLike) -> NDArray[Any]:
-        """Fill a vector for each vector given.
+        """Apply the map to each input vector.
 
         Args:
             values: Shape (..., n_over).
@@ -328,8 +339,8 @@ class Gather:
         given = np.asarray(values)
         if given.shape[-1:] != (self.n_over,):
             raise SpaceMismatch(
-                f"The layout holds {self.n_over} numbers, one or more to a {self.kind}: "
-                f"the last axis must have that length, and the shape given is {given.shape}."
+                f"The layout of {self.kind}s has {self.n_over} numbers, so the last axis must have "
+                f"that length, and the shape is {given.shape}."
             )
         dtype = np.result_type(given.dtype, np.float32)
         filled = np.empty((*given.shape[:-1], self.offset.size), dtype)

@@ -1,4 +1,12 @@
-"""A symmetry of one body: the same motion, seen in a mirror or from the next leg on."""
+"""Symmetries of one body, such as its left-right mirror image, found by the names of its features.
+
+The mirror is the plane y = 0, with x forward and z up. It changes the sign of the y component of a
+vector (position, velocity, force) and of the x and z components of an axial vector (angular
+velocity, torque). A rotation about the axis n becomes the rotation by the same angle about n with
+its y component kept and the others negated, so a quaternion (w, x, y, z) negates x and z. A hinge
+whose axis is mapped to the axis of its partner keeps its sign, and one whose axis is mapped to the
+opposite changes it: the caller states which those are.
+"""
 
 from __future__ import annotations
 
@@ -27,16 +35,16 @@ class Symmetry(msgspec.Struct, frozen=True):
     """A permutation of a body's features with a sign for each.
 
     Attributes:
-        observation_layout: What the body senses.
-        action_layout: What the body moves.
-        observation: For each observation feature, in order, what it takes: the feature that the
-            turned body has in its place.
+        observation_layout: Layout of the body's observations.
+        action_layout: Layout of the body's actions.
+        observation: For each observation feature, in order, the feature that the transformed body
+            has in its place.
         action: The same for each action feature.
 
     Raises:
-        MapError: If it is no permutation, a scale is not 1 or -1, or two features that change
-            places differ in unit, shape or range.
-        UnknownName: If a feature is taken that is not there.
+        MapError: If it is no permutation, a scale is not 1 or -1, or two features that swap differ
+            in unit, shape or range.
+        UnknownName: If a feature does not exist.
     """
 
     observation_layout: Layout
@@ -57,17 +65,17 @@ class Symmetry(msgspec.Struct, frozen=True):
         observation: Mapping[str, Copy] | None = None,
         action: Mapping[str, Copy] | None = None,
     ) -> Symmetry:
-        """The symmetry in which some features change; the others stay as they are.
+        """Build the symmetry that changes some features and keeps the others.
 
         Args:
-            observation_layout: What the body senses.
-            action_layout: What the body moves.
-            observation: For an observation feature what it takes, with scale 1 or -1.
+            observation_layout: Layout of the body's observations.
+            action_layout: Layout of the body's actions.
+            observation: For an observation feature what it copies, with scale 1 or -1.
             action: The same for action features.
 
         Raises:
             MapError: If that is no symmetry.
-            UnknownName: If a feature is named that is not there.
+            UnknownName: If a feature does not exist.
         """
         return cls(
             observation_layout,
@@ -87,7 +95,7 @@ class Symmetry(msgspec.Struct, frozen=True):
         return _entries(self.action_layout, self.action)
 
     def inverse(self) -> Symmetry:
-        """The symmetry that undoes this one; a mirror undoes itself."""
+        """Return the inverse symmetry; a mirror is its own inverse."""
         return Symmetry(
             self.observation_layout,
             self.action_layout,
@@ -95,8 +103,13 @@ class Symmetry(msgspec.Struct, frozen=True):
             _undone(self.action_layout, self.action),
         )
 
-    def suits(self, observation: Layout, action: Layout) -> bool:
-        """Whether the numbers of a body mean what those of this symmetry mean."""
+    def fits(self, observation: Layout, action: Layout) -> bool:
+        """Whether the symmetry fits the layouts of a body.
+
+        Args:
+            observation: Layout of the body's observations.
+            action: Layout of the body's actions.
+        """
         return not (
             same_meaning(self.observation_layout, observation)
             or same_meaning(self.action_layout, action)
@@ -114,25 +127,25 @@ def _check(side: SideName, layout: Layout, takes: tuple[Copy, ...]) -> None:
             raise UnknownName(f"{side} feature", take.feature, layout.names)
         if take.feature in taken:
             raise MapError(
-                f"{taken[take.feature]!r} and {feature.name!r} both take {take.feature!r}: "
-                "a symmetry takes each feature once."
+                f"{taken[take.feature]!r} and {feature.name!r} both copy {take.feature!r}: "
+                "a symmetry copies each feature once."
             )
         taken[take.feature] = feature.name
         _check_pair(feature, layout[take.feature], take.scale)
 
 
 def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
-    """Refuse two features that cannot stand for each other."""
+    """Refuse two features that cannot swap."""
     if abs(scale) != 1.0:
         raise MapError(
-            f"{feature.name!r} takes {partner.name!r} times {scale:g}: "
+            f"{feature.name!r} copies {partner.name!r} times {scale:g}: "
             "in a symmetry the scale is 1 or -1."
         )
     for aspect in ("unit", "shape", "gain", "gain_unit"):
         ours, theirs = getattr(feature, aspect), getattr(partner, aspect)
         if ours != theirs:
             raise MapError(
-                f"{feature.name!r} and {partner.name!r} cannot change places: "
+                f"{feature.name!r} and {partner.name!r} cannot swap: "
                 f"their {aspect} is {ours!r} and {theirs!r}."
             )
     low, high = sorted((scale * partner.low, scale * partner.high))
@@ -145,7 +158,7 @@ def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
 
 
 def _close(a: float, b: float) -> bool:
-    """Whether two bounds are one but for rounding, such as that of degrees to radians."""
+    """Whether two bounds are equal up to rounding, such as that of degrees to radians."""
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
 
 
@@ -170,9 +183,9 @@ def _entries(layout: Layout, takes: tuple[Copy, ...]) -> tuple[MapEntry, ...]:
     )
 
 
-# The last part of a feature's name, where it is a component along an axis of the world.
-# Of an inertia the products with y turn; the cosine of an angle is that of the opposite.
-_TURNED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz", "xy", "yz", "my"})
+# Last parts of feature names that are components along an axis of the world. The products of
+# inertia with y change sign; the cosine of an angle does not.
+_NEGATED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz", "xy", "yz", "my"})
 _KEPT: Final = frozenset(
     {"x", "z", "vx", "vz", "fx", "fz", "wy", "ty", "qw", "qy", "xx", "yy", "zz", "xz", "mx", "mz"}
     | {"cos"}
@@ -186,24 +199,24 @@ def mirror(
     swap: Mapping[str, str] | None = None,
     flip: Iterable[str] = (),
 ) -> Symmetry:
-    """The symmetry that exchanges left and right.
+    """Build the symmetry that swaps left and right.
 
-    The element of a feature is what stands before the first "/" of its name.
+    The element of a feature is the part of its name before the first "/".
 
     Args:
-        observation_layout: What the body senses.
-        action_layout: What the body moves.
-        swap: For an element on one side the one on the other, such as `{"hip_1": "hip_4"}`, or a
-            glob, such as `{"*_1": "*_4"}`; each pair is named once or both ways. An element that
-            is not named stays where it is.
-        flip: Globs of elements whose coordinate changes its sign, such as the hinges about a
-            vertical axis; both elements of a pair or neither. Components along axes of the world,
-            such as `torso/vy`, need no mention.
+        observation_layout: Layout of the body's observations.
+        action_layout: Layout of the body's actions.
+        swap: Partner of each element on the other side, such as `{"hip_1": "hip_4"}`, or of a glob,
+            such as `{"*_1": "*_4"}`; each pair appears once or both ways. Other elements stay in
+            place.
+        flip: Globs of elements whose coordinate changes sign, such as the hinges about a vertical
+            axis; both elements of a pair or neither. Components along axes of the world, such as
+            `torso/vy`, are found by name.
 
     Raises:
         MapError: If the pairs contradict each other, one element of a pair flips and the other
             does not, a feature is a block, or the ranges of a pair are no mirror images.
-        UnknownName: If an element or the partner of a feature is not there.
+        UnknownName: If an element or the partner of a feature does not exist.
     """
     features = (*observation_layout, *action_layout)
     elements = tuple(dict.fromkeys(_element(feature) for feature in features))
@@ -211,9 +224,7 @@ def mirror(
     flipped = frozenset(name for glob in flip for name in _fitting(glob, elements))
     for element, partner in partners.items():
         if (element in flipped) != (partner in flipped):
-            raise MapError(
-                f"{element!r} and {partner!r} mirror each other: flip both of them or neither."
-            )
+            raise MapError(f"{element!r} and {partner!r} mirror each other: flip both or neither.")
     return Symmetry(
         observation_layout,
         action_layout,
@@ -236,14 +247,14 @@ def _both_ways(swap: Mapping[str, str], elements: tuple[str, ...]) -> dict[str, 
                     raise UnknownName("element", name, elements)
                 if partners.setdefault(name, partner) != partner:
                     raise MapError(
-                        f"{name!r} is to mirror both {partners[name]!r} and {partner!r}: "
+                        f"{name!r} cannot mirror both {partners[name]!r} and {partner!r}: "
                         "choose one."
                     )
     return partners
 
 
 def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
-    """The elements that bear this name or fit this glob."""
+    """The element of this exact name, or else the elements that match it as a glob."""
     fits = [glob] if glob in elements else [e for e in elements if fnmatch.fnmatchcase(e, glob)]
     if not fits:
         raise UnknownName("element", glob, elements)
@@ -251,14 +262,14 @@ def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
 
 
 def _reflected(feature: Feature, partners: Mapping[str, str], flipped: frozenset[str]) -> Copy:
-    """What the mirrored body has in the place of `feature`."""
+    """The feature that the mirrored body has in place of `feature`."""
     if feature.shape:
-        raise MapError(f"{feature.name!r} is a block of numbers, which no mirror turns by name.")
+        raise MapError(f"{feature.name!r} is a block of numbers, which cannot be mirrored by name.")
     element, *path = feature.name.split("/", 1)
     component = feature.name.rsplit("/", 1)[-1]
     if component in _KEPT:
         sign = 1.0
-    elif component in _TURNED or element in flipped:
+    elif component in _NEGATED or element in flipped:
         sign = -1.0
     else:
         sign = 1.0

@@ -1,5 +1,113 @@
-"""Learners: training, evaluating and storing policies."""
+"""Learners: settings, training, evaluation and stored policies."""
 
 from __future__ import annotations
 
-__all__: list[str] = []
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.body_map import BodyMap
+    from shapechanger.transfer.learners.cloning import DemonstrationFile
+    from shapechanger.transfer.learners.evaluation import Evaluation
+
+__all__ = ["Learner", "PolicyOrigin"]
+
+
+class PolicyOrigin(NamedTuple):
+    """Where a stored policy comes from.
+
+    Attributes:
+        env: The env that it was trained in.
+        steps: Training steps, demonstrated ones included.
+    """
+
+    env: EnvRef
+    steps: int
+
+
+class Learner(Protocol):
+    """A learner as the methods of a study use it; its policies are of its own type."""
+
+    def require(self, env: EnvRef, traits: EnvTraits) -> None:
+        """Refuse an env that it cannot learn in.
+
+        Args:
+            env: The env.
+            traits: Its traits.
+
+        Raises:
+            StudyError: If it lacks something.
+            SpaceMismatch: If its spaces do not fit its layouts.
+        """
+        ...
+
+    def train(
+        self,
+        env: EnvRef,
+        steps: int,
+        seed: int,
+        *,
+        demonstrations: DemonstrationFile,
+        start: Any = None,
+        body_map: BodyMap | None = None,
+        only_last: bool = False,
+        on_evaluation: Callable[[Evaluation], None],
+        on_steps: Callable[[int], None],
+    ) -> Any:
+        """Train a policy.
+
+        Args:
+            env: The env.
+            steps: Budget, in steps.
+            seed: Seed of the training.
+            demonstrations: File of the demonstrations, for learners that need some.
+            start: A source policy to start from; None for a new policy.
+            body_map: Map between the bodies of `start` and `env`.
+            only_last: Whether only the final evaluation is needed.
+            on_evaluation: Called with each evaluation.
+            on_steps: Called with the number of steps done.
+        """
+        ...
+
+    def evaluate(self, env: EnvRef, policy: Any, body_map: BodyMap) -> Evaluation:
+        """Evaluate a source policy in another env without training it.
+
+        Args:
+            env: The env.
+            policy: The policy.
+            body_map: Map between the two bodies.
+        """
+        ...
+
+    def load(self, path: Path, *, trust: bool = False) -> Any:
+        """Load a policy.
+
+        Args:
+            path: The file.
+            trust: Accept content that can run code.
+        """
+        ...
+
+    def save(self, policy: Any, path: Path) -> None:
+        """Write a policy to a file.
+
+        Args:
+            policy: The policy.
+            path: The file.
+        """
+        ...
+
+    def origin(self, path: Path, *, trust: bool = False) -> PolicyOrigin:
+        """Read where a stored policy comes from.
+
+        Args:
+            path: The file.
+            trust: Accept content that can run code.
+
+        Raises:
+            StudyError: If another kind of learner trained it.
+        """
+        ...

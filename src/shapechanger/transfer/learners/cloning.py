@@ -1,4 +1,4 @@
-"""Learning by demonstrations in a study: record, clone, and judge at each budget."""
+"""Behavioural cloning in a study: record demonstrations, clone them, evaluate at each budget."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,7 @@ from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import WEIGHTS, CameraPolicy
 from shapechanger.demos.cloning.train import clone
 from shapechanger.errors import StudyError
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
 from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
@@ -25,40 +25,28 @@ __all__ = [
     "CLONE_EVALUATION_SEED",
     "DemonstrationFile",
     "Demonstrations",
-    "TaskDemonstrator",
     "evaluate_clone",
     "is_clone",
     "load_clone",
     "load_or_record",
     "record_demonstrations",
+    "require_camera_env",
     "train_clones",
 ]
 
 CLONE_EVALUATION_SEED = 10_000_000
-"""Seed of the first episode that a clone is judged in: the same ones for every run and arm."""
-
-
-class TaskDemonstrator(Protocol):
-    """Somebody who can do the task of an env; `env.unwrapped.demonstrator(seed)` gives one."""
-
-    def begin(self) -> None:
-        """An episode has begun."""
-        ...
-
-    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """What they mean to do now, which is learned, and what they do, which is carried out."""
-        ...
+"""Seed of the first evaluation episode, the same for every run and arm."""
 
 
 class Demonstrations(NamedTuple):
-    """What was seen and done.
+    """Recorded demonstrations.
 
     Attributes:
         pictures: (n, h, w, 3) as a policy sees them.
-        actions: (n, 2) what the demonstrator meant to do on seeing each.
-        done: (n, 2) what was done instead.
-        rewards: (n,) what it was worth.
-        episodes: How many of them each episode has, in order.
+        actions: (n, 2) intended action of the demonstrator at each picture.
+        done: (n, 2) executed action.
+        rewards: (n,) reward of the executed action.
+        episodes: Number of steps of each episode, in order.
     """
 
     pictures: NDArray[np.uint8]
@@ -68,7 +56,7 @@ class Demonstrations(NamedTuple):
     episodes: tuple[int, ...]
 
     def first(self, steps: int) -> Demonstrations:
-        """The first so many steps."""
+        """Return the first `steps` steps."""
         episodes: list[int] = []
         left = steps
         for length in self.episodes:
@@ -85,11 +73,11 @@ class Demonstrations(NamedTuple):
 
 
 class DemonstrationFile(NamedTuple):
-    """Where demonstrations are kept, so that several runs learn from the same ones.
+    """File of demonstrations, shared by the runs that learn from them.
 
     Attributes:
         path: The file.
-        seed: What they follow from.
+        seed: Seed of the recording.
     """
 
     path: Path
@@ -104,24 +92,26 @@ def record_demonstrations(
     framing: Framing,
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> Demonstrations:
-    """Let the demonstrator of an env do its task for so many steps.
+    """Record the demonstrator of an env.
 
     Args:
-        env: The env; it has a camera and a demonstrator.
-        steps: How many.
-        episode_steps: How many of them an episode has at most.
-        seed: Of the starts, and of the demonstrator's mistakes.
-        framing: What a policy sees of a picture.
-        on_steps: Called with the number of steps, from time to time.
+        env: An env with a camera and a demonstrator.
+        steps: Number of steps to record.
+        episode_steps: Maximum number of steps of an episode.
+        seed: Seed of the starts and of the demonstrator's mistakes.
+        framing: The part and size of a picture that a policy sees.
+        on_steps: Called with the number of steps from time to time.
 
     Raises:
-        StudyError: If the env has nobody who shows how.
+        StudyError: If the env has no demonstrator.
     """
     made = env.make(max_episode_steps=episode_steps)
     try:
-        driver = _demonstrator(made, env, seed)
+        if not isinstance(made.unwrapped, HasDemonstrator):
+            raise StudyError(f"{env} has no demonstrator to learn from.")
+        driver = made.unwrapped.demonstrator(seed)
         pictures: list[NDArray[np.uint8]] = []
-        actions, carried_out = np.empty((2, steps, 2), np.float32)
+        actions, executed = np.empty((2, steps, 2), np.float32)
         rewards = np.empty(steps, np.float32)
         episodes: list[int] = []
         while sum(episodes) < steps:
@@ -131,15 +121,43 @@ def record_demonstrations(
             over = False
             while not over and sum(episodes) < steps:
                 step = sum(episodes)
-                actions[step], carried_out[step] = driver.act()
+                actions[step], executed[step] = driver.act()
                 pictures.append(prepare(seen[np.newaxis], framing)[0])
-                seen, rewards[step], terminated, truncated, _ = made.step(carried_out[step])
+                seen, rewards[step], terminated, truncated, _ = made.step(executed[step])
                 episodes[-1] += 1
                 over = terminated or truncated
             on_steps(sum(episodes))
     finally:
         made.close()
-    return Demonstrations(np.stack(pictures), actions, carried_out, rewards, tuple(episodes))
+    return Demonstrations(np.stack(pictures), actions, executed, rewards, tuple(episodes))
+
+
+def load_or_record(
+    file: DemonstrationFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
+) -> Demonstrations:
+    """Load demonstrations from a file that has enough of them, or record and write it.
+
+    Args:
+        file: The file and the seed of the recording.
+        env: An env with a camera and a demonstrator.
+        steps: Number of steps.
+        episode_steps: Maximum number of steps of an episode.
+        framing: The part and size of a picture that a policy sees.
+    """
+    path = file.path
+    if path.exists():
+        with np.load(path) as arrays:
+            named = {name: arrays[name] for name in Demonstrations._fields[:-1]}
+            found = Demonstrations(**named, episodes=tuple(arrays["episodes"].tolist()))
+        if len(found.actions) >= steps:
+            return found.first(steps)
+    recorded = record_demonstrations(env, steps, episode_steps, file.seed, framing)
+    make_folder(path.parent)
+    # Two arms may record the same demonstrations at the same time, each in its own process.
+    part = path.with_name(f".{path.stem}.{os.getpid()}.npz")
+    np.savez(part, **recorded._asdict())
+    part.replace(path)
+    return recorded
 
 
 def train_clones(
@@ -154,29 +172,29 @@ def train_clones(
     on_evaluation: Callable[[Evaluation], None],
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> CameraPolicy:
-    """Clone the demonstrator at each budget, and judge each clone.
+    """Clone the demonstrator at each budget, and evaluate each clone.
 
     Args:
         env: The env.
-        settings: How.
+        settings: The settings.
         steps: The last budget.
-        seed: Of everything random in the trainings.
-        demonstrations: Where they are, or come to be.
-        start: A policy to go on from at each budget, in place of none.
-        only_last: Whether only the last budget is of interest.
+        seed: Seed of the trainings.
+        demonstrations: File of the demonstrations; recorded if missing.
+        start: The policy to start from at each budget; None for a new one.
+        only_last: Skip all budgets but the last.
         on_evaluation: Called with each evaluation.
-        on_steps: Called with the number of demonstrated steps that were used.
+        on_steps: Called with the number of demonstrated steps used.
 
     Returns:
         The clone of the last budget.
     """
     policy = CameraPolicy.fresh(settings.clone, seed) if start is None else start
     on_evaluation(evaluate_clone(env, policy, settings))
-    shown = load_or_record(
+    recorded = load_or_record(
         demonstrations, env, steps, settings.episode_steps, settings.clone.framing
     )
     for budget in (steps,) if only_last else settings.within(steps):
-        part = shown.first(budget)
+        part = recorded.first(budget)
         policy, _ = clone(
             part.pictures,
             part.actions,
@@ -195,7 +213,14 @@ def train_clones(
 def evaluate_clone(
     env: EnvRef, policy: CameraPolicy, settings: CloningSettings | SacSettings, steps: int = 0
 ) -> Evaluation:
-    """How good a clone is in an env, after so many demonstrated steps."""
+    """Evaluate a clone.
+
+    Args:
+        env: The env.
+        policy: The clone.
+        settings: Settings of its learner.
+        steps: Training steps so far, for the result.
+    """
     envs = evaluation_envs(env, settings)
     try:
         return evaluate(policy.predict_many, envs, CLONE_EVALUATION_SEED, steps)
@@ -204,8 +229,39 @@ def evaluate_clone(
             one.close()
 
 
+def require_camera_env(
+    name: str, observation_space: gym.Space[Any], has_demonstrator: bool, learner: str
+) -> None:
+    """Refuse an env without a camera or a demonstrator.
+
+    Args:
+        name: Name of the env, for the message.
+        observation_space: Its observation space.
+        has_demonstrator: Whether it has an expert for its task.
+        learner: Name of the learner, for the message.
+
+    Raises:
+        StudyError: If it lacks one.
+    """
+    is_camera = (
+        isinstance(observation_space, gym.spaces.Box)
+        and np.dtype(np.uint8) == cast("Any", observation_space).dtype
+        and len(observation_space.shape) == 3
+    )
+    missing = [
+        what
+        for what, there in (("no camera", is_camera), ("no demonstrator", has_demonstrator))
+        if not there
+    ]
+    if missing:
+        raise StudyError(
+            f"{name} has {' and '.join(missing)}, and {learner} learns from the pictures of a "
+            "demonstrator: give a --learner that begins with ppo."
+        )
+
+
 def is_clone(path: Path) -> bool:
-    """Whether a file is one that a clone was saved to, and no other policy."""
+    """Whether a file holds a clone, rather than another policy or something else."""
     try:
         with zipfile.ZipFile(path) as archive:
             return WEIGHTS in archive.namelist()
@@ -214,36 +270,9 @@ def is_clone(path: Path) -> bool:
 
 
 def load_clone(path: Path) -> CameraPolicy:
-    """The clone in a file.
+    """Load a clone: weights, read by PyTorch with `weights_only=True`, and a JSON card.
 
     Raises:
-        PolicyError: If there is none.
+        PolicyError: If the file holds none.
     """
     return CameraPolicy.load(path)
-
-
-def _demonstrator(made: gym.Env[Any, Any], env: EnvRef, seed: int) -> TaskDemonstrator:
-    give = getattr(made.unwrapped, "demonstrator", None)
-    if give is None:
-        raise StudyError(f"{env} has no demonstrator, so there is nobody to learn from.")
-    return cast("TaskDemonstrator", give(seed))
-
-
-def load_or_record(
-    recording: DemonstrationFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
-) -> Demonstrations:
-    """The demonstrations of an env, from their file if it is there; see `record_demonstrations`."""
-    path = recording.path
-    if path.exists():
-        with np.load(path) as arrays:
-            named = {name: arrays[name] for name in Demonstrations._fields[:-1]}
-            found = Demonstrations(**named, episodes=tuple(arrays["episodes"].tolist()))
-        if len(found.actions) >= steps:
-            return found.first(steps)
-    shown = record_demonstrations(env, steps, episode_steps, recording.seed, framing)
-    make_folder(path.parent)
-    # Two arms may record the same ones at the same time, each in a process of its own.
-    part = path.with_name(f".{path.stem}.{os.getpid()}.npz")
-    np.savez(part, **shown._asdict())
-    part.replace(path)
-    return shown

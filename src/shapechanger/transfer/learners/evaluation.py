@@ -1,4 +1,4 @@
-"""How good a policy is: whole episodes, from starts that are the same for every policy."""
+"""Evaluation of policies: whole episodes from starts that are the same for every policy."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.settings import LearnerSettings, Settings
+from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, is_single_instance
+from shapechanger.transfer.learners.settings import Settings
 
 __all__ = [
     "Act",
     "Evaluation",
     "evaluate",
     "evaluation_envs",
-    "is_single_instance",
     "random_actions",
 ]
 
@@ -28,16 +27,15 @@ Act = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Evaluation(msgspec.Struct, frozen=True):
-    """What a policy was worth after a number of steps of training.
+    """Result of evaluating a policy after a number of training steps.
 
     Attributes:
         steps: Env steps of training in this env before the evaluation.
         mean_return: Mean undiscounted return over the episodes.
         mean_length: Mean length of the episodes, in steps.
-        terms: For each reward term that the env reports its mean sum over an episode. A high return
-            of an ant that stands still shows here.
-        success: Share of the episodes whose last `info["is_success"]` is true; None of an env that
-            says nothing of success.
+        terms: Mean sum over an episode of each reward term that the env reports.
+        success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
+            not report success.
     """
 
     steps: int
@@ -47,26 +45,24 @@ class Evaluation(msgspec.Struct, frozen=True):
     success: float | None = None
 
 
-def is_single_instance(env: gym.Env[Any, Any]) -> bool:
-    """Whether there is but one of it, as of a robot: an env says so by `side_by_side = False`."""
-    return not getattr(env.unwrapped, "side_by_side", True)
-
-
 def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
-    """The envs in which policies of one learner are judged: one for each episode, or one for all.
+    """Make the envs in which a learner's policies are evaluated, in held-out surroundings if any.
 
-    An env that has surroundings to hold out, and says so by a method `hold_out`, is judged there.
+    Args:
+        env: The env.
+        settings: Settings of the learner.
+
+    Returns:
+        One env for each episode; a single env if only one instance can exist.
     """
-    more = {}
-    if not isinstance(settings, LearnerSettings):
-        more["max_episode_steps"] = settings.eval_steps
+    limit = settings.episode_limit
+    more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]
     if not is_single_instance(envs[0]):
         envs += [env.make(**more) for _ in range(settings.eval_episodes - 1)]
     for one in envs:
-        hold_out = getattr(one.unwrapped, "hold_out", None)
-        if hold_out is not None:
-            hold_out()
+        if isinstance(one.unwrapped, HasHeldOutStarts):
+            one.unwrapped.hold_out()
     return envs
 
 
@@ -77,15 +73,14 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Play some episodes and take the mean.
+    """Average over episodes.
 
     Args:
         act: The policy.
         envs: The envs; each ends its episodes by itself.
-        seed: The first episode starts from this seed, the next from the next.
-        steps: Recorded with the result.
-        episodes: How many, side by side in all envs and again in all of them until there are so
-            many; one in each env if not given.
+        seed: Seed of the first episode; it increases by one per episode.
+        steps: Training steps so far, for the result.
+        episodes: Number of episodes, rounded up to a multiple of the envs; one per env by default.
     """
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
@@ -106,7 +101,7 @@ def evaluate(
 
 @dataclass(slots=True)
 class _Episode:
-    """What has come of one episode so far."""
+    """Sums over one episode."""
 
     total: float = 0.0
     length: int = 0
@@ -115,7 +110,7 @@ class _Episode:
 
 
 def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episode]:
-    """One episode in each env, side by side."""
+    """Run one episode in each env in parallel."""
     starts = [env.reset(seed=seed + i)[0] for i, env in enumerate(envs)]
     observations = np.stack(starts)
     episodes = [_Episode() for _ in envs]
@@ -141,6 +136,6 @@ def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episo
 
 
 def random_actions(space: gym.Space[Any], seed: int) -> Act:
-    """A policy that draws each action uniformly from its space."""
+    """Return a policy that draws actions uniformly from `space`."""
     space.seed(seed)
     return lambda observations: np.stack([space.sample() for _ in observations])

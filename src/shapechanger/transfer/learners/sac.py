@@ -1,16 +1,18 @@
-"""SAC from camera: a clone of a few demonstrations goes on by trying.
+"""SAC from a camera, starting from a clone of a few demonstrations.
 
-The demonstrations stay in its replay: half of each batch is drawn from them (P. Ball and others,
-Efficient online reinforcement learning with offline data, ICML 2023). The critics learn on them
-alone first, while the clone waits; so they know what driving is worth before they change it. And
-each step of SAC is followed by one of cloning, so that what was shown is not forgotten.
+The demonstrations stay in the replay buffer: half of each batch is drawn from them (P. Ball and
+others, Efficient online reinforcement learning with offline data, ICML 2023). The critics are first
+trained on them alone, with the actor fixed, so that they are accurate before they change it. Each
+SAC update is followed by a cloning step, so that demonstrated behaviour is not forgotten.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final, NotRequired, Required, TypedDict, Unpack, cast
 
+import msgspec
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -19,25 +21,23 @@ from torch.nn import functional
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.replay import MixedReplay
 from shapechanger.demos.cloning.sb3 import from_sb3, to_sb3
-from shapechanger.errors import MissingExtra
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits, env_traits
+from shapechanger.transfer.learners import PolicyOrigin
 from shapechanger.transfer.learners.cloning import (
     DemonstrationFile,
     Demonstrations,
     evaluate_clone,
+    is_clone,
+    load_clone,
     load_or_record,
+    require_camera_env,
     train_clones,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
-
-__all__ = [
-    "AnchoredSAC",
-    "CameraTrainingOptions",
-    "MixedReplay",
-    "train_camera_policy",
-    "train_sac",
-]
 
 try:
     from stable_baselines3 import SAC
@@ -47,24 +47,167 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
+__all__ = [
+    "AnchoredSAC",
+    "CameraLearner",
+    "CameraTrainingOptions",
+    "MixedReplay",
+    "train_camera_policy",
+    "train_sac",
+]
 
-# As in cloning: where the loss turns from a square into a straight line.
+# As in cloning: where the loss turns from quadratic to linear.
 _HUBER_BETA: Final = 0.1
 
 
+class CameraTrainingOptions(TypedDict):
+    """Keyword arguments of both `train_clones` and `train_sac`."""
+
+    demonstrations: Required[DemonstrationFile]
+    start: NotRequired[CameraPolicy | None]
+    only_last: NotRequired[bool]
+    on_evaluation: Required[Callable[[Evaluation], None]]
+    on_steps: NotRequired[Callable[[int], None]]
+
+
+class _CardData(msgspec.Struct):
+    """Provenance in the card of a clone that a study or `shapechanger train` wrote."""
+
+    env: str
+    arguments: dict[str, Any]
+    demonstrated_steps: int
+    tried_steps: int = 0
+
+
+class CameraLearner:
+    """Cloning, or SAC that starts from a clone: a `shapechanger.transfer.learners.Learner`.
+
+    Args:
+        name: Name of the learner.
+        settings: Its settings.
+    """
+
+    def __init__(self, name: str, settings: CloningSettings | SacSettings) -> None:
+        self._name = name
+        self._settings = settings
+
+    def require(self, env: EnvRef, traits: EnvTraits) -> None:
+        """Refuse an env without a camera or a demonstrator."""
+        require_camera_env(str(env), traits.observation_space, traits.has_demonstrator, self._name)
+
+    def train(
+        self,
+        env: EnvRef,
+        steps: int,
+        seed: int,
+        *,
+        body_map: BodyMap | None = None,
+        **options: Unpack[CameraTrainingOptions],
+    ) -> CameraPolicy:
+        """Train a policy; all vehicles share one camera and action, so the body map is unused."""
+        del body_map
+        return _train(env, self._settings, steps, seed, **options)
+
+    def evaluate(self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap) -> Evaluation:
+        """Evaluate a policy; all vehicles share one camera and action."""
+        del body_map
+        return evaluate_clone(env, policy, self._settings)
+
+    def load(self, path: Path, *, trust: bool = False) -> CameraPolicy:
+        """Load a clone, which never contains code."""
+        del trust
+        return load_clone(path)
+
+    def save(self, policy: CameraPolicy, path: Path) -> None:
+        """Write a clone to a file."""
+        policy.save(path)
+
+    def origin(self, path: Path, *, trust: bool = False) -> PolicyOrigin:
+        """Read where a clone comes from.
+
+        Raises:
+            StudyError: If the policy is no clone, or sees other pictures.
+        """
+        if not is_clone(path):
+            card = load_policy(path, trust=trust).card
+            raise StudyError(
+                f"{path} was trained with {card.learner}, and {self._name} starts from "
+                f"demonstrations: give --learner {card.learner}, or a clone."
+            )
+        card = load_clone(path).card
+        wanted = self._settings.clone.framing
+        if card.framing != wanted:
+            raise StudyError(
+                f"{path} takes pictures of {card.framing.height} x {card.framing.width} pixels "
+                f"from {card.framing.top:g} of their height on, and {self._name} "
+                f"{wanted.height} x {wanted.width} from {wanted.top:g}: give a clone that takes "
+                "the same pictures."
+            )
+        try:
+            data = msgspec.convert(card.data, _CardData)
+        except msgspec.ValidationError as error:
+            raise StudyError(
+                f"The card of {path} lacks the demonstrations that it was cloned from ({error}): "
+                "give a clone that `shapechanger train` or a study has written."
+            ) from error
+        steps = data.demonstrated_steps + data.tried_steps
+        return PolicyOrigin(EnvRef(data.env, data.arguments), steps)
+
+
+def train_camera_policy(
+    env: EnvRef,
+    settings: CloningSettings | SacSettings,
+    steps: int,
+    seed: int,
+    **options: Unpack[CameraTrainingOptions],
+) -> CameraPolicy:
+    """Train with cloning or SAC, as the settings are; see `train_clones` and `train_sac`.
+
+    Args:
+        env: The env.
+        settings: The settings.
+        steps: Budget, in steps.
+        seed: Seed of the training.
+        **options: Keyword arguments of `train_clones` and `train_sac`.
+
+    Raises:
+        StudyError: If the env has no camera or no demonstrator.
+    """
+    made = env.make()
+    try:
+        traits = env_traits(made)
+    finally:
+        made.close()
+    name = "cloning" if isinstance(settings, CloningSettings) else "sac"
+    CameraLearner(name, settings).require(env, traits)
+    return _train(env, settings, steps, seed, **options)
+
+
+def _train(
+    env: EnvRef,
+    settings: CloningSettings | SacSettings,
+    steps: int,
+    seed: int,
+    **options: Unpack[CameraTrainingOptions],
+) -> CameraPolicy:
+    if isinstance(settings, CloningSettings):
+        return train_clones(env, settings, steps, seed, **options)
+    return train_sac(env, settings, steps, seed, **options)
+
+
 class AnchoredSAC(SAC):
-    """SAC that takes a step of cloning after each of its own, so that it forgets nobody's driving.
+    """SAC that takes a cloning step after each update, so that demonstrations are not forgotten.
 
     Attributes:
-        shown: Features and meant actions of the demonstrations, each (n, ...); None for none.
-        anchor: Takes the steps of cloning.
+        shown: Features and intended actions of the demonstrations, each (n, ...); None for none.
+        anchor: Optimiser of the cloning steps.
     """
 
     shown: tuple[Tensor, Tensor] | None = None
     anchor: torch.optim.Optimizer | None = None
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """So many steps of both."""
+        """Take `gradient_steps` steps of both."""
         super().train(gradient_steps, batch_size)
         if self.shown is None or self.anchor is None:
             return
@@ -90,21 +233,21 @@ def train_sac(
     on_evaluation: Callable[[Evaluation], None],
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> CameraPolicy:
-    """Clone demonstrations, go on by trying, and judge what was learned along the way.
+    """Clone demonstrations, continue with SAC, and evaluate along the way.
 
     Args:
         env: The env.
-        settings: How.
-        steps: How many steps in it, those of the demonstrations included.
-        seed: Of everything random in it.
-        demonstrations: Where they are, or come to be.
-        start: A policy to go on from, in place of none.
-        only_last: Whether only the first and the last evaluation are of interest.
+        settings: The settings.
+        steps: Number of steps, demonstrated ones included.
+        seed: Seed of the training.
+        demonstrations: File of the demonstrations; recorded if missing.
+        start: The policy to start from; None for a new one.
+        only_last: Skip all evaluations but the first and the last.
         on_evaluation: Called with each evaluation.
         on_steps: Called with the number of steps.
 
     Returns:
-        The policy at the end, without its noise.
+        The final policy, without exploration noise.
     """
     cloning = settings.cloning()
     first = train_clones(
@@ -135,16 +278,18 @@ def train_sac(
             batch_size=settings.batch_size,
             gamma=settings.gamma,
             ent_coef=settings.ent_coef,
-            learning_starts=0,  # Before that SB3 would drive at random.
+            learning_starts=0,  # SB3 would act at random before.
             buffer_size=max(tried, settings.batch_size),
             replay_buffer_class=MixedReplay,
             device="cpu",
         )
         replay = _as_replay(shown, first, model)
         cast("Any", model.replay_buffer).demonstrations = replay
-        _teach_critics(model, replay, settings)
-        _drop_anchor(model, shown, first, settings)
-        watcher = _Watcher(env, settings, first, tried, only_last, on_evaluation, on_steps)
+        _warm_up_critics(model, replay, settings)
+        _add_anchor(model, shown, first, settings)
+        watcher = _PeriodicEvaluation(
+            env, settings, first, tried, only_last, on_evaluation, on_steps
+        )
         cast("Any", model).learn(tried, callback=watcher)
         policy = from_sb3(model, first)
         on_evaluation(evaluate_clone(env, policy, settings, steps))
@@ -154,7 +299,7 @@ def train_sac(
 
 
 def _as_replay(shown: Demonstrations, policy: CameraPolicy, model: SAC) -> ReplayBuffer:
-    """Demonstrations as transitions. The last step of an episode has no next picture."""
+    """Turn demonstrations into transitions; the last step of an episode has no next picture."""
     learner = cast("Any", model)
     replay = ReplayBuffer(
         len(shown.rewards), learner.observation_space, learner.action_space, device=model.device
@@ -175,8 +320,8 @@ def _as_replay(shown: Demonstrations, policy: CameraPolicy, model: SAC) -> Repla
     return replay
 
 
-def _teach_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) -> None:
-    """Let the critics judge the clone by what was demonstrated, and leave the clone as it is."""
+def _warm_up_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) -> None:
+    """Train the critics on the demonstrations with the actor fixed."""
     learner = cast("Any", model)
     for _ in range(settings.critic_warm_up):
         batch = replay.sample(settings.batch_size)
@@ -193,10 +338,10 @@ def _teach_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) -> N
         polyak_update(learner.critic.parameters(), learner.critic_target.parameters(), learner.tau)
 
 
-def _drop_anchor(
+def _add_anchor(
     model: SAC, shown: Demonstrations, policy: CameraPolicy, settings: SacSettings
 ) -> None:
-    """Let it go on cloning what was shown, as far as the settings ask for that."""
+    """Add the cloning step, if the settings have one."""
     if not settings.anchor_rate or not isinstance(model, AnchoredSAC):
         return
     model.shown = torch.as_tensor(policy.features(shown.pictures)), torch.as_tensor(shown.actions)
@@ -204,8 +349,8 @@ def _drop_anchor(
     model.anchor = torch.optim.Adam(hands.parameters(), lr=settings.anchor_rate)
 
 
-class _Watcher(BaseCallback):
-    """Judges the policy every so many steps, but neither before the first nor after the last."""
+class _PeriodicEvaluation(BaseCallback):
+    """Evaluates the policy at regular steps between the first and the last."""
 
     def __init__(
         self,
@@ -235,26 +380,3 @@ class _Watcher(BaseCallback):
             policy = from_sb3(cast("SAC", self.model), self._first)
             self._on_evaluation(evaluate_clone(self._env, policy, self._settings, done))
         return True
-
-
-class CameraTrainingOptions(TypedDict):
-    """What `train_clones` and `train_sac` both take by name."""
-
-    demonstrations: Required[DemonstrationFile]
-    start: NotRequired[CameraPolicy | None]
-    only_last: NotRequired[bool]
-    on_evaluation: Required[Callable[[Evaluation], None]]
-    on_steps: NotRequired[Callable[[int], None]]
-
-
-def train_camera_policy(
-    env: EnvRef,
-    settings: CloningSettings | SacSettings,
-    steps: int,
-    seed: int,
-    **options: Unpack[CameraTrainingOptions],
-) -> CameraPolicy:
-    """Learn as the settings say; see `train_clones` and `train_sac`."""
-    if isinstance(settings, CloningSettings):
-        return train_clones(env, settings, steps, seed, **options)
-    return train_sac(env, settings, steps, seed, **options)

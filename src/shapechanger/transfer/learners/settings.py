@@ -1,4 +1,4 @@
-"""How a learner is set up; the sets that ship were tuned, and say on what."""
+"""Learner settings: PPO, cloning, and SAC from a camera; the shipped sets were tuned."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from shapechanger.errors import StudyError, UnknownName
 __all__ = [
     "LEARNERS",
     "CloningSettings",
-    "LearnerSettings",
+    "PpoSettings",
     "SacSettings",
     "Settings",
     "learner_settings",
 ]
 
 
-class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
+class PpoSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
     """Settings of Stable-Baselines3's PPO, under its names.
 
     Attributes:
-        n_envs: Envs stepped together.
+        n_envs: Number of parallel envs.
         n_steps: Steps of each env between two updates.
         batch_size: Steps in a minibatch.
         n_epochs: Passes over the steps of an update.
-        learning_rate: Of Adam.
+        learning_rate: Learning rate of Adam.
         gamma: Discount.
-        gae_lambda: Of generalised advantage estimation.
-        clip_range: Of the policy ratio.
+        gae_lambda: Lambda of generalised advantage estimation.
+        clip_range: Clipping range of the policy ratio.
         ent_coef: Weight of the entropy.
-        log_std_init: Logarithm of the first standard deviation of the actions.
+        log_std_init: Initial logarithm of the standard deviation of the actions.
         net_arch: Widths of the hidden layers, of actor and critic each.
         normalise: Whether observations and rewards are divided by running estimates of their
             standard deviation (`VecNormalize`).
-        steps: Env steps of a training, where nobody asks for another number.
-        source_steps: The same of a source policy; 0 for half as many as on the target, so that
-            there is something left to compare when they are counted too.
+        steps: Default env steps of a training.
+        source_steps: Default env steps of a source policy; 0 for half as many as on the target, so
+            that total steps leave something to compare.
         eval_every: Target steps between two evaluations, at least `n_envs * n_steps`.
-        eval_episodes: Episodes of an evaluation, with actions that are the policy's mean.
+        eval_episodes: Episodes of an evaluation, with the policy's mean actions.
     """
 
     n_envs: int
@@ -72,23 +72,38 @@ class LearnerSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
 
     @property
     def update_steps(self) -> int:
-        """Env steps between two updates: the grain that every budget is rounded up to."""
+        """Env steps between two updates; budgets are rounded up to a multiple of it."""
         return self.n_envs * self.n_steps
 
     def whole_updates(self, steps: int) -> int:
-        """The least number of env steps that is `steps` or more and ends with an update."""
+        """Round `steps` up to whole updates."""
         return -(-steps // self.update_steps) * self.update_steps
+
+    @property
+    def last_k(self) -> int:
+        """Number of final evaluations that count as the end of a run."""
+        return 3
+
+    @property
+    def episode_limit(self) -> int | None:
+        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
+        return None
+
+    def for_budget(self, steps: int) -> PpoSettings:
+        """Return the settings for a shorter budget: four evaluations, no source default."""
+        every = min(self.eval_every, self.whole_updates(steps // 4))
+        return msgspec.structs.replace(self, eval_every=every, source_steps=0)
 
 
 class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
-    """Settings of cloning: a step is one of a demonstration, and what is scarce is their number.
+    """Settings of behavioural cloning, in which a step is a demonstrated step.
 
     Attributes:
         budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
-        episode_steps: Steps of a demonstration, after which the next begins on another course.
+        episode_steps: Steps of a demonstration; the next begins on another course.
         eval_episodes: Episodes of an evaluation.
         eval_steps: Steps of each of them.
-        clone: How a policy is trained on so many steps.
+        clone: Settings of each training.
     """
 
     budgets: tuple[int, ...]
@@ -109,7 +124,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
 
     @property
     def steps(self) -> int:
-        """Demonstrated steps, where nobody asks for another number."""
+        """Default number of demonstrated steps."""
         return self.budgets[-1]
 
     @property
@@ -118,31 +133,50 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return self.budgets[0]
 
     def whole_updates(self, steps: int) -> int:
-        """The smallest budget that is `steps` or more; the largest, if none is."""
+        """Round `steps` up to a budget; the largest if all are smaller."""
         return next((budget for budget in self.budgets if budget >= steps), self.budgets[-1])
 
+    @property
+    def last_k(self) -> int:
+        """Number of final evaluations that count: each one is of another clone."""
+        return 1
+
+    @property
+    def episode_limit(self) -> int | None:
+        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
+        return self.eval_steps
+
+    @property
+    def source_steps(self) -> int:
+        """Default steps of a source policy: none of its own."""
+        return 0
+
+    def for_budget(self, steps: int) -> CloningSettings:
+        """Return the settings for a shorter budget: the same."""
+        return self
+
     def within(self, steps: int) -> tuple[int, ...]:
-        """The budgets up to so many steps."""
+        """Return the budgets up to `steps`."""
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
 class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
-    """Settings of SAC from camera, which begins with a clone; those of SAC under SB3's names.
+    """Settings of SAC from a camera, starting from a clone; those of SAC under SB3's names.
 
     Attributes:
-        demonstrated_steps: Steps of demonstrations, which are cloned, and stay in the replay.
-        steps: Steps where nobody asks for another number, those of the demonstrations included.
-        episode_steps: Steps of an episode, after which the next begins on another course.
-        eval_every: Steps of trying between two evaluations.
-        eval_episodes: Episodes of an evaluation, with actions that are the policy's mean.
+        demonstrated_steps: Demonstrated steps, which are cloned and stay in the replay buffer.
+        steps: Default number of steps, demonstrated ones included.
+        episode_steps: Steps of an episode; the next begins on another course.
+        eval_every: Steps of SAC between two evaluations.
+        eval_episodes: Episodes of an evaluation, with the policy's mean actions.
         eval_steps: Steps of each of them.
-        learning_rate: Of Adam, of actor and critics.
+        learning_rate: Learning rate of Adam, for actor and critics.
         batch_size: Transitions in a batch; half of them are demonstrated.
         gamma: Discount.
         ent_coef: Weight of the entropy.
-        critic_warm_up: Updates of the critics before the first step of trying.
-        anchor_rate: Learning rate of the step of cloning after each of SAC's own; 0 for none.
-        clone: How the demonstrations are cloned.
+        critic_warm_up: Updates of the critics before the first step of SAC.
+        anchor_rate: Learning rate of the cloning step after each SAC update; 0 for none.
+        clone: Settings of cloning.
     """
 
     demonstrated_steps: int
@@ -168,12 +202,31 @@ class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
             )
 
     def whole_updates(self, steps: int) -> int:
-        """The least number of steps that is `steps` or more and ends with an evaluation."""
+        """Round `steps` up so that SAC ends with an evaluation."""
         tried = max(1, -(-(steps - self.demonstrated_steps) // self.eval_every))
         return self.demonstrated_steps + tried * self.eval_every
 
+    @property
+    def last_k(self) -> int:
+        """Number of final evaluations that count as the end of a run."""
+        return 3
+
+    @property
+    def episode_limit(self) -> int | None:
+        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
+        return self.eval_steps
+
+    @property
+    def source_steps(self) -> int:
+        """Default steps of a source policy: none of its own."""
+        return 0
+
+    def for_budget(self, steps: int) -> SacSettings:
+        """Return the settings for a shorter budget: the same."""
+        return self
+
     def cloning(self) -> CloningSettings:
-        """How its demonstrations are cloned."""
+        """Return the settings of its cloning phase."""
         return CloningSettings(
             budgets=(self.demonstrated_steps,),
             episode_steps=self.episode_steps,
@@ -183,12 +236,12 @@ class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
         )
 
 
-Settings = LearnerSettings | CloningSettings | SacSettings
+Settings = PpoSettings | CloningSettings | SacSettings
 """The settings of any learner."""
 
-# Tuned on the finger that reaches, and not further: each of four seeds ends with 200 of 200
+# Tuned on the reaching finger only: each of four seeds ends with 200 of 200
 # targets reached (`python -m benchmarks.run finger-learned`).
-_FINGER: Final = LearnerSettings(
+_FINGER: Final = PpoSettings(
     n_envs=16,
     n_steps=128,
     batch_size=256,
@@ -206,11 +259,11 @@ _FINGER: Final = LearnerSettings(
 
 # `ppo-balance` was tuned on InvertedPendulum and BigInvertedPendulum: within 24,576 steps the
 # latter ends at 1,000 on 5 of 5 seeds (benchmarks/results/demo.json). SmallInvertedPendulum is
-# harder: both of two seeds tried reach 1,000, and one of them has fallen to 744 at the end.
+# harder: both of two seeds reach 1,000, and one has dropped to 744 at the end.
 # `ppo-run` was tuned on the ant: `shapechanger train Ant` (seed 0) ends upright at 1.45 m/s, a
 # return of 2,215, after 1,048,576 steps (benchmarks/results/train-ant.txt).
 LEARNERS: Final[dict[str, Settings]] = {
-    "ppo-balance": LearnerSettings(
+    "ppo-balance": PpoSettings(
         n_envs=16,
         n_steps=64,
         batch_size=128,
@@ -220,7 +273,7 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_every=3072,
         eval_episodes=5,
     ),
-    "ppo-run": LearnerSettings(
+    "ppo-run": PpoSettings(
         n_envs=64,
         n_steps=128,
         batch_size=2048,
@@ -233,22 +286,22 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_episodes=5,
     ),
     "ppo-finger": _FINGER,
-    # What a rig moves for ten minutes; what is learned in simulation costs nothing.
+    # Ten minutes of a rig's motion; source steps in simulation are cheap.
     "ppo-rig": msgspec.structs.replace(
         _FINGER, steps=30_720, source_steps=307_200, eval_every=6144
     ),
     # Half a minute, and 1, 2, 5 and 10 minutes, at 20 steps a second.
     "cloning": CloningSettings(
         budgets=(600, 1200, 2400, 6000, 12_000),
-        episode_steps=200,  # So that half a minute already shows three courses.
+        episode_steps=200,  # So that half a minute already covers three courses.
         eval_episodes=4,
         eval_steps=400,
-        # A few held-out pictures choose badly: they stopped two minutes of driving after 150 steps.
+        # Early stopping on few held-out pictures is unreliable: it stopped after 150 steps.
         clone=CloneSettings(held_out=0.0),
     ),
-    # A minute of demonstrations, and nine of trying. Chosen on the tank that begins with the car's
-    # clone (seed 100, up to 8,400 steps): without an anchor, or ten times as fast, it was soon
-    # worse than the clone; with settings near to these it stayed about as good, and no better.
+    # A minute of demonstrations and nine of SAC. Chosen on the tank that starts from the car's
+    # clone (seed 100, up to 8,400 steps): without the anchor, or with ten times the learning rate,
+    # it soon fell below the clone; near these settings it stayed as good as the clone, not better.
     "sac": SacSettings(
         demonstrated_steps=1200,
         steps=12_000,
@@ -268,10 +321,10 @@ LEARNERS: Final[dict[str, Settings]] = {
 
 
 def learner_settings(name: str) -> Settings:
-    """The settings of this name.
+    """Return the shipped settings of a learner.
 
     Raises:
-        UnknownName: If there are none.
+        UnknownName: If no learner has this name.
     """
     if name not in LEARNERS:
         raise UnknownName("learner", name, LEARNERS)

@@ -1,11 +1,9 @@
-"""Simulated Dynamixel servos on a bus: they take and give bytes of protocol 2.0.
+"""Simulated Dynamixel servos, which speak protocol 2.0 byte by byte.
 
-`Line` (`line`) is the bus with its servos; its time moves only when it is told to. Above it `port`
-is a port for the driver in the same process, `pty` a pseudo-terminal for anything that opens a
-serial device. Below it: `packets` and `table` are the protocol and the registers, `servo` one
-servo, `motor` how it turns, `load` what it pulls at.
-
-What no source tells and the twin assumes is marked "assumed"; the list is in `servo`.
+`bus` has the bus and its servos, `rig` the servos of a robot by tendon, `port` a port for the
+SDK. Below them, `protocol` has packets and registers, `servo` one servo, and `motor` its motor,
+its tendon and the load. The SDK's own packet code never runs on this side, so each side tests the
+other. Assumptions are marked "assumed" and listed in `servo`.
 """
 
 from __future__ import annotations

@@ -1,18 +1,164 @@
-"""How a servo in current mode turns: current, torque, friction, inertia, heat."""
+"""Motor of a servo in current mode, its tendon, and the load at the other end."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final, Protocol
 
-from shapechanger.twin.servos.models import TwinModel
+from shapechanger.errors import UnknownName
 
-__all__ = ["EndStops", "Load", "SimulatedMotor", "Tendon"]
+__all__ = ["MODELS", "EndStops", "Load", "SimulatedMotor", "Tendon", "TwinModel", "twin_model"]
 
-# Heat, all chosen: a servo that stalls with half its current gets some 55 degrees warmer, with a
-# time constant of two minutes. Nothing was found that says so.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwinModel:
+    """Model of a servo.
+
+    Attributes:
+        number: Model number.
+        ampere_per_count: Unit of current registers, A.
+        most_counts: Largest current limit, in that unit.
+        stall_nm: Stall torque at `volts`, N·m.
+        stall_a: Stall current at `volts`, A.
+        no_load_rpm: Speed without load at `volts`, turns per minute.
+        volts: Nominal voltage, V.
+        least_v: Lowest voltage limit, V.
+        most_v: Highest voltage limit, V.
+        most_c: Temperature limit, degrees Celsius.
+        shutdown: Hardware errors that shut it off, as bits.
+        inertia: Inertia of motor and gears at the output, kg·m2.
+        friction_nm: Coulomb friction at the output, N·m.
+        viscous: Viscous friction at the output, N·m·s/rad.
+    """
+
+    number: int
+    ampere_per_count: float
+    most_counts: int
+    stall_nm: float
+    stall_a: float
+    no_load_rpm: float
+    volts: float
+    least_v: float
+    most_v: float
+    most_c: int
+    shutdown: int
+    inertia: float
+    friction_nm: float
+    viscous: float
+
+    @property
+    def torque_constant(self) -> float:
+        """Torque at the output per current, N·m/A."""
+        return self.stall_nm / self.stall_a
+
+    @property
+    def electric_rad_per_s(self) -> float:
+        """Speed at which no current flows, above that without load, where friction takes some."""
+        no_load = self.no_load_rpm * 2.0 * math.pi / 60.0
+        lost = (self.friction_nm + self.viscous * no_load) / self.stall_nm
+        return no_load / (1.0 - lost)
+
+
+# Limits, torques and speeds: ROBOTIS e-manual. Inertia and friction of the XL330-M288: identified
+# by Rhoban's `bam` (xl330/m1); of the M077: the same, scaled by the square of the
+# gear ratio; of the XC330-M288: fits on joints of a LEAP hand, with the viscous part of the XL330
+# assumed; of the XM430: chosen for want of a source.
+_X330: Final = {
+    "ampere_per_count": 1e-3,
+    "volts": 5.0,
+    "least_v": 3.5,
+    "most_v": 7.0,
+    "most_c": 70,
+}
+_XM430: Final = {
+    "ampere_per_count": 2.69e-3,
+    "most_counts": 1193,
+    "stall_a": 2.3,
+    "volts": 12.0,
+    "least_v": 9.5,
+    "most_v": 16.0,
+    "most_c": 80,
+    "shutdown": 52,
+}
+_MODELS: Final = {
+    "XL330-M288": {
+        **_X330,
+        "number": 1200,
+        "most_counts": 1750,
+        "stall_nm": 0.52,
+        "stall_a": 1.47,
+        "no_load_rpm": 103.0,
+        "shutdown": 53,
+        "inertia": 0.00199,
+        "friction_nm": 0.018,
+        "viscous": 0.0059,
+    },
+    "XL330-M077": {
+        **_X330,
+        "number": 1190,
+        "most_counts": 1750,
+        "stall_nm": 0.215,
+        "stall_a": 1.47,
+        "no_load_rpm": 383.0,
+        "shutdown": 53,
+        "inertia": 0.000144,
+        "friction_nm": 0.005,
+        "viscous": 0.00043,
+    },
+    "XC330-M288": {
+        **_X330,
+        "number": 1240,
+        "most_counts": 2352,
+        "stall_nm": 0.93,
+        "stall_a": 1.80,
+        "no_load_rpm": 81.0,
+        "shutdown": 52,
+        "inertia": 0.00141,
+        "friction_nm": 0.029,
+        "viscous": 0.0059,
+    },
+    "XM430-W210": {
+        **_XM430,
+        "number": 1030,
+        "stall_nm": 3.0,
+        "no_load_rpm": 77.0,
+        "inertia": 0.003,
+        "friction_nm": 0.09,
+        "viscous": 0.02,
+    },
+    "XM430-W350": {
+        **_XM430,
+        "number": 1020,
+        "stall_nm": 4.1,
+        "no_load_rpm": 46.0,
+        "inertia": 0.008,
+        "friction_nm": 0.12,
+        "viscous": 0.05,
+    },
+}
+
+MODELS: Final[Mapping[str, TwinModel]] = MappingProxyType(
+    {name: TwinModel(**numbers) for name, numbers in _MODELS.items()}  # pyright: ignore[reportArgumentType]
+)
+"""Models of simulated servos, by name."""
+
+
+def twin_model(name: str) -> TwinModel:
+    """Return a model by its name.
+
+    Raises:
+        UnknownName: If there is no such model.
+    """
+    if name not in MODELS:
+        raise UnknownName("servo model", name, MODELS)
+    return MODELS[name]
+
+
+# Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
+# degrees warmer, with a time constant of two minutes.
 _ROOM_C: Final = 25.0
 _KELVIN_PER_WATT: Final = 30.0
 _HEAT_S: Final = 120.0
@@ -20,14 +166,13 @@ _HEAT_S: Final = 120.0
 
 @dataclass(slots=True)
 class Tendon:
-    """What connects a spool to the load.
+    """Tendon between a spool and the load.
 
     Attributes:
-        spool_radius_m: m.
-        direction: 1 if a positive angle winds in.
-        stiffness: Of cable and frame, N/m. Chosen: a good millimetre for 25 N. A load whose end
-            has a mass of m kg must be able to follow a spring of this stiffness in steps of 1 ms:
-            m should be more than 0.01 kg.
+        spool_radius_m: Radius of the spool, m.
+        direction: 1 if a positive angle winds in, -1 if it lets out.
+        stiffness: Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end
+            of the load needs a mass of more than 0.01 kg to follow such a spring in steps of 1 ms.
         snapped: Whether it is torn.
     """
 
@@ -38,19 +183,19 @@ class Tendon:
 
 
 class SimulatedMotor:
-    """One motor with its gears, its spool and its end of a tendon.
+    """A motor with its gears, its spool and its end of a tendon.
 
     Args:
-        model: Which model.
-        tendon: What it pulls.
-        angle: Where its spool is while the tendon is just taut and its far end at 0, rad.
+        model: Model of the servo.
+        tendon: Its tendon.
+        angle: Angle of the spool while the tendon is just taut and its far end at 0, rad.
 
     Attributes:
-        angle: rad, over many turns.
-        speed: rad/s.
-        current: What flows, A.
-        tension: What pulls at the tendon, N.
-        temperature: Degrees Celsius.
+        angle: Angle of the spool over many turns, rad.
+        speed: Speed of the spool, rad/s.
+        current: Current, A.
+        tension: Tension of the tendon, N.
+        temperature: Temperature, degrees Celsius.
     """
 
     def __init__(self, model: TwinModel, tendon: Tendon, angle: float = 0.0) -> None:
@@ -64,13 +209,13 @@ class SimulatedMotor:
         self.temperature = _ROOM_C
 
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
-        """Turn for a short time.
+        """Turn for one short step.
 
         Args:
-            goal_a: Current that is wanted, A; 0 lets it coast.
-            volts: Of its supply.
-            travel_m: Where the tendon's far end is, m towards the spool.
-            dt_s: How long.
+            goal_a: Goal of the current, A; with 0 the motor coasts.
+            volts: Voltage of the supply.
+            travel_m: How far the tendon's far end is towards the spool, m.
+            dt_s: Length of the step, s.
         """
         model, tendon = self._model, self._tendon
         # The faster it turns, the less current the voltage can still drive.
@@ -80,8 +225,8 @@ class SimulatedMotor:
         least = model.stall_a * (-share - self.speed / free)
         self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, min(least, 0.0)), max(most, 0.0))
         lever = tendon.direction * tendon.spool_radius_m
-        # Speeds are those at the end of the step, in friction and cable too, so that a stiff cable
-        # does not need a tiny step.
+        # Friction and cable use the speed at the end of the step, so that a stiff cable does not
+        # need a tiny step.
         inertia = model.inertia + dt_s * model.viscous
         torque = model.torque_constant * self.current
         if self._pull(travel_m) > 0.0:
@@ -96,7 +241,7 @@ class SimulatedMotor:
         self._warm(dt_s)
 
     def _pull(self, travel_m: float) -> float:
-        """Tension for where both ends are, N."""
+        """Return the tension for the positions of both ends, N."""
         tendon = self._tendon
         if tendon.snapped:
             return 0.0
@@ -110,31 +255,34 @@ class SimulatedMotor:
 
 
 class Load(Protocol):
-    """What is at the far end of all tendons of a line, such as a finger."""
+    """Load at the far ends of all tendons of a bus, such as a finger."""
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
-        """Let some time go by under these tensions.
+        """Move under these tensions for one step.
 
         Args:
-            tensions_n: N for each tendon, in the order of the servos; never below 0.
-            dt_s: How long they act.
+            tensions_n: Tension of each tendon, N, in the order of the servos; at least 0.
+            dt_s: Length of the step, s.
 
         Returns:
-            How far each tendon's end has moved towards its spool since the beginning, m; below 0
-            for away from it.
+            How far each tendon's end is towards its spool since the beginning, m; negative away
+            from it.
         """
         ...
 
 
 class EndStops:
-    """For each tendon a spring with a damper between two stops; it has no mass.
+    """For each tendon a massless spring with a damper between two stops.
 
     Args:
-        count: How many tendons.
-        stiffness: N/m.
-        damping: N·s/m.
+        count: Number of tendons.
+        stiffness: Stiffness of each spring, N/m.
+        damping: Damping of each spring, N·s/m.
         nearest_m: How far an end can be pulled, m.
-        farthest_m: How far it can go the other way, m; 0 or below.
+        farthest_m: How far it can go the other way, m; at most 0.
+
+    Attributes:
+        travels: How far the ends are towards their spools, m.
     """
 
     def __init__(
@@ -149,10 +297,9 @@ class EndStops:
         self._lag_s = damping / stiffness
         self._range = (farthest_m, nearest_m)
         self.travels = [0.0] * count
-        """Where the ends are, m."""
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
-        """Let some time go by; see `Load`."""
+        """Move under these tensions; see `Load.pull`."""
         keep = math.exp(-dt_s / self._lag_s)
         low, high = self._range
         for i, tension in enumerate(tensions_n):

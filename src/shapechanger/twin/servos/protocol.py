@@ -1,4 +1,4 @@
-"""Packets of protocol 2.0, from the servo's side.
+"""Packets and registers of Dynamixel protocol 2.0, from the servo's side.
 
 Source: ROBOTIS e-manual, DYNAMIXEL Protocol 2.0. Nothing here comes from the SDK, so that each
 tests the other.
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from shapechanger.twin.servos.models import TwinModel
+from shapechanger.twin.servos.motor import TwinModel
 
 __all__ = [
     "ACCESS",
@@ -23,35 +23,35 @@ __all__ = [
     "Table",
     "TableError",
     "crc16",
-    "packed",
+    "pack",
     "status",
 ]
 
 BROADCAST: Final = 0xFE
-"""The id that means everybody."""
+"""Id that addresses all servos."""
 
 _HEADER: Final = b"\xff\xff\xfd"
 _STATUS: Final = 0x55
 _BEFORE_LENGTH: Final = 7  # Header, reserved byte, id and the length itself.
 _LEAST_LENGTH: Final = 3  # Instruction and CRC.
-# Assumed: what a servo can hold. The SDK sends no more.
+# Assumed: buffer of a servo. The SDK sends no longer packets.
 _MOST_LENGTH: Final = 1024
 
 
 class Packet(NamedTuple):
-    """An instruction that has arrived.
+    """An instruction packet.
 
     Attributes:
-        id: Who is meant.
-        instruction: Its code.
-        parameters: What it needs; stuffing is removed.
-        is_whole: Whether its CRC fits.
+        id: Id of the addressed servo.
+        instruction: Code of the instruction.
+        parameters: Parameters, without stuffing.
+        is_valid: Whether the CRC matches.
     """
 
     id: int
     instruction: int
     parameters: bytes
-    is_whole: bool
+    is_valid: bool
 
 
 def _table() -> tuple[int, ...]:
@@ -68,20 +68,20 @@ _CRC: Final = _table()
 
 
 def crc16(data: bytes, crc: int = 0) -> int:
-    """CRC-16 with the polynomial x^16 + x^15 + x^2 + 1, starting from `crc`."""
+    """Return the CRC-16 with the polynomial x^16 + x^15 + x^2 + 1, starting from `crc`."""
     for byte in data:
         crc = (crc << 8 & 0xFFFF) ^ _CRC[crc >> 8 ^ byte]
     return crc
 
 
-def packed(servo_id: int, code: int, body: bytes, *, stuffs: bool = True) -> bytes:
-    """A whole packet.
+def pack(servo_id: int, code: int, body: bytes, *, stuffs: bool = True) -> bytes:
+    """Return a packet.
 
     Args:
-        servo_id: Whose, or for whom.
-        code: The instruction, or 0x55 for a status.
-        body: What follows it, up to the CRC.
-        stuffs: Whether FF FF FD becomes FF FF FD FD in it.
+        servo_id: Id of the sender or the addressee.
+        code: Code of the instruction, or 0x55 for a status.
+        body: Bytes between the code and the CRC.
+        stuffs: Whether to replace FF FF FD by FF FF FD FD in it.
     """
     inner = bytes([code]) + body
     if stuffs:
@@ -92,27 +92,27 @@ def packed(servo_id: int, code: int, body: bytes, *, stuffs: bool = True) -> byt
 
 
 def status(servo_id: int, error: int, data: bytes = b"") -> bytes:
-    """What a servo answers."""
-    return packed(servo_id, _STATUS, bytes([error]) + data)
+    """Return the status packet of a servo."""
+    return pack(servo_id, _STATUS, bytes([error]) + data)
 
 
 class Parser:
-    """Finds packets in a stream of bytes, whatever lies between them."""
+    """Finds packets in a stream of bytes, and skips whatever lies between them."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     @property
     def waits(self) -> bool:
-        """Whether it holds the beginning of a packet."""
+        """True if it holds the start of a packet."""
         return bool(self._bytes)
 
     def forget(self) -> None:
-        """Drop the beginning of a packet whose end never came."""
+        """Discard the start of a packet whose end never came."""
         self._bytes.clear()
 
     def feed(self, data: bytes) -> list[Packet]:
-        """The packets that end in these bytes."""
+        """Return the packets that end in these bytes."""
         self._bytes += data
         found: list[Packet] = []
         while (packet := self._next()) is not None:
@@ -124,7 +124,7 @@ class Parser:
         while True:
             start = held.find(_HEADER)
             if start < 0:
-                del held[: max(0, len(held) - 2)]  # FF FF may be the beginning of a header.
+                del held[: max(0, len(held) - 2)]  # FF FF may start a header.
                 return None
             del held[:start]
             if len(held) < _BEFORE_LENGTH:
@@ -137,11 +137,11 @@ class Parser:
         if len(held) < end:
             return None
         whole = bytes(held[:end])
-        is_whole = crc16(whole[:-2]) == int.from_bytes(whole[-2:], "little")
+        is_valid = crc16(whole[:-2]) == int.from_bytes(whole[-2:], "little")
         # A damaged packet may have swallowed the header of the next one.
-        del held[: end if is_whole else 1]
+        del held[: end if is_valid else 1]
         inner = whole[_BEFORE_LENGTH:-2].replace(_HEADER + b"\xfd", _HEADER)
-        return Packet(whole[4], inner[0], inner[1:], is_whole)
+        return Packet(whole[4], inner[0], inner[1:], is_valid)
 
 
 RANGE: Final = 4
@@ -156,7 +156,7 @@ _ANY: Final = 1 << 31
 
 @dataclass(frozen=True, slots=True)
 class _Field:
-    """One register; `low` above `high` for one that cannot be written."""
+    """A register; `low` is above `high` for one that cannot be written."""
 
     size: int
     initial: int = 0
@@ -232,10 +232,10 @@ def _fields(model: TwinModel) -> dict[int, _Field]:
 
 
 class TableError(Exception):
-    """What a servo answers instead.
+    """Error number of a status packet.
 
     Attributes:
-        number: Of the error.
+        number: The number.
     """
 
     def __init__(self, number: int) -> None:
@@ -244,14 +244,14 @@ class TableError(Exception):
 
 
 class Table:
-    """The registers of one servo.
+    """Control table of a servo.
 
     Args:
-        model: Which model.
-        servo_id: Its id.
+        model: Model of the servo.
+        servo_id: Id of the servo.
         firmware: Version of its firmware.
-        baud_code: Register 8.
-        check: Refuses a value by raising `TableError`; asked before anything is written.
+        baud_code: Value of register 8, the baud rate.
+        check: Called with address and value before a register is written; raises `TableError`.
     """
 
     def __init__(
@@ -272,42 +272,42 @@ class Table:
             self.set(at, value)
 
     def get(self, at: int) -> int:
-        """The register that begins here. Present values are signed."""
+        """Return the register at an address. Present values are signed."""
         field = self._fields[at]
         signed = field.is_signed or 126 <= at < 144
         data = self._bytes[at : at + field.size]
         return int.from_bytes(data, "little", signed=signed)
 
     def set(self, at: int, value: int) -> None:
-        """Let a register be this, as the servo itself does; nothing is checked."""
+        """Set a register without checks, as the servo itself does."""
         size = self._fields[at].size
         self._bytes[at : at + size] = (value % (1 << 8 * size)).to_bytes(size, "little")
 
     def lose_power(self) -> None:
-        """Keep what lies in the EEPROM, and let the rest be as it begins."""
+        """Reset all registers except those in the EEPROM."""
         for at, field in self._fields.items():
             if at >= _EEPROM_END:
                 self.set(at, field.initial)
 
     def read(self, at: int, length: int) -> bytes:
-        """Some bytes.
+        """Read bytes.
 
         Raises:
             TableError: If one of them does not exist. (Assumed: real servos may answer 0 for the
-                gaps between registers, so a driver must not count on an error.)
+                gaps between registers, so a driver must not rely on an error.)
         """
         if length == 0 or not all(at + i in self._known for i in range(length)):
             raise TableError(ACCESS)
         return bytes(self._bytes[at : at + length])
 
     def write(self, at: int, data: bytes) -> list[int]:
-        """Write some bytes.
+        """Write bytes.
 
         Returns:
-            The registers that were written.
+            Addresses of the registers that were written.
 
         Raises:
-            TableError: If they may not be written; then none of them is.
+            TableError: If one of them must not be written; then none of them is.
         """
         wanted: dict[int, int] = {}
         end = at + len(data)

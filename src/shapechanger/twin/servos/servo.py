@@ -1,12 +1,12 @@
-"""One servo: what it answers, when it stops by itself, and what it does with its current.
+"""One simulated servo: its answers, its safety functions and its current control.
 
-Assumed, because no source tells it; each is to be tried on a rig:
+Assumed for want of a source, to be tried on a rig:
 
 - A bus watchdog that trips in current mode takes the current away; torque enable stays 1
-  (`on_trip` "coast"), or goes to 0 ("release"). The manual says that the servo "will stop".
-- Any whole instruction packet on the bus feeds the watchdog, whomever it is for.
+  (`on_trip` "coast"), or goes to 0 ("release"). In the manual the servo "will stop".
+- Any valid instruction packet on the bus feeds the watchdog, whichever servo it is for.
 - The gaps between registers cannot be read.
-- Without power the count of turns is lost: the position begins again within one turn.
+- Without power the count of turns is lost: the position starts again within one turn.
 - It needs 0.3 s to start.
 """
 
@@ -16,8 +16,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from shapechanger.twin.servos.models import TwinModel, twin_model
-from shapechanger.twin.servos.motor import SimulatedMotor, Tendon
+from shapechanger.twin.servos.motor import SimulatedMotor, Tendon, TwinModel, twin_model
 from shapechanger.twin.servos.protocol import BROADCAST, LIMIT, RANGE, Table, TableError
 
 __all__ = ["Faults", "ServoPlan", "SimulatedServo", "StatusPacket"]
@@ -45,13 +44,13 @@ _CURRENT_MODE: Final = 0
 
 @dataclass(slots=True)
 class Faults:
-    """What can be wrong with a servo, to be set by a test.
+    """Faults of a servo.
 
     Attributes:
-        mute: It obeys and says nothing.
-        deaf: It hears nothing: as without its cable, but with power.
-        late_ns: How long after everybody else it answers.
-        bad_crc: Its answers are damaged.
+        mute: Whether it obeys without answering.
+        deaf: Whether it receives nothing, as without its data line.
+        late_ns: Delay of its answers.
+        bad_crc: Whether its answers are damaged.
     """
 
     mute: bool = False
@@ -62,16 +61,16 @@ class Faults:
 
 @dataclass(frozen=True, slots=True)
 class ServoPlan:
-    """A servo as it is attached.
+    """A servo and what is attached to it.
 
     Attributes:
-        id: Its id.
+        id: Id on the bus.
         model: Name of its model.
-        tendon: What it pulls.
-        angle: Of its spool when power comes, rad. Its tendon is just taut then.
-        firmware: Version.
-        fast: Whether it knows the fast sync read.
-        on_trip: What its watchdog does; see the module.
+        tendon: Its tendon.
+        angle: Angle of the spool at power-on, with the tendon just taut, rad.
+        firmware: Version of its firmware.
+        fast: Whether it supports the fast sync read.
+        on_trip: Effect of its watchdog; see the module.
     """
 
     id: int
@@ -85,7 +84,7 @@ class ServoPlan:
 
 @dataclass(frozen=True, slots=True)
 class StatusPacket:
-    """What goes into a status packet.
+    """Content of a status packet.
 
     Attributes:
         error: Error byte.
@@ -97,16 +96,18 @@ class StatusPacket:
 
 
 class SimulatedServo:
-    """One servo.
+    """A servo.
 
     Args:
-        plan: How it is attached.
-        baud_code: Register 8.
+        plan: The servo and its tendon.
+        baud_code: Value of register 8, the baud rate.
 
     Attributes:
-        faults: What is wrong with it.
-        motor: How it turns.
-        volts: Of its supply.
+        plan: The servo and its tendon.
+        model: Its model.
+        faults: Its faults.
+        motor: Its motor.
+        volts: Voltage of its supply.
     """
 
     def __init__(self, plan: ServoPlan, baud_code: int = 3) -> None:
@@ -117,93 +118,92 @@ class SimulatedServo:
         self.motor = SimulatedMotor(self.model, plan.tendon, plan.angle)
         self._table = Table(self.model, plan.id, plan.firmware, baud_code, self._check)
         self._now_ns = 0
-        self._heard_ns = 0
+        self._fed_ns = 0
         self._starts_until_ns = 0
-        self._turns = 0  # Counts that were forgotten with the power.
-        self._recall()
+        self._turns = 0  # Counts lost with the power.
+        self._cache()
 
     @property
     def is_awake(self) -> bool:
-        """Whether it hears and obeys."""
+        """True if it receives packets."""
         return self._now_ns >= self._starts_until_ns and not self.faults.deaf
 
     @property
     def has_torque(self) -> bool:
-        """Whether torque enable is on."""
+        """True if torque enable is on."""
         return self._torque
 
     @property
     def pulls_a(self) -> float:
-        """The current that it is told to let flow, A, with the sign of its registers."""
+        """Goal current in effect, A, with the sign of its registers."""
         return self._goal_a
 
     def register(self, at: int) -> int:
-        """What is in a register now, for a test to look at."""
-        self._show()
+        """Return the current value of a register."""
+        self._measure()
         return self._table.get(at)
 
-    def hear(self) -> None:
-        """A whole instruction packet came by, for whomever."""
+    def feed_watchdog(self) -> None:
+        """Notice a valid instruction packet on the bus."""
         if self.is_awake:
-            self._heard_ns = self._now_ns
+            self._fed_ns = self._now_ns
 
-    def obey(self, instruction: int, parameters: bytes, addressed: int) -> StatusPacket | None:
-        """Do what an instruction says.
+    def execute(self, instruction: int, parameters: bytes, addressed: int) -> StatusPacket | None:
+        """Execute an instruction.
 
         Args:
-            instruction: Its code.
-            parameters: What it needs.
-            addressed: The id in the packet.
+            instruction: Code of the instruction.
+            parameters: Its parameters.
+            addressed: Id in the packet.
 
         Returns:
-            What it answers; None where it does not.
+            The answer; None without one.
         """
-        self._show()
+        self._measure()
         try:
             data = self._do(instruction, parameters)
             error = 0
         except TableError as refusal:
             data, error = b"", refusal.number
         level = self._table.get(68)
-        if instruction == _PING or (instruction == _READ and level >= 1) or level == 2:
-            return (
-                None if addressed == BROADCAST and instruction != _PING else self._said(error, data)
-            )
-        return None
+        if instruction == _PING:
+            return self._status(error, data)
+        answers = level == 2 or (instruction == _READ and level == 1)
+        return self._status(error, data) if answers and addressed != BROADCAST else None
 
     def read(self, at: int, length: int) -> StatusPacket:
-        """What it says in a sync read."""
-        self._show()
+        """Return the answer to a sync read."""
+        self._measure()
         try:
-            return self._said(0, self._table.read(at, length))
+            return self._status(0, self._table.read(at, length))
         except TableError as refusal:
-            return self._said(refusal.number, b"")
+            return self._status(refusal.number, b"")
 
     def write(self, at: int, data: bytes) -> None:
-        """Obey its part of a sync write; nobody hears of a refusal."""
+        """Execute its part of a sync write, which has no answer."""
         try:
             self._write(at, data)
         except TableError:
             return
 
     def overload(self) -> None:
-        """Let it notice that it is overloaded."""
+        """Set the overload error."""
         self._fail(_OVERLOAD)
 
     def lose_power(self) -> None:
-        """Let its supply dip, so that it starts afresh."""
+        """Interrupt its supply, so that it restarts."""
         self._table.lose_power()
-        self._recall()
+        self._cache()
         self._turns = math.floor(self.motor.angle / (2.0 * math.pi)) * 4096
         self._starts_until_ns = self._now_ns + _START_NS
-        self._heard_ns = self._starts_until_ns
+        self._fed_ns = self._starts_until_ns
 
     def advance(self, now_ns: int, travel_m: float) -> None:
-        """Go on to a time, with the tendon's far end there.
+        """Advance to a time.
 
         Args:
             now_ns: The time.
-            travel_m: Where the tendon's far end is, m towards the spool.
+            travel_m: How far the tendon's far end is towards the spool, m.
         """
         dt_s = (now_ns - self._now_ns) / 1e9
         self._now_ns = now_ns
@@ -215,25 +215,25 @@ class SimulatedServo:
         if not least_v <= self.volts <= most_v:
             self._fail(_VOLTAGE)
 
-    def _recall(self) -> None:
-        """Look at the registers that count all the time; they are asked for in each step."""
+    def _cache(self) -> None:
+        """Cache the registers that are used in each step."""
         table = self._table
         self._torque = bool(table.get(64))
         steps = table.get(98)
-        self._patience_ns = steps * _WATCHDOG_STEP_NS if self._torque and 0 < steps < 128 else None
+        self._watchdog_ns = steps * _WATCHDOG_STEP_NS if self._torque and 0 < steps < 128 else None
         pulls = self._torque and steps != _TRIPPED and table.get(11) == _CURRENT_MODE
-        # The twin has no other mode.
+        # Other modes are not simulated.
         self._goal_a = table.get(102) * self.model.ampere_per_count if pulls else 0.0
         self._limits = (table.get(31), table.get(34) / 10, table.get(32) / 10)
 
     def _watch(self) -> None:
-        if self._patience_ns is None or self._now_ns - self._heard_ns < self._patience_ns:
+        if self._watchdog_ns is None or self._now_ns - self._fed_ns < self._watchdog_ns:
             return
         self._table.set(98, _TRIPPED)
         self._table.set(102, 0)
         if self.plan.on_trip == "release":
             self._table.set(64, 0)
-        self._recall()
+        self._cache()
 
     def _do(self, instruction: int, parameters: bytes) -> bytes:
         if instruction == _PING:
@@ -255,12 +255,12 @@ class SimulatedServo:
 
     def _write(self, at: int, data: bytes) -> None:
         for register in self._table.write(at, data):
-            if register == 11:  # A change of the mode sets the goals to their limits.
+            if register == 11:  # A change of mode sets the goals to their limits.
                 self._table.set(102, self._table.get(38))
                 self._table.set(100, self._table.get(36))
             elif register in (64, 98):
-                self._heard_ns = self._now_ns
-        self._recall()
+                self._fed_ns = self._now_ns
+        self._cache()
 
     def _check(self, at: int, value: int) -> None:
         if at in _GOALS and self._table.get(98) == _TRIPPED:
@@ -268,19 +268,19 @@ class SimulatedServo:
         if at == 102 and abs(value) > self._table.get(38):
             raise TableError(LIMIT)
         if at == 64 and value and self._table.get(70) & self._table.get(63):
-            raise TableError(RANGE)  # Only a reboot gives torque again.
+            raise TableError(RANGE)  # Until a reboot.
 
     def _fail(self, bit: int) -> None:
         self._table.set(70, self._table.get(70) | bit)
         if bit & self._table.get(63):
             self._table.set(64, 0)
-        self._recall()
+        self._cache()
 
-    def _said(self, error: int, data: bytes) -> StatusPacket:
+    def _status(self, error: int, data: bytes) -> StatusPacket:
         return StatusPacket(error | (_ALERT if self._table.get(70) else 0), data)
 
-    def _show(self) -> None:
-        """Put what it measures into its registers."""
+    def _measure(self) -> None:
+        """Update the registers of its measurements."""
         motor, table = self.motor, self._table
         table.set(126, round(motor.current / self.model.ampere_per_count))
         table.set(128, round(motor.speed * _PER_RAD_PER_S))

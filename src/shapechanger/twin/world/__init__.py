@@ -1,4 +1,7 @@
-"""The surroundings of the twin: a room, the vehicle in it, and what its sensors see."""
+"""Worlds of a twin: the plain room with its vehicles, a finger, and the choice of a place.
+
+Courses in MuJoCo come from `shapechanger.worlds`.
+"""
 
 from __future__ import annotations
 

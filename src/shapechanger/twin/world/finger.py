@@ -1,4 +1,4 @@
-"""A finger on a rig, as what the tendons of its servos pull at."""
+"""World of a finger on a rig, the load of its servos' tendons."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ from shapechanger.errors import RobotError
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 if TYPE_CHECKING:
-    from shapechanger.twin.rig import Rig
+    from shapechanger.twin.servos.rig import Rig
 
 __all__ = ["FingerWorld"]
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3
-# kg. What the end of a cable weighs, so that a step of 1 ms can follow the cable's spring.
+# kg, mass of the end of a cable: enough for steps of 1 ms to follow the cable's spring.
 _CABLE_KG: Final = 0.010
-_MOST_STEP_S: Final = 0.001
-# Of the rest posture, how far starts are, rad: as in simulation.
+_MAX_STEP_S: Final = 0.001
+# Distance of starts from the rest posture, rad, as in simulation.
 _START_SPREAD: Final = 0.1
 
 
 class FingerWorld:
-    """Bones and joints that servos pull; see `World`, `TendonWorld` and `JointWorld`.
+    """Bones and joints of a finger; see `World`, `TendonWorld` and `JointWorld`.
 
-    Motors, spools, gears and their friction are those of the twin's servos; so the friction, the
-    mass, the lag and the delay of the drive of the parameters are left out here, and the stretch of
-    the tendons is the servos' cables'. The noise of the joints is that of their encoders.
+    The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
+    delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
+    The noise of the joints is that of their encoders.
 
     Args:
-        parameters: Of the finger.
-        seed: Of the first start.
+        parameters: Parameters of the finger.
+        seed: Seed of the first start.
 
     Attributes:
-        resting_v: As every world has it; nothing here has a battery.
+        resting_v: Voltage of the battery of every world, V; a finger has none.
     """
 
     def __init__(self, parameters: FingerParameters, seed: int) -> None:
@@ -59,7 +59,7 @@ class FingerWorld:
             command_delay=0.0,
         )
         spec = build_finger(bare, drive_of("tension", bare))
-        spec.option.timestep = _MOST_STEP_S
+        spec.option.timestep = _MAX_STEP_S
         for actuator in list(spec.actuators):
             spec.delete(actuator)
         self._model: mujoco.MjModel = spec.compile()
@@ -75,11 +75,11 @@ class FingerWorld:
 
     @property
     def cable_stiffness(self) -> float:
-        """Of the tendons, N/m."""
+        """Stiffness of the tendons, N/m."""
         return self._stiffness
 
     def connect(self, tendons: Sequence[str], rig: Rig) -> FingerWorld:
-        """Be what these tendons pull at; see `TendonWorld.connect`."""
+        """Attach the tendons of a rig; see `TendonWorld.connect`."""
         if sorted(tendons) != sorted(TENDONS):
             raise RobotError(
                 f"A finger has the tendons {', '.join(TENDONS)}; this robot has "
@@ -90,11 +90,11 @@ class FingerWorld:
         return self
 
     def travels(self) -> Sequence[float]:
-        """How far the end of each tendon is towards its spool, m; 0 for the straight finger."""
+        """Return how far each tendon's end is towards its spool, m; 0 for the straight finger."""
         return (self._arms @ self._data.qpos)[self._order].tolist()
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
-        """Let some time go by under these tensions; see `Load`."""
+        """Move under these tensions; see `Load.pull`."""
         tensions = np.empty(len(TENDONS))
         tensions[self._order] = tensions_n
         self._data.qfrc_applied[:] = self._arms.T @ tensions
@@ -104,30 +104,30 @@ class FingerWorld:
         return self.travels()
 
     def measured_angle(self, joint: str) -> float:
-        """One reading of a joint's angle, rad; see `JointWorld`."""
+        """Return one reading of a joint's angle, rad; see `JointWorld`."""
         if joint not in JOINTS:
             raise RobotError(f"A finger has the joints {', '.join(JOINTS)}, and no {joint}.")
         angle = float(self._data.qpos[JOINTS.index(joint)])
         return angle + self._joint_noise * float(self._noise.standard_normal())
 
     def lay_out(self, seed: int) -> None:
-        """There is nothing around a finger: put it at a start."""
+        """Place the finger at a start, as it has no surroundings."""
         self.place(seed)
 
     def truth(self) -> dict[str, float]:
-        """Where the fingertip is, m, and the angles, rad."""
+        """Return the position of the fingertip, m, and the angles of the joints, rad."""
         mujoco.mj_kinematics(self._model, self._data)
         tip = {f"fingertip/{axis}": float(x) for axis, x in zip("xyz", self._tip, strict=True)}
         angles = zip(JOINTS, self._data.qpos, strict=True)
         return tip | {f"{name}/angle": float(angle) for name, angle in angles}
 
     def place(self, seed: int) -> None:
-        """Put the finger near its posture at rest, at rest, with all tendons just taut."""
+        """Place the finger near its rest posture, at rest, with all tendons just taut."""
         rng = np.random.default_rng(seed)
         low, high = JOINT_RANGE.T
         posture = JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, len(JOINTS))
         mujoco.mj_resetData(self._model, self._data)
-        # Of its own, so that how often somebody reads does not change where starts are.
+        # A generator of its own, so that the number of readings does not change the starts.
         self._noise = np.random.default_rng([seed, 1])
         self._data.qpos[:] = np.clip(posture, low, high)
         mujoco.mj_forward(self._model, self._data)
@@ -135,20 +135,20 @@ class FingerWorld:
             self._rig.settle()
 
     def put_back(self) -> None:
-        """A finger runs into nothing; put it at a start all the same."""
+        """Place the finger at a start, as it cannot collide."""
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Nothing: the servos' line moves it, by `pull`."""
+        """Do nothing: the servo bus moves the finger, by `pull`."""
 
     def inputs(self) -> Readings:
-        """What sensors could measure now: none of these is on a finger."""
+        """Return the default readings: a finger has none of these sensors."""
         return Readings(Pose(0.0, 0.0, 0.0), battery_v=self.resting_v)
 
     def distance_m(self) -> float:
-        """Nothing is ahead."""
+        """Return 0."""
         return 0.0
 
     def picture(self) -> NDArray[np.uint8]:
-        """Nobody looks at it: black, shape (120, 160, 3)."""
+        """Return a black picture, shape (120, 160, 3)."""
         return np.zeros((120, 160, 3), np.uint8)

@@ -1,4 +1,4 @@
-"""Where the vehicle of a twin is: the plain room of this package, or a place in MuJoCo."""
+"""Place of a twin: the plain room, a finger's rig, or a course in MuJoCo."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from shapechanger.worlds.world import World
 __all__ = ["ROOM", "Place", "open_world"]
 
 ROOM = (160, 120)
-"""Size of the pictures of a room that nobody looks at."""
+"""Width and height of the pictures of a room without a camera, in pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a vehicle is.
+    """A world and the body in it.
 
     Attributes:
-        world: Kind of place, such as "corridor", for which MuJoCo is needed; "" for a plain room
-            with boxes in it, which needs nothing.
-        vehicle: What drives there, such as "car"; in the room it follows from the parts.
-        lenses: What is wrong with the camera, see `shapechanger.worlds.lens`.
+        world: Kind of course in MuJoCo, such as "corridor"; "" for the plain room with boxes, which
+            needs no simulator.
+        vehicle: Vehicle on a course, such as "car"; in the room it follows from the parts.
+        lenses: Defects of the camera; see `shapechanger.worlds.lens`.
         finger: Parameters of the finger whose tendons the robot pulls, as JSON; "" for none.
     """
 
@@ -36,20 +36,20 @@ class Place:
 def open_world(
     place: Place, parts: Collection[str], size: tuple[int, int] | None, seed: int
 ) -> World:
-    """The world at a place.
+    """Open the world of a place.
 
     Args:
-        place: Where.
-        parts: What the robot's outputs move.
-        size: Width and height of the pictures in pixels; None for no camera.
-        seed: Of what stands there, and of the start.
+        place: The place.
+        parts: Parts that the robot's outputs move.
+        size: Width and height of the pictures in pixels; None without a camera.
+        seed: Seed of the surroundings and of the start.
 
     Raises:
-        UnknownName: If there is no such place, vehicle or lens.
+        UnknownName: If there is no such course, vehicle or lens.
         ProfileError: If the vehicle has other parts.
         WorldError: If the vehicle cannot drive there.
         MissingExtra: If MuJoCo is needed and not installed.
-        FingerError: If the parameters of the finger are none.
+        FingerError: If the parameters of the finger are invalid.
     """
     if place.finger:
         try:

@@ -1,4 +1,4 @@
-"""A rectangular room with a few boxes in it."""
+"""A rectangular room with a few boxes, and its picture from the vehicle."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Box:
     top: float
 
     def apart(self, other: Box) -> float:
-        """Distance to another box, along the axis where it is larger; 0 and less if they touch."""
+        """Return the larger of the distances along both axes; at most 0 if the boxes touch."""
         return max(
             other.left - self.right,
             self.left - other.right,
@@ -45,7 +45,7 @@ class Box:
         )
 
     def gap(self, x: float, y: float) -> float:
-        """Distance from a point outside."""
+        """Return the distance from a point outside, m."""
         return math.hypot(
             max(self.left - x, 0.0, x - self.right), max(self.bottom - y, 0.0, y - self.top)
         )
@@ -57,7 +57,7 @@ class Room:
     Args:
         length: Along x, in metres; the room begins at 0.
         width: Along y, in metres; the room begins at 0.
-        boxes: What stands in it.
+        boxes: Boxes in it.
 
     Attributes:
         starts: (N, 2) start of each wall segment.
@@ -84,7 +84,7 @@ class Room:
         self.edges = np.concatenate([np.roll(c, -1, axis=0) - c for c in corners])
 
     def clearance(self, x: float, y: float) -> tuple[float, float, float]:
-        """The nearest wall: distance of a point from it, negative outside the room; where it is."""
+        """Return the distance to the nearest wall, negative outside, and where that is."""
         nearest = min(
             (x, 0.0, y),
             (self.length - x, self.length, y),
@@ -130,7 +130,7 @@ class Room:
 
 
 def lay_out(seed: int) -> Room:
-    """A room that follows from the seed alone."""
+    """Return the room of a seed."""
     rng = random.Random(f"room {seed}")
     boxes: list[Box] = []
     for _ in range(40 * BOXES):
@@ -146,7 +146,7 @@ def lay_out(seed: int) -> Room:
 
 
 def find_start(room: Room, seed: int) -> Pose:
-    """A place in the room with room around it and more of it ahead; it follows from the seed."""
+    """Return the start of a seed, with free space around and more of it ahead."""
     rng = random.Random(f"start {seed}")
     best, best_pose = -math.inf, Pose(room.length / 2, room.width / 2, 0.0)
     for _ in range(_TRIES):
@@ -189,7 +189,7 @@ _WALLS: Final = np.array(
 
 
 class FrontCamera:
-    """Draws the room from where the vehicle is.
+    """Draws the room as the vehicle sees it.
 
     Args:
         size: Width and height of the pictures in pixels.

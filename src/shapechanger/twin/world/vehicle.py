@@ -1,7 +1,7 @@
-"""How vehicles move: seen from above, without slip except on water.
+"""Vehicles in the plain room, moving in two dimensions, without slip except on water.
 
-A vehicle turns what its outputs do into speed ahead, speed to the left and rate of turn. Its
-numbers are those of toys of 20 to 30 cm; none was measured on one vehicle.
+A vehicle turns the values of its outputs into speed ahead, speed to the left and rate of turn. Its
+constants are typical of toys of 20 to 30 cm; none was measured.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DEAD_BAND: Final = 0.04
 
 # Cars and trucks.
 CAR_SPEED: Final = 1.5  # m/s at full throttle
-CAR_LAG_S: Final = 0.15  # Time in which the speed makes up 63 % of a difference.
+CAR_LAG_S: Final = 0.15  # Time in which the speed covers 63 % of a difference.
 WHEELBASE: Final = 0.18  # m
 FULL_LOCK: Final = math.radians(28.0)  # Angle of the front wheels at a steering of 1.
 STEERING_LAG_S: Final = 0.08
@@ -40,20 +40,20 @@ TRACK_GAUGE: Final = 0.16  # m between the tracks, longer than measured because 
 BOAT_SPEED: Final = 0.9  # m/s
 BOAT_LAG_S: Final = 1.2
 PROPELLER_LAG_S: Final = 0.2
-REVERSE_THRUST: Final = 0.5  # Share of the thrust that is left astern.
+REVERSE_THRUST: Final = 0.5  # Share of the thrust that remains astern.
 RUDDER_RATE: Final = 1.2  # rad/s of turn at a speed of 1 and full rudder
 TWIN_RATE: Final = 1.0  # rad/s of turn with one propeller ahead and one astern
 TURN_LAG_S: Final = 0.5
-DRIFT_S: Final = 0.6  # Time for which a hull slides on in its old direction.
+DRIFT_S: Final = 0.6  # Time for which a hull slides in its old direction.
 
 
 class VehicleMotion(NamedTuple):
-    """How a vehicle moves.
+    """Motion of a vehicle.
 
     Attributes:
-        ahead: m/s along its heading.
-        left: m/s to its left.
-        yaw_rate: rad/s, counter-clockwise seen from above.
+        ahead: Speed along the heading, m/s.
+        left: Speed to the left, m/s.
+        yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
     """
 
     ahead: float
@@ -62,14 +62,14 @@ class VehicleMotion(NamedTuple):
 
 
 class RoomVehicle(Protocol):
-    """Something that moves."""
+    """A vehicle in the plain room."""
 
     def move(self, dt_s: float, outputs: Outputs) -> VehicleMotion:
-        """How it moves after a short time."""
+        """Advance by a short step and return the motion at its end."""
         ...
 
     def halt(self) -> None:
-        """It ran into something: it stops at once, while its motors go on."""
+        """Stop at once after a collision, while the motors continue."""
         ...
 
 
@@ -146,7 +146,7 @@ class _Boat:
 
 
 class _Still:
-    """Legs, fingers and everything else whose motion this world does not know."""
+    """Legs, fingers and other bodies, which do not move in this world."""
 
     def move(self, dt_s: float, outputs: Outputs) -> VehicleMotion:
         return VehicleMotion(0.0, 0.0, 0.0)
@@ -156,10 +156,10 @@ class _Still:
 
 
 def vehicle_for(parts: Collection[str]) -> RoomVehicle:
-    """The vehicle that has these parts.
+    """Return a vehicle with these parts.
 
     Raises:
-        RobotError: If they belong to vehicles of two kinds.
+        RobotError: If they belong to vehicles of different kinds.
     """
     kinds: list[type[_Car] | type[_Tracks] | type[_Boat]] = []
     if {"wheels", "steering"} & set(parts):
@@ -178,36 +178,36 @@ def _after_dead_band(value: float | None) -> float:
 
 
 def _lagged(value: float, target: float, lag_s: float, dt_s: float) -> float:
-    """A first-order lag, exact for a target that stays."""
+    """Apply a first-order lag, exact for a constant target."""
     return target + (value - target) * math.exp(-dt_s / lag_s)
 
 
-RADIUS: Final = 0.13  # m of the disc around its middle that may not touch a wall
-CONTACT: Final = 0.004  # m: nearer than this, something presses the bumper
-BUMPER_SPREAD: Final = math.radians(75.0)  # How far to each side the bumper at the front reaches.
+RADIUS: Final = 0.13  # m, of the disc around the middle that must not touch a wall
+CONTACT: Final = 0.004  # m: something this near presses the bumper
+BUMPER_SPREAD: Final = math.radians(75.0)  # Reach of the front bumper to each side.
 LONGEST_STEP_S: Final = 0.01
-IMPACT_S: Final = 0.03  # How long the accelerometer shows the blow of a collision.
-SPEED_OF_IMPACT: Final = 0.15  # m/s: slower than this, a collision is no blow.
+IMPACT_S: Final = 0.03  # Time for which the accelerometer shows a collision.
+SPEED_OF_IMPACT: Final = 0.15  # m/s: the accelerometer shows only faster collisions.
 IMPACT_STOP_S: Final = 0.01  # Time in which a collision takes all the speed.
 
-INNER_OHM: Final = 0.12  # Of the battery and its leads.
-IDLE_A: Final = 0.6  # What the computer takes.
-MOTOR_A: Final = 3.0  # What a motor takes at a value of 1 when it runs freely, and
-STALL_FACTOR: Final = 3.0  # how much more when it cannot turn.
+INNER_OHM: Final = 0.12  # Resistance of the battery and its leads.
+IDLE_A: Final = 0.6  # Current of the computer.
+MOTOR_A: Final = 3.0  # Current of a free-running motor at a value of 1, and
+STALL_FACTOR: Final = 3.0  # its factor when the motor is blocked.
 
-_CONE: Final = np.radians(np.array((-7.0, 0.0, 7.0)))  # An HC-SR04 hears 15 degrees.
+_CONE: Final = np.radians(np.array((-7.0, 0.0, 7.0)))  # The beam of an HC-SR04 is 15 degrees wide.
 
 
 class DrivingWorld:
     """A vehicle in a rectangular room; see `World`.
 
     Args:
-        parts: What the vehicle's outputs move, such as "wheels".
+        parts: Parts that the vehicle's outputs move, such as "wheels".
         size: Width and height of the pictures in pixels.
-        seed: Where the boxes stand, and the first start.
+        seed: Seed of the boxes and of the first start.
 
     Attributes:
-        resting_v: Voltage of the battery without load.
+        resting_v: Voltage of the battery without load, V.
     """
 
     def __init__(self, parts: Collection[str], size: tuple[int, int], seed: int) -> None:
@@ -219,16 +219,16 @@ class DrivingWorld:
         self.lay_out(seed)
 
     def lay_out(self, seed: int) -> None:
-        """Put other boxes into the room; see `World.lay_out`."""
+        """Replace the boxes; see `World.lay_out`."""
         self.room = lay_out(seed)
         self.place(seed)
 
     def truth(self) -> dict[str, float]:
-        """Nothing: nobody counts here; see `World.truth`."""
+        """Return no quantities; see `World.truth`."""
         return {}
 
     def place(self, seed: int) -> None:
-        """Put the vehicle at a start, at rest; see `World.place`."""
+        """Place the vehicle at a start, at rest; see `World.place`."""
         self._start = seed
         pose = find_start(self.room, seed)
         self._x, self._y, self._heading = pose.x, pose.y, pose.heading
@@ -241,18 +241,18 @@ class DrivingWorld:
         self._bumped = self._touches_ahead()
 
     def put_back(self) -> None:
-        """Put the vehicle at its start again: a room has no lane; see `World.put_back`."""
+        """Return the vehicle to its start, as the room has no lane; see `World.put_back`."""
         self.place(self._start)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Let time go by; see `World.advance`."""
+        """Advance time; see `World.advance`."""
         while dt_s > 1e-12:
             step_s = min(dt_s, LONGEST_STEP_S)
             self._step(step_s, outputs)
             dt_s -= step_s
 
     def inputs(self) -> Readings:
-        """What sensors could measure now; see `World.inputs`."""
+        """Return what sensors could measure; see `World.inputs`."""
         return Readings(
             pose=Pose(self._x, self._y, self._heading),
             speed=self._speed,
@@ -266,14 +266,14 @@ class DrivingWorld:
         )
 
     def distance_m(self) -> float:
-        """The shortest of three rays from the nose; see `World.distance_m`."""
+        """Return the shortest of three rays from the nose; see `World.distance_m`."""
         angles = self._heading + _CONE
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
         return max(0.0, float(self.room.cast(self._x, self._y, directions)[0].min()) - RADIUS)
 
     def picture(self) -> NDArray[np.uint8]:
-        """What the camera at the nose sees; see `World.picture`."""
-        # At the middle of the disc and not at its rim, so that it is never inside a wall.
+        """Return the picture of the front camera; see `World.picture`."""
+        # From the middle of the disc, so that the camera is never inside a wall.
         return self._camera.picture(self.room, self._x, self._y, self._heading)
 
     def _step(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
@@ -302,7 +302,7 @@ class DrivingWorld:
         self._current_a = IDLE_A + MOTOR_A * load * (STALL_FACTOR if self._blocked else 1.0)
 
     def _free_share(self, move_x: float, move_y: float) -> float:
-        """Which share of a move does not run into anything."""
+        """Return the share of a move that is free of collisions."""
         if self.room.clearance(self._x + move_x, self._y + move_y)[0] >= RADIUS:
             return 1.0
         here = self.room.clearance(self._x, self._y)

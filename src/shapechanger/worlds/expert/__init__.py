@@ -1,4 +1,4 @@
-"""Who knows the whole course, and so always knows the way: paths round it and an expert driver."""
+"""Expert driving with full knowledge of the course: planned paths, a driver and disturbances."""
 
 from __future__ import annotations
 

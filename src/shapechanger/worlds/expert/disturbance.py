@@ -1,9 +1,9 @@
-"""Noise on what a demonstrator does, so that a learner sees how mistakes are put right.
+"""Noise on a demonstrator's actions, so that demonstrations show how to correct errors.
 
-The vehicle does what `applied` returns, and the record keeps what the demonstrator meant: M. Laskey
-et al., "DART: Noise Injection for Robust Imitation Learning", CoRL 2017. The two kinds are those
-that drivers make: a hand that wanders (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the
-Brownian motion", Physical Review 36, 1930), and a jerk now and then.
+The vehicle executes the result of `applied`, and the demonstrator's own action is recorded (M.
+Laskey et al., "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two
+kinds: slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
+Physical Review 36, 1930) and rare jerks of the steering.
 """
 
 from __future__ import annotations
@@ -19,22 +19,24 @@ from shapechanger.worlds.expert.traits import traits_of
 __all__ = ["Disturbance"]
 
 WANDER_S: Final = 0.6
-"""Time over which wandering forgets itself."""
+"""Correlation time of the wandering, s."""
 
 JERKS_PER_S: Final = 0.25
+"""Mean rate of jerks, 1/s."""
+
 JERK_S: Final = (0.15, 0.5)
-"""Shortest and longest."""
+"""Shortest and longest duration of a jerk, s."""
 
 
 class Disturbance:
-    """What happens to actions on their way to the vehicle.
+    """Noise on steering and throttle.
 
     Args:
-        kind: Whether it wanders, jerks, or both.
-        seed: What it follows from.
+        kind: Kind of noise.
+        seed: Seed of the noise.
         size: Standard deviation of the wandering of steering and throttle; jerks steer by up to
             three times the first.
-        period_s: Time from one action to the next, s.
+        period_s: Control period, s.
     """
 
     def __init__(
@@ -62,24 +64,24 @@ class Disturbance:
         *,
         period_s: float = 0.05,
     ) -> Disturbance:
-        """As much of it as a vehicle can put right.
+        """Noise of a size that the expert can correct with a vehicle.
 
         Args:
-            vehicle: Its name.
+            vehicle: Name of the vehicle.
             kind: See `Disturbance`.
             seed: See `Disturbance`.
             period_s: See `Disturbance`.
 
         Raises:
-            UnknownName: No expert knows the vehicle.
+            UnknownName: If the vehicle is unknown.
         """
         return cls(kind, seed, size=(traits_of(vehicle).sway, 0.1), period_s=period_s)
 
     def applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What the vehicle does instead of an action, (2,) from -1 to 1."""
+        """Add noise to an action, (2,), and clip it to -1 to 1."""
         noise = np.zeros(2)
         if self._wanders:
-            # The exact step of the process, whatever the period is.
+            # The exact discretization, for any period.
             keep = math.exp(-self._period_s / WANDER_S)
             fresh = self._size * math.sqrt(1 - keep**2)
             self._wander = keep * self._wander + fresh * self._rng.standard_normal(2)
@@ -89,7 +91,7 @@ class Disturbance:
         return np.clip(action + noise, -1.0, 1.0).astype(np.float32)
 
     def _jerked(self) -> float:
-        """Steering of the jerk that is going on, 0 without one."""
+        """Steering of the current jerk; 0 without one."""
         self._jerk_s -= self._period_s
         if self._jerk_s > 0:
             return self._jerk

@@ -1,4 +1,11 @@
-"""Differences of directions."""
+"""Driver that follows a path planned on the whole course.
+
+The steering is pure pursuit: R. C. Coulter, "Implementation of the Pure Pursuit Path Tracking
+Algorithm", CMU-RI-TR-92-01 (1992). The circle that is tangent to the vehicle's heading and passes
+through a point at distance L and angle a has the curvature 2 sin(a) / L. A boat drifts, so it aims
+like a ship on a line of sight (T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion
+Control", 2011, chapter 10), with its drift angle subtracted.
+"""
 
 from __future__ import annotations
 
@@ -19,30 +26,30 @@ __all__ = ["CourseExpert", "Pursuit", "ThreeWay", "wrap_angle"]
 
 
 def wrap_angle(angle: float) -> float:
-    """The same direction as an angle from -pi to pi, rad."""
+    """Equivalent angle from -pi to pi, rad."""
     return math.remainder(angle, 2 * math.pi)
 
 
 DRIFT_S: Final = 0.8
-"""Time over which a drift is averaged: turns come and go faster, the current stays."""
+"""Time constant of the drift average, s: longer than turns, so that the current remains."""
 
 STICKING: Final = 0.1
-"""Rate of turn from which on a tank is given all of what its tracks stick by, rad/s; less below, or
-it would twitch where it goes straight on."""
+"""Rate of turn, rad/s, from which a tank's full dead band is compensated; less below it, so that
+it does not twitch on straights."""
 
 ABOUT: Final = 0.9
-"""Angle to its target, rad, from which on a tank turns on the spot."""
+"""Angle to the target, rad, above which a tank turns on the spot."""
 
 ABOUT_RATE: Final = 2.5
-"""Rate of that turn over the angle, 1/s: friction holds a tank that turns about half-heartedly."""
+"""Rate of that turn over the angle, 1/s; a slower turn gets stuck in friction."""
 
 
 class Pursuit:
-    """The steering of one vehicle.
+    """Steering towards a point ahead.
 
     Args:
-        traits: How it is driven.
-        period_s: Time from one action to the next, s.
+        traits: Driving properties of the vehicle.
+        period_s: Control period, s.
     """
 
     def __init__(self, traits: Traits, period_s: float) -> None:
@@ -52,35 +59,35 @@ class Pursuit:
         self._drift = 0.0
 
     def reset(self) -> None:
-        """Forget how it has moved."""
+        """Forget the drift."""
         self._before, self._drift = None, 0.0
 
     def moved(self, pose: Pose) -> None:
-        """Hear where the vehicle is, once a period, to learn how it drifts."""
+        """Update the drift estimate; call it once per period."""
         before, self._before = self._before, pose
         if before is None:
             return
         dx, dy = pose.x - before.x, pose.y - before.y
         going = math.hypot(dx, dy) / self._period_s > 0.2 * self._traits.top_speed
         now = wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
-        if abs(now) > math.pi / 3:  # It goes astern, or was moved.
+        if abs(now) > math.pi / 3:  # Astern, or moved by hand.
             now = 0.0
         self._drift += (now - self._drift) * self._period_s / DRIFT_S
 
     def look(self, speed: float) -> float:
-        """How far ahead on the path to aim, m, at a speed in m/s."""
+        """Look-ahead distance, m, at a speed, m/s."""
         return self._traits.look_m + self._traits.look_s * max(speed, 0.0)
 
     def steering(
         self, pose: Pose, speed: float, yaw_rate: float, target: tuple[float, float]
     ) -> float:
-        """The steering that leads to a point, from -1, left, to 1.
+        """Steering towards a point, from -1, left, to 1.
 
         Args:
-            pose: Where the vehicle is.
-            speed: Along its heading, m/s.
-            yaw_rate: Counter-clockwise, rad/s.
-            target: x and y, m.
+            pose: Pose of the vehicle.
+            speed: Speed along its heading, m/s.
+            yaw_rate: Rate of turn, rad/s, counter-clockwise.
+            target: x and y of the point, m.
         """
         dx, dy = target[0] - pose.x, target[1] - pose.y
         distance = max(math.hypot(dx, dy), 0.1)
@@ -92,7 +99,7 @@ class Pursuit:
                 rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
                 if abs(angle) > ABOUT:
                     rate = ABOUT_RATE * angle
-                # Tracks slip by as much as the floor likes, so what is missing is added.
+                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
                 value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
                 value += self._traits.dead * max(-1.0, min(1.0, rate / STICKING))
                 return self._clipped(-value)
@@ -103,7 +110,7 @@ class Pursuit:
                 return self._clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
 
     def _curvature(self, angle: float, distance: float) -> float:
-        """Of the circle to the target, 1/m; one behind is turned to as tightly as one abeam."""
+        """Curvature of the circle to the target, 1/m; targets behind count as abeam."""
         side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
         return 2 * side / distance
 
@@ -113,59 +120,59 @@ class Pursuit:
 
 
 class ThreeWay:
-    """Gives each side its share of time.
+    """Steering for a vehicle that knows only left, straight on and right, as that of 2017.
 
-    What a step steers too much or too little is made up for by the next ones, as in a sigma-delta
-    modulator of first order (H. Inose, Y. Yasuda, "A unity bit coding method by negative
-    feedback", Proceedings of the IEEE 51, 1963).
+    The error of each step is carried over to the next ones, as in a first-order sigma-delta
+    modulator (H. Inose, Y. Yasuda, "A unity bit coding method by negative feedback", Proceedings of
+    the IEEE 51, 1963).
     """
 
     def __init__(self) -> None:
-        self._owed = 0.0
+        self._error = 0.0
 
     def reset(self) -> None:
-        """Owe nothing."""
-        self._owed = 0.0
+        """Forget the error carried over."""
+        self._error = 0.0
 
     def step(self, steering: float) -> float:
-        """-1, 0 or 1, whose mean over some steps is the steering that was asked for."""
-        self._owed += steering
-        given = float(max(-1, min(1, round(self._owed))))
-        self._owed = max(-1.0, min(1.0, self._owed - given))
+        """Quantize a steering to -1, 0 or 1, so that the mean over several steps is kept."""
+        self._error += steering
+        given = float(max(-1, min(1, round(self._error))))
+        self._error = max(-1.0, min(1.0, self._error - given))
         return given
 
 
 SPEED_GAIN: Final = 1.5
-"""Throttle for a speed that is missing, as a multiple of the share of the top speed."""
+"""Gain of the throttle on the speed error, both relative to their maxima."""
 
 REACTION_S: Final = 0.15
-"""Time from an action to its effect: the expert looks at where the vehicle will be by then."""
+"""Delay from an action to its effect, s, over which the pose is predicted."""
 
 ASIDE: Final = 0.7
-"""Angle to its target, rad, from which on a vehicle has to turn before it can go on."""
+"""Angle to the target, rad, above which a vehicle must turn before it can go on."""
 
 BLOCKED_M: Final = 0.15
-"""Room before its nose that is too little for that."""
+"""Clearance ahead of the nose, m, that is too small for that."""
 
 
 class CourseExpert:
-    """Drives one vehicle round one course, along a path planned beforehand.
+    """Drives a vehicle around a course, along a planned path.
 
     Args:
-        course: Where.
+        course: The course.
         vehicle: Name of the vehicle: "car", "tank", "truck" or "boat".
-        seed: Of how it gets away from walls.
-        levels: "continuous", or "three" for a steering that knows only left, straight on, right.
-        period_s: Time from one action to the next, s.
-        path: The path, where it is known already.
+        seed: Seed of the recovery manoeuvres.
+        levels: "continuous", or "three" for steering with left, straight on and right only.
+        period_s: Control period, s.
+        path: The path, if it is already planned.
 
     Attributes:
-        path: What it follows.
-        speeds: (N,) how fast each point of it is driven, m/s.
+        path: The path that it follows.
+        speeds: Speed at each point of the path, m/s, (N,).
 
     Raises:
-        UnknownName: No expert knows the vehicle.
-        WorldError: It does not get round the course.
+        UnknownName: If the vehicle is unknown.
+        WorldError: If there is no path around the course.
     """
 
     def __init__(
@@ -189,11 +196,11 @@ class CourseExpert:
 
     @property
     def recovering(self) -> bool:
-        """Whether it is getting away from something."""
+        """Whether a recovery manoeuvre is active."""
         return self._recovery.active
 
     def reset(self, pose: Pose) -> None:
-        """Begin at a pose."""
+        """Start at a pose."""
         self._station = self.path.nearest(pose.x, pose.y).station
         self._pursuit.reset()
         self._recovery.reset()
@@ -201,15 +208,15 @@ class CourseExpert:
             self._three_way.reset()
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
-        """What to do now.
+        """Choose an action; call it once per period.
 
         Args:
-            pose: Where the vehicle is.
-            speed: Along its heading, m/s.
-            yaw_rate: Counter-clockwise seen from above, rad/s.
+            pose: Pose of the vehicle.
+            speed: Speed along its heading, m/s.
+            yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
 
         Returns:
-            (2,) steering and throttle, from -1 to 1; -1 steers to the left.
+            Steering and throttle, from -1 to 1, (2,); -1 steers left.
         """
         if self._station is None:
             self.reset(pose)
@@ -233,7 +240,7 @@ class CourseExpert:
         return np.array(action, np.float32)
 
     def _ahead(self, pose: Pose) -> float:
-        """Room before the vehicle's nose, m."""
+        """Clearance at `BLOCKED_M` ahead of the nose, m."""
         reach = self._traits.nose_m + BLOCKED_M
         nose = (
             pose.x + reach * math.cos(pose.heading),
@@ -242,7 +249,7 @@ class CourseExpert:
         return float(self._obstacles.distance(np.array([nose]))[0])
 
     def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
-        """Where the vehicle will be when an action of now has its effect."""
+        """Predicted pose when the current action takes effect."""
         ahead = speed * REACTION_S
         heading = pose.heading + yaw_rate * REACTION_S / 2
         return Pose(
@@ -254,11 +261,11 @@ class CourseExpert:
     def _driven(
         self, steering: float, station: float, lateral: float, angle: float, speed: float
     ) -> tuple[float, float]:
-        """Steering and throttle while it goes forward."""
+        """Steering and throttle for driving forward."""
         traits = self._traits
         here = self.path.index(station)
         wanted = float(self.speeds[here])
-        # Off its line it has less room than was planned with, and turned away it must come round.
+        # Off the path there is less room than planned, and a wrong heading must be corrected.
         room = float(self.path.clearance[here]) - abs(lateral) - traits.half_width_m
         if room < traits.margin_m:
             wanted *= 0.5 + 0.5 * max(room, 0.0) / traits.margin_m
@@ -267,6 +274,6 @@ class CourseExpert:
         throttle = wanted / traits.top_speed
         throttle += SPEED_GAIN * (wanted - speed) / traits.top_speed
         throttle = max(traits.least_throttle, min(1.0, throttle))
-        if traits.drive == "tracks":  # Else one side would be cut off, and it would not turn.
+        if traits.drive == "tracks":  # Saturating one track would prevent the turn.
             throttle = min(throttle, 1.0 - abs(steering))
         return steering, throttle

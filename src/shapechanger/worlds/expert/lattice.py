@@ -1,4 +1,4 @@
-"""How far points are from whatever stands in a course."""
+"""The cheapest way around a course on a lattice of points, and clearances from obstacles."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from shapechanger.worlds.expert.line import ClosedLine
 __all__ = ["FAR_M", "ClearanceField", "Lattice", "cheapest_way", "lay_lattice"]
 
 FAR_M: Final = 2.5
-"""Distances are exact up to here and given as this beyond: nobody drives by what is farther."""
+"""Largest distance that is computed, m; larger ones are reported as this."""
 
 _CHUNK: Final = 256
 
 
 class ClearanceField:
-    """The walls and things of a course, seen from above.
+    """Distances from the walls and obstacles of a course, seen from above.
 
     Args:
-        course: What they stand in.
+        course: The course.
     """
 
     def __init__(self, course: Course) -> None:
         walls = np.array([(*w.start, *w.end) for w in course.walls], np.float64).reshape(-1, 4)
         self._start, self._step = walls[:, :2], walls[:, 2:] - walls[:, :2]
         self._squared = np.maximum(np.einsum("ij,ij->i", self._step, self._step), 1e-12)
-        boxes = [t for t in course.things if not t.is_round]
-        rounds = [t for t in course.things if t.is_round]
+        boxes = [t for t in course.obstacles if not t.is_round]
+        rounds = [t for t in course.obstacles if t.is_round]
         self._box = np.array(
             [(t.x, t.y, np.cos(t.yaw), np.sin(t.yaw), t.length / 2, t.width / 2) for t in boxes],
             np.float64,
@@ -41,21 +41,19 @@ class ClearanceField:
         self._round = self._round.reshape(-1, 3)
 
     def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of each point from the nearest wall or thing, m, at most `FAR_M`; 0 inside.
+        """Distance of each point from the nearest wall or obstacle, m, (N,).
 
-        It is fast where neighbours in the array are neighbours in the course.
+        It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
+        close to each other.
 
         Args:
-            points: (N, 2), m.
-
-        Returns:
-            (N,).
+            points: Points, m, (N, 2).
         """
         parts = [self._near(points[i : i + _CHUNK]) for i in range(0, max(len(points), 1), _CHUNK)]
         return np.concatenate(parts)
 
     def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """As `distance`, for points that lie close together."""
+        """Distances of points that are close together."""
         found = np.full(len(points), FAR_M)
         if not len(points):
             return found
@@ -67,7 +65,7 @@ class ClearanceField:
     def _from_walls(
         self, points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Distance of each point from the nearest wall that reaches into a rectangle."""
+        """Distances from the walls that reach into a rectangle."""
         end = self._start + self._step
         near = (np.maximum(self._start, end) >= low) & (np.minimum(self._start, end) <= high)
         near = near.all(axis=1)
@@ -82,7 +80,7 @@ class ClearanceField:
     def _from_boxes(
         self, points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """As `_from_walls`, of boxes."""
+        """Distances from the boxes that reach into a rectangle."""
         reach = (self._box[:, 4] + self._box[:, 5])[:, None]
         near = (self._box[:, :2] + reach >= low) & (self._box[:, :2] - reach <= high)
         x, y, cos, sin, half_length, half_width = self._box[near.all(axis=1)].T[:, :, None]
@@ -94,7 +92,7 @@ class ClearanceField:
     def _from_rounds(
         self, points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """As `_from_walls`, of cylinders."""
+        """Distances from the cylinders that reach into a rectangle."""
         reach = self._round[:, 2:]
         near = (self._round[:, :2] + reach >= low) & (self._round[:, :2] - reach <= high)
         x, y, radius = self._round[near.all(axis=1)].T[:, :, None]
@@ -106,32 +104,32 @@ STATION_M: Final = 0.2
 OFFSET_M: Final = 0.1
 
 SLOPES: Final = np.arange(-2, 3)
-"""Offsets that a way may gain from one station to the next, in steps of `OFFSET_M`."""
+"""Changes of the offset from one station to the next, in steps of `OFFSET_M`."""
 
 BEND_COST: Final = 0.15
-"""Of changing the slope by one."""
+"""Cost of changing the slope by one."""
 
 SLANT_COST: Final = 0.02
-"""Of a slope of one."""
+"""Cost of a slope of one."""
 
 NARROW_COST: Final = 1.0
-"""Of a point whose clearance is the smallest allowed; it grows with the square of what is missing
-to a comfortable one."""
+"""Cost of a point with the smallest allowed clearance; it is quadratic in what is missing to the
+preferred clearance."""
 
 OVERLAP_M: Final = 12.0
-"""How far ways are searched beyond a whole lap. Where a way is now no longer depends on where it
-was that long ago, so a lap cut out of the middle closes."""
+"""Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
+that a lap cut from the middle is closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """Points across the lane at stations along it.
+    """Rows of points across the lane, at stations along it.
 
     Attributes:
-        middle: (N, 2) of the lane, m.
-        left: (N, 2) unit vectors to the left.
-        offsets: (K,) m, positive to the left.
-        clearance: (N, K) m; 0 where a point is no part of the lane.
+        middle: Middle of the lane, m, (N, 2).
+        left: Unit vectors to the left, (N, 2).
+        offsets: Offsets from the middle, m, positive to the left, (K,).
+        clearance: Clearance of each point, m, (N, K); 0 outside the lane.
     """
 
     middle: NDArray[np.float64]
@@ -141,11 +139,11 @@ class Lattice:
 
 
 def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
-    """Lay points over the lane of a course.
+    """Lay a lattice over the lane of a course.
 
     Args:
-        course: Where.
-        obstacles: What stands there.
+        course: The course.
+        obstacles: Its clearances.
     """
     line = ClosedLine(course.route)
     count = max(round(line.length / STATION_M), 8)
@@ -157,7 +155,7 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
         period=line.length,
     )
     step = line.length / count
-    # The direction over 0.8 m: a sharper look would let the rows cross each other in tight corners.
+    # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
     ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
@@ -166,7 +164,7 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
     points = middle[:, None] + offsets[None, :, None] * left[:, None]
     clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
     clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
-    # Inside a corner, beyond its centre, the rows run backward: nobody can drive there.
+    # Beyond the centre of a corner, rows run backward; such points are outside the lane.
     gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
     backward = gained < 0.2 * step
     clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
@@ -174,20 +172,20 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
 
 
 def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[np.int64]:
-    """The closed way that bends least and keeps away from what is in the way.
+    """The closed way with the least cost of bends and narrow passages.
 
-    Dynamic programming over stations; what is remembered of a way is its offset and its slope.
+    It is found by dynamic programming over stations, with offset and slope as the state.
 
     Args:
-        lattice: Where.
-        least_m: Clearance that no point of the way may miss, m.
-        comfort_m: Clearance beyond which more is not worth a bend, m.
+        lattice: The lattice.
+        least_m: Smallest clearance, m.
+        comfort_m: Clearance above which more is worth nothing, m.
 
     Returns:
-        (N,) numbers of the offsets, one a station.
+        Index of the offset at each station, (N,).
 
     Raises:
-        WorldError: There is no such way.
+        WorldError: If there is no such way.
     """
     missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
     cost = np.where(lattice.clearance >= least_m, NARROW_COST * missing**2, np.inf)
@@ -205,19 +203,16 @@ def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[
 def _search(
     cost: NDArray[np.float64], stations: NDArray[np.int64], seam: int | None, least_m: float
 ) -> NDArray[np.int64]:
-    """The cheapest way along stations.
+    """The cheapest way along stations, as indices of offsets, (M,).
 
     Args:
-        cost: (N, K) of being at each offset.
-        stations: (M,) which of the N, in order.
-        seam: The offset to begin and to end with; None leaves both free.
-        least_m: For the words of the error.
-
-    Returns:
-        (M,).
+        cost: Cost of each offset, (N, K).
+        stations: Stations to visit, in order, (M,).
+        seam: Offset to start and end with; None leaves both free.
+        least_m: Smallest clearance, m, for error messages.
 
     Raises:
-        WorldError: There is none.
+        WorldError: If there is no way.
     """
     width = cost.shape[1]
     bends = BEND_COST * (SLOPES[:, None] - SLOPES[None, :]) ** 2  # (from, to)
@@ -240,7 +235,7 @@ def _search(
             came_from[row, to, slope] = chosen[of, slope]
         if not np.isfinite(total).any():
             raise WorldError(
-                f"Nothing that needs {2 * least_m:.2f} m gets through this course: it is blocked "
+                f"The course is blocked for anything {2 * least_m:.2f} m wide "
                 f"{station * STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
                 "margin, or another seed."
             )
@@ -248,8 +243,8 @@ def _search(
         total[np.arange(width) != seam] = np.inf
         if not np.isfinite(total).any():
             raise WorldError(
-                f"No way round this course with {2 * least_m:.2f} m of room comes back to where "
-                "it began. Use a smaller margin, or another seed."
+                f"No way around this course with a width of {2 * least_m:.2f} m returns to its "
+                "start. Use a smaller margin, or another seed."
             )
     offset, slope = np.unravel_index(int(np.argmin(total)), total.shape)
     way = np.empty(len(stations), np.int64)

@@ -1,4 +1,4 @@
-"""A closed line that knows where on it a point is."""
+"""Closed lines with stations, and progress along a course."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from shapechanger.worlds.course import Course
 __all__ = ["ClosedLine", "CourseProgress", "Spot"]
 
 WINDOW_M: Final = 2.0
-"""How far along the line from its last spot something is looked for. Legs of a course that run next
-to each other are much farther apart along the line, so none is taken for the other."""
+"""Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
+of a course are much farther apart along the line, so none is mistaken for another."""
 
 
 class Spot(NamedTuple):
-    """Where something is, seen from a line.
+    """Position relative to a line.
 
     Attributes:
         station: Distance along the line, m, from 0 to its length.
-        lateral: Distance from the line, m; to the left is positive.
+        lateral: Distance from the line, m; positive to the left.
     """
 
     station: float
@@ -30,10 +30,15 @@ class Spot(NamedTuple):
 
 
 class ClosedLine:
-    """Straight pieces between points, the last of which leads back to the first.
+    """Closed polyline; the last point is joined to the first.
 
     Args:
-        points: (N, 2), m, no two neighbours alike.
+        points: Points, m, (N, 2); neighbours differ.
+
+    Attributes:
+        points: The points.
+        stations: Distance of each point along the line, m, (N,).
+        length: Length of the line, m.
     """
 
     def __init__(self, points: NDArray[np.float64]) -> None:
@@ -44,23 +49,23 @@ class ClosedLine:
         self.stations: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
         self._window = int(np.ceil(WINDOW_M / (self.length / len(points))))
-        # Going on beyond both ends by a window, so that each window is a slice.
+        # Extended beyond both ends by a window, so that each window is a slice.
         around = np.arange(-self._window, len(points) + self._window) % len(points)
         self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()
 
     def index(self, station: float) -> int:
-        """Number of the point that a station lies at or behind.
+        """Index of the last point at or before a station.
 
         Args:
-            station: m; any number, for stations go on round and round.
+            station: Station, m; it wraps around.
         """
         return int(np.searchsorted(self.stations, station % self.length, side="right")) - 1
 
     def at(self, station: float) -> tuple[float, float]:
-        """The point at a station.
+        """Point at a station, m.
 
         Args:
-            station: m; any number, for stations go on round and round.
+            station: Station, m; it wraps around.
         """
         i = self.index(station)
         share = (station % self.length - self.stations[i]) / np.sqrt(self._squared[i])
@@ -68,18 +73,18 @@ class ClosedLine:
         return float(x), float(y)
 
     def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
-        """The spot of the line that is nearest to a point.
+        """Nearest spot of the line to a point.
 
         Args:
-            x: m.
-            y: m.
-            hint: Station near which to look, m; None looks everywhere.
+            x: Position, m.
+            y: Position, m.
+            hint: Station to search around, m; None to search everywhere.
         """
         if hint is None:
             first, count = 0, len(self.points)
         else:
             first, count = self.index(hint) - self._window, 2 * self._window + 1
-        # This is asked at each step of each simulation, so it makes few and small arrays.
+        # Called at each simulation step, so it makes few and small arrays.
         near = self._around[:, first + self._window : first + self._window + count]
         start_x, start_y, step_x, step_y, squared = near
         away_x, away_y = x - start_x, y - start_y
@@ -93,23 +98,23 @@ class ClosedLine:
         return Spot(station, math.copysign(math.hypot(off_x[best], off_y[best]), cross))
 
     def ahead_by(self, start: float, end: float) -> float:
-        """The shorter way along the line from one station to another, m; backward is negative.
+        """Shorter way along the line from one station to another, m; backward is negative.
 
         Args:
-            start: m.
-            end: m.
+            start: First station, m.
+            end: Second station, m.
         """
         return (end - start + self.length / 2) % self.length - self.length / 2
 
 
 class CourseProgress:
-    """Net metres along the middle of the lane.
+    """Net distance of a vehicle along the route of a course.
 
-    They go on counting lap after lap, and driving backward counts them down. A vehicle that is
-    moved by more than 2 m needs a `reset`.
+    It keeps counting lap after lap; driving backward counts down. After moving the vehicle by more
+    than 2 m call `reset`.
 
     Args:
-        course: What the vehicle drives round.
+        course: The course.
     """
 
     def __init__(self, course: Course) -> None:
@@ -119,21 +124,16 @@ class CourseProgress:
 
     @property
     def metres(self) -> float:
-        """Net progress since the last reset, m."""
+        """Net distance since the last reset, m."""
         return self._metres
 
-    @property
-    def spot(self) -> Spot:
-        """Where along the lane the vehicle was last."""
-        return self._spot
-
     def reset(self, x: float, y: float) -> None:
-        """Begin at a point, m."""
+        """Start at a point, m."""
         self._spot = self._line.nearest(x, y)
         self._metres = 0.0
 
     def update(self, x: float, y: float) -> float:
-        """Net progress since the last reset, m, now that the vehicle is at a point, m."""
+        """Move the vehicle to a point, m, and return the net distance since the last reset, m."""
         spot = self._line.nearest(x, y, self._spot.station)
         self._metres += self._line.ahead_by(self._spot.station, spot.station)
         self._spot = spot

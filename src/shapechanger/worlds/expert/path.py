@@ -1,10 +1,11 @@
-"""A smooth line through a lane whose edges are known: the least bent one between bounds.
+"""Planning of a smooth, collision-free path around a course, and its speed profile.
 
-The points of the line are `middle + offset * left`, so how much it bends, the sum of its squared
-second differences, is a quadratic function of the offsets, and the best offsets between bounds are
-a convex problem. Racing lines are found like this: F. Braghin et al., "Race driver model",
-Computers and Structures 86 (2008); A. Heilmeier et al., "Minimum curvature trajectory planning",
-Vehicle System Dynamics 58 (2020).
+The cheapest way over a lattice decides on which side to pass each obstacle; the path is then the
+least bent line between bounds around that way. Its points are `middle + offset * left`, so the sum
+of its squared second differences is a quadratic function of the offsets, and the best offsets are
+the solution of a convex problem. Racing lines are found like this: F. Braghin et al., "Race driver
+model", Computers and Structures 86 (2008); A. Heilmeier et al., "Minimum curvature trajectory
+planning", Vehicle System Dynamics 58 (2020).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ __all__ = ["SPACING_M", "CoursePath", "least_bent", "plan_path", "plan_path_for"
 
 ROUNDS: Final = 150
 RELAXATION: Final = 1.6
-"""S. Boyd et al., "Distributed Optimization and Statistical Learning via the Alternating Direction
-Method of Multipliers" (2011), section 3.4.3: 1.5 to 1.8 converge faster than 1."""
+"""Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
+Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3)."""
 
 
 def least_bent(
@@ -37,19 +38,22 @@ def least_bent(
     wish: NDArray[np.float64],
     pull: float,
 ) -> NDArray[np.float64]:
-    """Offsets of a closed line that bends little.
+    """Offsets of the least bent closed line between bounds.
+
+    The alternating direction method approximates the solution, and an active-set step refines it.
+    SciPy's `lsq_linear` needs up to thirty times as long for lines of a course's size.
 
     Args:
-        middle: (N, 2) points, m, evenly spaced.
-        left: (N, 2) direction in which each may be moved.
-        low: (N,) smallest offset of each, m.
-        high: (N,) largest offset of each, m.
-        wish: (N,) offset that each would have, m.
-        pull: How much a line is bent for the wish: 1/m^4, a curvature of 1/m costs as much as being
-            `1 / sqrt(pull)` m away.
+        middle: Evenly spaced points, m, (N, 2).
+        left: Direction in which each point may move, (N, 2).
+        low: Smallest offset of each point, m, (N,).
+        high: Largest offset of each point, m, (N,).
+        wish: Preferred offset of each point, m, (N,).
+        pull: Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as an offset
+            of `1 / sqrt(pull)` m from them.
 
     Returns:
-        (N,) offsets within the bounds.
+        Offsets within the bounds, m, (N,).
     """
     count = len(middle)
     step = float(np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1).mean())
@@ -60,7 +64,7 @@ def least_bent(
     gram = bend.T @ bend
     quadratic = gram * (left @ left.T) + pull * np.eye(count)
     linear = np.einsum("ij,ij->i", left, gram @ middle) - pull * wish
-    # Scaled form of the alternating direction method: a step without bounds, a step onto them.
+    # Alternating direction method in scaled form: a step without bounds, then a projection.
     weight = 10.0 * pull + 1.0
     inverse = np.linalg.inv(quadratic + weight * np.eye(count))
     bounded = np.clip(wish, low, high)
@@ -70,7 +74,7 @@ def least_bent(
         free = RELAXATION * free + (1 - RELAXATION) * bounded
         bounded = np.clip(free + debt, low, high)
         debt += free - bounded
-    # The rest exactly: whoever lies on a bound stays there.
+    # Exact solution for the points that are not on a bound.
     moves = (bounded > low + 1e-6) & (bounded < high - 1e-6)
     if moves.any():
         fixed = quadratic[np.ix_(moves, ~moves)] @ bounded[~moves]
@@ -79,30 +83,30 @@ def least_bent(
 
 
 SPACING_M: Final = 0.1
-"""About how far apart the points of a path are."""
+"""Approximate distance between the points of a path, m."""
 
 PULL: Final = 0.02
-"""How much a path bends to stay where there is room; see `least_bent`."""
+"""Weight of the preferred offsets, 1/m^4; see `least_bent`."""
 
 ATTEMPTS: Final = 8
-"""How often a line that comes too near is bent away before it is given up."""
+"""Number of attempts to push a line away from obstacles."""
 
 
 class CoursePath:
-    """A closed line with what a driver must know of it.
+    """A closed path around a course.
 
     Args:
-        points: (N, 2), m, evenly spaced.
-        heading: (N,) its direction, rad, counter-clockwise from the x axis.
-        curvature: (N,) 1/m; to the left is positive.
-        clearance: (N,) distance to what is nearest, m.
+        points: Evenly spaced points, m, (N, 2).
+        heading: Direction at each point, rad, counter-clockwise from the x axis, (N,).
+        curvature: Curvature at each point, 1/m, positive to the left, (N,).
+        clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
 
     Attributes:
-        points: As given.
-        heading: As given.
-        curvature: As given.
-        clearance: As given.
-        length: Once round, m.
+        points: See above.
+        heading: See above.
+        curvature: See above.
+        clearance: See above.
+        length: Length of the path, m.
     """
 
     def __init__(
@@ -121,54 +125,54 @@ class CoursePath:
 
     @property
     def stations(self) -> NDArray[np.float64]:
-        """(N,) distance of each point along the path, m."""
+        """Distance of each point along the path, m, (N,)."""
         return self._line.stations
 
     def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
-        """The spot of the path that is nearest to a point.
+        """Nearest spot of the path to a point.
 
         Args:
-            x: m.
-            y: m.
-            hint: Station to look around, m; None looks everywhere.
+            x: Position, m.
+            y: Position, m.
+            hint: Station to search around, m; None to search everywhere.
         """
         return self._line.nearest(x, y, hint)
 
     def ahead(self, station: float, distance: float) -> tuple[float, float]:
-        """The point that lies a distance farther along the path, m."""
+        """Point at a distance beyond a station, m."""
         return self._line.at(station + distance)
 
     def index(self, station: float) -> int:
-        """Number of the point at a station, m."""
+        """Index of the last point at or before a station, m."""
         return self._line.index(station)
 
     def way(self, start: float, end: float) -> float:
-        """The shorter way from one station to another, m; backward is negative."""
+        """Shorter way from one station to another, m; backward is negative."""
         return self._line.ahead_by(start, end)
 
 
 def plan_path(
     course: Course, half_width_m: float, margin_m: float, *, comfort_m: float | None = None
 ) -> CoursePath:
-    """Find a smooth way round a course.
+    """Plan a smooth path around a course.
 
     Args:
-        course: Where.
-        half_width_m: Of the vehicle, m.
-        margin_m: What must be left between its sides and everything else, m.
-        comfort_m: What should be left where there is room, m; three times the margin as it comes.
+        course: The course.
+        half_width_m: Half width of the vehicle, m.
+        margin_m: Smallest clearance beside the vehicle, m.
+        comfort_m: Preferred clearance, m; None for three times the margin.
 
     Returns:
-        A path whose points all have a clearance of `half_width_m + margin_m`.
+        A path with a clearance of at least `half_width_m + margin_m` at every point.
 
     Raises:
-        WorldError: Nothing gets through with so much room.
+        WorldError: If no such path exists.
     """
     least = half_width_m + margin_m
     comfort = half_width_m + (3 * margin_m if comfort_m is None else comfort_m)
     obstacles = ClearanceField(course)
     lattice = lay_lattice(course, obstacles)
-    # Between two points that are clear enough a line may come nearer by what lies between them.
+    # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
     for spare in (0.03, 0.0):
         try:
             way = cheapest_way(lattice, least + spare, max(comfort, least + 0.05))
@@ -180,17 +184,21 @@ def plan_path(
         if path is not None:
             return path
     raise WorldError(
-        f"A way through the {course.world} with seed {course.seed} exists, but not one that is "
-        f"smooth and leaves {margin_m:.2f} m at each side of a vehicle of "
-        f"{2 * half_width_m:.2f} m. Use a smaller margin, or another seed."
+        f"No smooth path through the {course.world} with seed {course.seed} leaves "
+        f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide. Use a smaller "
+        "margin, or another seed."
     )
 
 
 def plan_path_for(course: Course, traits: Traits) -> CoursePath:
-    """The way round a course for one vehicle.
+    """Plan a path around a course for a vehicle.
+
+    Args:
+        course: The course.
+        traits: Driving properties of the vehicle.
 
     Raises:
-        WorldError: There is none.
+        WorldError: If there is no path.
     """
     return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
 
@@ -202,7 +210,7 @@ def _smoothed(
     least: float,
     comfort: float,
 ) -> CoursePath | None:
-    """A smooth path that passes everything on the same side as a way, or None."""
+    """A smooth path that passes all obstacles on the same sides as a way, or None."""
     extra = np.zeros(len(way))
     for _ in range(ATTEMPTS):
         low, high = _room(lattice, way, least, comfort, extra)
@@ -211,7 +219,7 @@ def _smoothed(
         short = least - path.clearance
         if short.max() <= 0:
             return path
-        # Ask for more room about wherever it is missing, and try again.
+        # Ask for more clearance wherever it is missing, and try again.
         knots = np.arange(len(path.points)) * len(way) // len(path.points)
         need = np.zeros(len(way))
         np.maximum.at(need, knots, np.maximum(short, 0.0))
@@ -228,10 +236,10 @@ def _room(
     comfort: float,
     extra: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Bounds of the offset at each station, m: comfortable ones where there is room for them."""
+    """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
     low, high = np.empty(len(way)), np.empty(len(way))
     for i, k in enumerate(way):
-        # The way itself is always inside, so bounds of neighbours never lie past one another.
+        # They always include the way, so bounds of neighbours overlap.
         clear = float(lattice.clearance[i, k])
         wanted = min(max(comfort, least + extra[i]), clear - 0.02 + extra[i])
         wanted = min(max(wanted, least + extra[i]), clear)
@@ -242,7 +250,7 @@ def _room(
 
 
 def _run(mask: NDArray[np.bool_], k: int) -> tuple[int, int]:
-    """First and last number of the run of true values about one."""
+    """First and last index of the run of true values around an index."""
     false = np.flatnonzero(~mask)
     after = np.searchsorted(false, k)
     first = int(false[after - 1]) + 1 if after else 0
@@ -251,24 +259,24 @@ def _run(mask: NDArray[np.bool_], k: int) -> tuple[int, int]:
 
 
 def _edge(lattice: Lattice, i: int, k: int, side: int, wanted: float) -> float:
-    """Offset beyond point k at which the clearance falls below what is wanted, m."""
+    """Offset beyond point k at which the clearance falls below `wanted`, m."""
     here = float(lattice.offsets[k])
     beyond = k + side
     if not 0 <= beyond < len(lattice.offsets):
         return here
     inside, outside = float(lattice.clearance[i, k]), float(lattice.clearance[i, beyond])
     if outside == 0.0 or inside <= wanted or outside >= inside:
-        return here  # 0 may mean that the point is no part of the lane.
+        return here  # 0 may mark a point outside the lane.
     share = (inside - wanted) / (inside - outside)
     return here + min(share, 1.0) * (float(lattice.offsets[beyond]) - here)
 
 
 def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePath:
-    """An evenly spaced path through points, by a closed cubic spline."""
+    """An evenly spaced path through points, by a periodic cubic spline."""
     closed = np.vstack((knots, knots[:1]))
     chords = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
     spline = CubicSpline(chords, closed, bc_type="periodic")
-    # Even steps of the parameter are only nearly even steps along the line.
+    # Even steps of the parameter are only approximately even along the line.
     around = float(chords[-1])
     count = max(round(around / SPACING_M), 8)
     fine = np.linspace(0.0, around, 4 * count + 1)
@@ -283,17 +291,14 @@ def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePat
 
 
 def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
-    """The speed to drive each point of a path at, m/s.
+    """Speed at each point of a path, m/s, (N,).
 
-    Bends limit it by the acceleration across, narrow places by care, and both are seen early
-    enough to slow down.
+    It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
+    both.
 
     Args:
-        path: What is driven.
-        traits: By what.
-
-    Returns:
-        (N,) one a point of the path.
+        path: The path.
+        traits: Driving properties of the vehicle.
     """
     least = traits.half_width_m + traits.margin_m
     comfort = traits.half_width_m + traits.comfort_m
@@ -302,7 +307,7 @@ def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
     bend = np.maximum(np.abs(path.curvature), 1e-6)
     speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
     step = path.length / len(speed)
-    for i in range(2 * len(speed) - 1, -1, -1):  # Twice round, for the end is before the start.
+    for i in range(2 * len(speed) - 1, -1, -1):  # Two laps, because the path is closed.
         here, after = i % len(speed), (i + 1) % len(speed)
         can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
         speed[here] = min(speed[here], can_brake_from)

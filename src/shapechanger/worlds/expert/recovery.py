@@ -1,4 +1,4 @@
-"""How a vehicle gets away from what it ran into: back, turning, and on."""
+"""Recovery of a stuck vehicle: back up, turn, and go on."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from shapechanger.worlds.expert.traits import Traits
 __all__ = ["Recovery"]
 
 PATIENCE_S: Final = 0.7
-"""How long a vehicle that is driven may stand still before it counts as stuck."""
+"""Time after which a driven vehicle that stands still counts as stuck, s."""
 
 SCRAPING_S: Final = 3.0
-"""How long it may be slow, as a vehicle that drags along a wall is."""
+"""Time after which a slow vehicle counts as scraping along a wall, s."""
 
 ASKED: Final = 0.25
-"""Throttle from which a vehicle is being driven."""
+"""Throttle or steering above which a vehicle counts as driven."""
 
 STILL: Final = 0.05
 """Share of the top speed below which it stands still."""
@@ -34,12 +34,12 @@ BACK_THROTTLE: Final = -0.6
 
 
 class _Move(NamedTuple):
-    """One part of getting away.
+    """One part of a recovery.
 
     Attributes:
-        seconds: How long.
-        steering: Of all that time.
-        throttle: Of all that time.
+        seconds: Duration.
+        steering: Constant steering.
+        throttle: Constant throttle.
     """
 
     seconds: float
@@ -48,12 +48,12 @@ class _Move(NamedTuple):
 
 
 class Recovery:
-    """Watches whether a vehicle gets on, and takes over where it does not.
+    """Detects that a vehicle is stuck, and takes over until it is free.
 
     Args:
-        traits: How it is driven.
-        period_s: Time from one action to the next, s.
-        rng: Makes no two tries alike, so that none is repeated for ever.
+        traits: Driving properties of the vehicle.
+        period_s: Control period, s.
+        rng: Random generator that varies the manoeuvres, so that none repeats for ever.
     """
 
     def __init__(self, traits: Traits, period_s: float, rng: np.random.Generator) -> None:
@@ -64,9 +64,9 @@ class Recovery:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Forget all timers and manoeuvres."""
         self._moves.clear()
-        self._left_s = 0.0  # Of the first move.
+        self._left_s = 0.0  # Remaining time of the first move.
         self._still_s = 0.0
         self._slow_s = 0.0
         self._free_s = 0.0
@@ -74,27 +74,27 @@ class Recovery:
 
     @property
     def active(self) -> bool:
-        """Whether it drives the vehicle now."""
+        """Whether a manoeuvre is being driven."""
         return bool(self._moves)
 
     def watch(
         self, action: tuple[float, float], speed: float, yaw_rate: float, *, blocked: bool
     ) -> None:
-        """Hear what was done, and what came of it.
+        """Update the timers from an action and its effect.
 
         Args:
-            action: Steering and throttle of now.
-            speed: m/s.
-            yaw_rate: rad/s.
-            blocked: Whether something is right before its nose that it wants to turn away from.
+            action: Steering and throttle.
+            speed: Speed, m/s.
+            yaw_rate: Rate of turn, rad/s.
+            blocked: Whether an obstacle ahead prevents a necessary turn.
         """
         share = abs(speed) / self._traits.top_speed
         driven = abs(action[1]) > ASKED
         turned = self._traits.drive == "tracks" and abs(action[0]) > ASKED
-        straight = abs(yaw_rate) < TURNING  # Who turns on the spot gets on, too.
+        straight = abs(yaw_rate) < TURNING  # Turning on the spot is progress.
         still = share < STILL and straight
-        # With its bow at a quay a boat turns until its stern is there as well, and then is stuck
-        # for good; and a car scrapes along. Tracks turn it away where it stands.
+        # A boat with its bow at a quay turns until its stern touches as well, and then is stuck for
+        # good; a car scrapes along. A tank turns away on the spot.
         still |= blocked and share < SLOW and action[1] > 0 and self._traits.drive != "tracks"
         self._still_s = self._still_s + self._period_s if still and (driven or turned) else 0.0
         self._slow_s = (
@@ -105,14 +105,14 @@ class Recovery:
             self._tries = 0
 
     def action(self, angle: float) -> tuple[float, float] | None:
-        """Steering and throttle that get it free; None while it needs no help.
+        """Steering and throttle of the manoeuvre; None if the vehicle is not stuck.
 
         Args:
-            angle: From its heading to where it wants to go, rad, counter-clockwise.
+            angle: Angle from the heading to the target, rad, counter-clockwise.
         """
         if self.active:
             self._left_s -= self._period_s
-            if self._left_s <= 0 or self._still_s > PATIENCE_S:  # Done, or stuck here as well.
+            if self._left_s <= 0 or self._still_s > PATIENCE_S:  # Finished, or stuck again.
                 self._moves.popleft()
                 self._begin_move()
         elif self._still_s > PATIENCE_S - self._period_s / 2:
@@ -122,18 +122,18 @@ class Recovery:
         return self._moves[0][1:] if self.active else None
 
     def _begin(self, angle: float, *, scraping: bool) -> None:
-        """Decide on moves."""
+        """Choose the moves of a manoeuvre."""
         self._tries += 1
         longer = 1.4 ** (self._tries - 1) * self._rng.uniform(0.8, 1.2)
         side: Literal[-1, 1] = 1 if angle >= 0 else -1
         if self._tries > 2 and self._rng.random() < 0.4:
             side = -1 if side == 1 else 1
         if self._traits.drive == "rudder" and scraping:
-            # A rudder swings the stern, and a stern at a quay cannot swing: it is the other way
-            # round that gets it off, with the bow at the quay, and then the boat backs away.
+            # A rudder swings the stern, which a quay beside it prevents. Steering towards the quay
+            # puts the bow there and frees the stern; then the boat backs away.
             self._moves.append(_Move(1.5 * longer, float(side), 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
-        # Tracks turn the same way back and forth, wheels and rudders the other way.
+        # Going back, wheels and rudders turn the other way; tracks do not.
         turn = side * min(1.0, 0.4 + abs(angle))
         turn *= -0.5 if self._traits.drive == "tracks" else 1.0
         self._moves.append(_Move(min(seconds, BACK_AT_MOST_S), turn, BACK_THROTTLE))

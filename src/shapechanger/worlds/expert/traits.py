@@ -1,4 +1,4 @@
-"""What an expert knows of the vehicle that it drives."""
+"""Driving properties of the vehicles, for the expert."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ __all__ = ["TRAITS", "Traits", "traits_of"]
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """How a vehicle is driven.
+    """Driving properties of a vehicle.
 
-    Sizes and speeds are those of the bodies in `shapechanger.bodies.vehicles`; the rest was
-    tuned on them, on seeds for training.
+    Sizes and speeds are those of `shapechanger.bodies.vehicles`; the rest was tuned on training
+    courses.
 
     Attributes:
-        drive: What turns it: front wheels, two tracks, or a rudder.
-        half_width_m: Of its widest part.
-        nose_m: From its origin to its front.
-        margin_m: What its path leaves at each side, at least: for the corners of its hull, a
+        drive: Kind of steering: front wheels, two tracks, or a rudder.
+        half_width_m: Half of its largest width.
+        nose_m: Distance from its origin to its front.
+        margin_m: Smallest clearance on each side of its path: for the corners of its hull, a
             trailer that cuts corners, and errors.
-        comfort_m: What its path leaves where there is room.
-        top_speed: m/s at full throttle on the level.
-        cruise: Share of the top speed that it is driven at where nothing is in the way.
-        lateral_limit: Acceleration across that it is not driven beyond, m/s2.
-        braking: Deceleration that it can be relied on for, m/s2.
-        look_m: How far ahead of itself it aims at standstill.
-        look_s: How much farther for each m/s.
-        turn: What one unit of steering gives: for wheels the tangent of the full lock over the
-            wheelbase, which is a curvature in 1/m; for tracks the rate of turn in rad/s; for a
-            rudder the rate of turn over the speed, in rad/m.
-        dead: Steering below which tracks do not turn it, because they stick.
-        sway: Steering that it can be disturbed by, as a standard deviation, and still put right.
-        least_throttle: Lowest throttle while it goes forward; below 0 brakes by the motor.
+        comfort_m: Preferred clearance.
+        top_speed: Speed at full throttle on level ground, m/s.
+        cruise: Share of the top speed on free, straight lanes.
+        lateral_limit: Largest lateral acceleration, m/s2.
+        braking: Reliable deceleration, m/s2.
+        look_m: Look-ahead distance at standstill.
+        look_s: Additional look-ahead distance per speed.
+        turn: Effect of one unit of steering: for wheels the tangent of the full lock over the
+            wheelbase, a curvature, 1/m; for tracks the rate of turn, rad/s; for a rudder the rate
+            of turn over the speed, rad/m.
+        dead: Dead band of a tank's steering, from friction of the tracks.
+        sway: Standard deviation of steering noise that it can correct.
+        least_throttle: Smallest throttle while driving forward; below 0 brakes with the motor.
     """
 
     drive: Literal["wheels", "tracks", "rudder"]
@@ -86,7 +86,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
             braking=1.0,
             look_m=0.35,
             look_s=0.25,
-            turn=6.0,  # With `dead`, a line through what the body does at 0.1 to 0.5.
+            turn=6.0,  # With `dead`, a linear fit to the body at 0.1 to 0.5.
             dead=0.09,
             sway=0.12,
         ),
@@ -121,17 +121,14 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         ),
     }
 )
-"""By the name of the vehicle."""
+"""Driving properties by the name of the vehicle."""
 
 
 def traits_of(name: str) -> Traits:
-    """How a vehicle is driven.
-
-    Args:
-        name: Of the vehicle.
+    """Find driving properties by the name of the vehicle.
 
     Raises:
-        UnknownName: No expert knows it.
+        UnknownName: If the vehicle is unknown.
     """
     if name not in TRAITS:
         raise UnknownName("vehicle", name, TRAITS)

@@ -1,9 +1,7 @@
-"""Courses laid out by a seed: corridors, yards and harbours, without pictures or physics."""
+"""Layout of courses from a seed: corridors, yards and harbours."""
 
 from __future__ import annotations
 
-from typing import Final
+from shapechanger.worlds.layout.courses import WORLDS, lay_out, start_pose
 
-from shapechanger.worlds.layout.courses import WORLDS, lay_out, occupancy, start_pose
-
-__all__: Final[list[str]] = ["WORLDS", "lay_out", "occupancy", "start_pose"]
+__all__ = ["WORLDS", "lay_out", "start_pose"]

@@ -1,4 +1,4 @@
-"""Corridors of an office building: straight legs and right-angled corners, once round."""
+"""Corridors of an office building: straight legs, right-angled corners, and panelled walls."""
 
 from __future__ import annotations
 
@@ -10,53 +10,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Lamp, Surface, Wall
-from shapechanger.worlds.layout.furniture import Furniture, Lane, Size, weighted_choice
+from shapechanger.worlds.layout.furniture import Lane, LaneObstacles, Size, weighted_choice
 from shapechanger.worlds.layout.geometry import (
-    arcs,
+    arc_lengths,
     grow_cells,
-    resampled,
+    resample,
     scale_grid,
     trace_outline,
 )
 
-__all__ = ["CEILING_M", "DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panelled"]
+__all__ = ["CEILING_M", "DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panel_walls"]
 
 DOOR_M: Final = 0.9
-"""Width of a door; its wall is wider by a frame at each side."""
+"""Width of a door without its frame, m."""
 
 FRAME_M: Final = 0.06
-"""Width of the frame of a door."""
+"""Width of a door's frame, m."""
 
 RECESS_M: Final = 0.15
-"""How deep some doors stand back from the wall."""
+"""Depth of a recessed door, m."""
 
 _PLAIN_M = (0.4, 2.4)
 
-# What is let into the plaster: how often, and how wide, m.
+# Panels in the plaster: surface, share, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
     ("door", 0.5, (DOOR_M + 2 * FRAME_M, DOOR_M + 2 * FRAME_M)),
     ("window", 0.2, (1.0, 2.0)),
     ("board", 0.18, (1.0, 2.4)),
     ("glass", 0.12, (0.8, 1.6)),
 )
-_HOW_OFTEN = [share for _, share, _ in _PANELS]
+_PANEL_SHARES = [share for _, share, _ in _PANELS]
 
 _Point = NDArray[np.float64]
 
 
-def panelled(
+def panel_walls(
     rng: np.random.Generator, corners: NDArray[np.float64], bends: NDArray[np.int64], height: float
 ) -> tuple[Wall, ...]:
-    """The walls round a closed line of corners, free space at the left hand.
+    """Walls along a closed line of corners, with the lane on their left.
 
     Args:
-        rng: Chance.
-        corners: Shape (n, 2), m; each leg is at least 1.5 m long and at a right angle to the next.
-        bends: At each corner 1 where it stands out into the lane, -1 where it is a nook.
-        height: Of the walls, m.
+        rng: Random generator.
+        corners: Corners, m, (n, 2); legs are at least 1.5 m long and at right angles.
+        bends: 1 for corners that stand out into the lane, -1 for nooks, (n,).
+        height: Height of the walls, m.
     """
     n = len(corners)
-    # Nooks are cut off and edges taken off by this much, mostly not at all.
+    # Length by which corners are cut off, mostly 0.
     cut = np.where(rng.random(n) < 0.3, rng.uniform(0.2, 0.5, n), 0.0)
     brick = np.where((bends > 0) & (rng.random(n) < 0.35), rng.uniform(0.3, 0.8, n), 0.0)
     walls: list[Wall] = []
@@ -81,14 +81,14 @@ def panelled(
 
 
 def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) -> Iterator[Wall]:
-    """Plaster from one point to another, with what is let into it."""
+    """Plaster between two points, with panels in it."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
     back = np.array([ahead[1], -ahead[0]]) * RECESS_M  # Away from the lane.
     done = start
     t = float(rng.uniform(*_PLAIN_M))
     while True:
-        surface, _, bounds = _PANELS[weighted_choice(rng, _HOW_OFTEN)]
+        surface, _, bounds = _PANELS[weighted_choice(rng, _PANEL_SHARES)]
         wide = float(rng.uniform(*bounds))
         recessed = surface == "door" and rng.random() < 0.4
         gap = float(rng.uniform(*_PLAIN_M))
@@ -119,7 +119,7 @@ _LENGTH_M = (40.0, 90.0)
 _GAP_M = 0.9
 _SPACING_M = 0.1
 
-# What stands along the walls; the second number of each is its depth. Sizes of common furniture.
+# Furniture along the walls, with the depth as the width; common sizes.
 _FURNITURE = (
     Size("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5)),
     Size("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7)),
@@ -128,45 +128,53 @@ _FURNITURE = (
     Size("cabinet", (0.8, 1.2), (0.4, 0.5), (1.0, 1.9)),
     Size("crate", (0.4, 0.6), (0.3, 0.4), (0.25, 0.4)),
 )
-_CORRIDOR_HOW_OFTEN = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
+_FURNITURE_SHARES = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
 
 
 def corridor(rng: np.random.Generator, seed: int) -> Course | None:
-    """One attempt at a course; None where chance made none that fits."""
+    """Try to lay out a corridor.
+
+    Args:
+        rng: Random generator.
+        seed: Seed to record in the course.
+
+    Returns:
+        The course, or None if the random layout does not fit.
+    """
     corners = _corners(rng)
     if corners is None:
         return None
     widths = rng.uniform(*_WIDTH_M, size=len(corners))
     route, starts = _route(corners, widths)
-    along = arcs(route)
+    along = arc_lengths(route)
     if not _LENGTH_M[0] <= along[-1] <= _LENGTH_M[1]:
         return None
     normals = _normals(corners)
     reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
     turns = _turns(corners)
-    # Who walks along the right wall has the lane at the left hand; along the left wall, backwards.
-    right = panelled(rng, corners - reach, -turns, CEILING_M)
-    left = panelled(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
+    # Walls have the lane on their left: the right one runs forwards, the left one backwards.
+    right = panel_walls(rng, corners - reach, -turns, CEILING_M)
+    left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
     lane = Lane(route, left, right)
     half_width = lane.half_width()
-    furniture = Furniture(lane, half_width, _GAP_M)
-    _furnish(rng, furniture, corners, widths, starts)
-    _plant(rng, furniture, corners, reach * turns[:, None], starts)
+    obstacles = LaneObstacles(lane, half_width, _GAP_M)
+    _furnish(rng, obstacles, corners, widths, starts)
+    _plant(rng, obstacles, corners, reach * turns[:, None], starts)
     return Course(
         world="corridor",
         seed=seed,
         route=route,
         half_width=half_width,
         walls=(*left, *right),
-        things=tuple(furniture.things),
+        obstacles=tuple(obstacles.obstacles),
         lamps=_lamps(rng, corners, widths),
         ceiling_m=CEILING_M,
-        gap_m=furniture.gap_m,
+        gap_m=obstacles.gap_m,
     )
 
 
 def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
-    """Where the middle of the corridor turns, in driving direction, the longest leg first."""
+    """Corners of the route in driving direction, the longest leg first, m, (n, 2)."""
     loop = trace_outline(grow_cells(rng, int(rng.integers(3, 8))))
     if loop is None:
         return None
@@ -181,7 +189,7 @@ def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
 
 
 def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """At each point 1 for a turn to the left, -1 to the right, 0 for none."""
+    """Turn at each point: 1 to the left, -1 to the right, 0 for none."""
     back = points - np.roll(points, 1, axis=0)
     ahead = np.roll(points, -1, axis=0) - points
     return np.sign(np.round(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], 6)).astype(
@@ -190,7 +198,7 @@ def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors to the left of each leg, shape (n, 2)."""
+    """Unit vectors to the left of each leg, (n, 2)."""
     ahead = np.roll(corners, -1, axis=0) - corners
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
     return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
@@ -199,10 +207,10 @@ def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 def _route(
     corners: NDArray[np.float64], widths: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The middle with round corners, and how far along it each corner is, m, shape (n,).
+    """Route with rounded corners, m, (m, 2), and the distance of each corner along it, m, (n,).
 
-    It begins after a third of the first leg. A corner as round as half the width leaves the inner
-    edge at the same distance all the way.
+    It starts after a third of the first leg. With half the width as the radius of a corner, its
+    distance from the inner edge is constant.
     """
     back = corners - np.roll(corners, 1, axis=0)
     back /= np.hypot(back[:, 0], back[:, 1])[:, None]
@@ -214,61 +222,61 @@ def _route(
         arc = (1.0 - np.sin(angles)) * -back[k] + (1.0 - np.cos(angles)) * ahead[k]
         pieces.append(corners[k] + radii[k] * arc)
     line = np.concatenate(pieces)
-    # The corner's middle is the thirteenth point of its arc.
-    along = arcs(line)[np.arange(len(corners)) * 25 + 13]
-    return resampled(line, _SPACING_M), np.roll(along, 1)
+    # The middle of a corner is the thirteenth point of its arc.
+    along = arc_lengths(line)[np.arange(len(corners)) * 25 + 13]
+    return resample(line, _SPACING_M), np.roll(along, 1)
 
 
 def _furnish(
     rng: np.random.Generator,
-    furniture: Furniture,
+    obstacles: LaneObstacles,
     corners: NDArray[np.float64],
     widths: NDArray[np.float64],
     along: NDArray[np.float64],
 ) -> None:
-    """Stand furniture along the walls, and a few boxes where they are in the way."""
+    """Add furniture along the walls, and a few boxes in the way."""
     normals = _normals(corners)
-    density = rng.uniform(0.1, 0.35)  # Things per metre: some buildings are tidy.
+    density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
     for k in range(len(corners)):
         after = (k + 1) % len(corners)
         leg = corners[after] - corners[k]
         length = float(np.hypot(*leg))
         ahead, yaw = leg / length, float(np.arctan2(leg[1], leg[0]))
         for _ in range(rng.poisson(density * length)):
-            size = _FURNITURE[weighted_choice(rng, _CORRIDOR_HOW_OFTEN)]
+            size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
             t = float(rng.uniform(1.2, length - 1.2))
             side = 1.0 if rng.random() < 0.5 else -1.0
-            thing = size.draw(rng, 0.0, 0.0, yaw)
-            aside = widths[k] / 2.0 - thing.width / 2.0 - float(rng.uniform(0.005, 0.04))
-            if thing.kind in ("box", "crate") and rng.random() < 0.4:
+            obstacle = size.draw(rng, 0.0, 0.0, yaw)
+            aside = widths[k] / 2.0 - obstacle.width / 2.0 - float(rng.uniform(0.005, 0.04))
+            if obstacle.kind in ("box", "crate") and rng.random() < 0.4:
                 aside *= float(rng.uniform(0.4, 0.9))
-                thing = replace(thing, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
+                obstacle = replace(obstacle, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
             x, y = corners[k] + ahead * t + normals[k] * side * aside
-            thing = replace(thing, x=float(x), y=float(y))
-            furniture.offer(thing, float(along[after]) - (length - t))
+            obstacle = replace(obstacle, x=float(x), y=float(y))
+            obstacles.offer(obstacle, float(along[after]) - (length - t))
 
 
 def _plant(
     rng: np.random.Generator,
-    furniture: Furniture,
+    obstacles: LaneObstacles,
     corners: NDArray[np.float64],
     inward: NDArray[np.float64],
     along: NDArray[np.float64],
 ) -> None:
-    """Stand plants and bins into some nooks: `inward` points from there through the corner."""
+    """Add plants and bins in some nooks; `inward` points from a nook through its corner."""
     for corner, way, s in zip(corners, inward, along, strict=True):
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
-            thing = size.draw(rng, 0.0, 0.0, 0.0)
-            # So far from both walls that it touches neither.
-            x, y = corner - way + np.sign(way) * (thing.length / 2.0 + 0.02)
-            furniture.offer(replace(thing, x=float(x), y=float(y)), float(s))
+            obstacle = size.draw(rng, 0.0, 0.0, 0.0)
+            # Free of both walls.
+            x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
+            obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
 
 
 def _lamps(
     rng: np.random.Generator, corners: NDArray[np.float64], widths: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
-    """A row of lamps along the middle of every leg, lengthwise or across."""
+    """Lamps along the middle of every leg, lengthwise or across."""
     every = float(rng.uniform(2.0, 3.2))
     long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))
     across = rng.random() < 0.35

@@ -1,4 +1,4 @@
-"""Choices by chance."""
+"""Random placement of obstacles and patches of sun, which keeps the lane passable."""
 
 from __future__ import annotations
 
@@ -9,24 +9,36 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.course import Lamp, Thing, ThingKind, Wall
+from shapechanger.worlds.course import Lamp, Obstacle, ObstacleKind, Wall
 from shapechanger.worlds.layout.geometry import (
-    arcs,
-    between,
-    from_thing,
+    arc_lengths,
+    distances_from_obstacle,
+    distances_to_segments,
     length,
     normals,
-    segments,
-    to_segments,
+    obstacle_gap,
+    wall_segments,
 )
 
-__all__ = ["Furniture", "Lane", "Scatter", "Size", "scattered", "sunlit", "weighted_choice"]
+__all__ = [
+    "Lane",
+    "LaneObstacles",
+    "Scatter",
+    "Size",
+    "place_sun_patches",
+    "scatter_obstacles",
+    "weighted_choice",
+]
 
 
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
-    """Index of one of several, each as often as its share of their sum says.
+    """Draw an index with a probability proportional to its share.
 
-    `Generator.choice` does the same thirty times slower, and it is asked for every panel of a wall.
+    `Generator.choice` is thirty times slower, and this is called for every panel of a wall.
+
+    Args:
+        rng: Random generator.
+        shares: Weights, >= 0.
     """
     left = float(rng.random()) * sum(shares)
     for i, share in enumerate(shares):
@@ -37,41 +49,52 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
 
 
 FREE_AHEAD_M: Final = 3.0
-"""Nothing stands this far ahead of the first point of the route."""
+"""Length of the route after its first point that stays free, m."""
 
 FREE_BEHIND_M: Final = 2.0
-"""Nor this far behind it: a truck with its trailer is 1 m long."""
+"""Length before it that stays free, m; a truck with its trailer is 1 m long."""
 
 _BEFORE_DOORS_M: Final = 0.3
-"""Nothing stands this near to a door."""
+"""Smallest distance from a door, m."""
 
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """How large a kind of thing is: each number lies between two, m."""
+    """Ranges of the size of a kind of obstacle, m."""
 
-    kind: ThingKind
+    kind: ObstacleKind
     length: tuple[float, float]
     width: tuple[float, float]
     height: tuple[float, float]
 
-    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Thing:
-        """One of them, at a place. A round one is as wide as it is long."""
+    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Obstacle:
+        """Draw an obstacle; a round one is as wide as it is long.
+
+        Args:
+            rng: Random generator.
+            x: Position, m.
+            y: Position, m.
+            yaw: Angle of its length, rad.
+        """
         length, width, height = (
             float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
         )
-        thing = Thing(self.kind, x, y, yaw, length, width, height)
-        return Thing(self.kind, x, y, 0.0, length, length, height) if thing.is_round else thing
+        obstacle = Obstacle(self.kind, x, y, yaw, length, width, height)
+        return (
+            Obstacle(self.kind, x, y, 0.0, length, length, height)
+            if obstacle.is_round
+            else obstacle
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """A lane that is still empty.
+    """An empty lane.
 
     Attributes:
-        route: Its middle, as that of a Course, (n, 2).
-        left: Walls at its left hand.
-        right: Walls at its right hand.
+        route: Its middle, as in `Course`, m, (n, 2).
+        left: Walls on its left.
+        right: Walls on its right.
     """
 
     route: NDArray[np.float64]
@@ -79,61 +102,63 @@ class Lane:
     right: tuple[Wall, ...]
 
     def half_width(self) -> NDArray[np.float64]:
-        """Distance of each point of the route from the nearest wall, m, shape (n,)."""
-        return to_segments(self.route, segments((*self.left, *self.right))).min(axis=1)
+        """Distance of each point of the route from the nearest wall, m, (n,)."""
+        return distances_to_segments(self.route, wall_segments((*self.left, *self.right))).min(
+            axis=1
+        )
 
 
-class Furniture:
-    """The things in a lane. One that would close it is refused.
+class LaneObstacles:
+    """Obstacles in a lane; those that would block it are rejected.
 
-    Everything leaves its wider side free. Two that leave the same side free may stand close
-    together; where a vehicle has to change sides between two, they are as far apart as the gap.
+    Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
+    stand close together; two that are passed on different sides are a gap apart.
 
     Args:
-        lane: Where they stand.
-        half_width: What `lane.half_width()` said, (n,).
-        gap_m: Narrowest way through that may be left, m.
+        lane: The lane.
+        half_width: Result of `lane.half_width()`, m, (n,).
+        gap_m: Smallest gap that must remain, m.
     """
 
     def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
         self.lane = lane
         self.half_width = half_width
-        self.things: list[Thing] = []
+        self.obstacles: list[Obstacle] = []
         self.gap_m = 2.0 * float(half_width.min())
-        """Narrowest way through that is left, m."""
+        """Narrowest remaining passage, m."""
         walls = (*lane.left, *lane.right)
-        self._walls = segments(walls)
+        self._walls = wall_segments(walls)
         self._lefts = len(lane.left)
         self._doors = np.array([wall.surface == "door" for wall in walls])
         self._wanted = gap_m
         self._round_m = length(lane.route)
         self._passed_left: list[bool] = []
 
-    def offer(self, thing: Thing, s: float) -> bool:
-        """Put a thing into the lane, if it fits.
+    def offer(self, obstacle: Obstacle, s: float) -> bool:
+        """Add an obstacle if it fits.
 
         Args:
-            thing: What, and where.
-            s: How far along the route its middle is, m.
+            obstacle: The obstacle.
+            s: Distance of its middle along the route, m.
 
         Returns:
-            Whether it stands there now.
+            Whether it was added.
         """
-        reach = max(thing.length, thing.width) / 2.0
+        reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
         if s - reach < FREE_AHEAD_M or self._round_m - s - reach < FREE_BEHIND_M:
             return False
-        far = from_thing(thing, self._walls)
+        far = distances_from_obstacle(obstacle, self._walls)
         left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
         if min(left, right) <= 0.0 or max(left, right) < self._wanted:
             return False
-        # Nobody puts a cabinet before a door.
+        # Doors stay free.
         if (far[self._doors] < _BEFORE_DOORS_M).any():
             return False
         narrowest = max(left, right)
         passed_left = left >= right
-        for other, other_left in zip(self.things, self._passed_left, strict=True):
-            apart = between(thing, other)
+        for other, other_left in zip(self.obstacles, self._passed_left, strict=True):
+            apart = obstacle_gap(obstacle, other)
             if passed_left == other_left:
                 if apart <= 0.0:
                     return False
@@ -142,19 +167,19 @@ class Furniture:
             else:
                 narrowest = min(narrowest, apart)
         self.gap_m = min(self.gap_m, narrowest)
-        self.things.append(thing)
+        self.obstacles.append(obstacle)
         self._passed_left.append(passed_left)
         return True
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """A kind of thing to strew.
+    """A kind of obstacle to scatter.
 
     Attributes:
-        size: What, and how large.
-        share: How often it is chosen.
-        moored: How often it lies along the wall, from 0 to 1.
+        size: Kind and range of sizes.
+        share: Weight with which it is drawn.
+        moored: Probability of lying along a wall.
     """
 
     size: Size
@@ -162,36 +187,49 @@ class Scatter:
     moored: float = 0.0
 
 
-def scattered(
-    rng: np.random.Generator, furniture: Furniture, kinds: tuple[Scatter, ...], per_m: float
+def scatter_obstacles(
+    rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
-    """Offer things to a lane, about `per_m` for each metre of it; those that fit stay."""
-    route, half_width = furniture.lane.route, furniture.half_width
-    along, left = arcs(route), normals(route)
+    """Scatter obstacles over a lane.
+
+    Args:
+        rng: Random generator.
+        obstacles: The lane and its obstacles, which are added to.
+        kinds: Kinds to draw from.
+        per_m: Mean number of attempts per metre; obstacles that do not fit are dropped.
+    """
+    route, half_width = obstacles.lane.route, obstacles.half_width
+    along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]
     for _ in range(rng.poisson(per_m * float(along[-1]))):
         kind = kinds[weighted_choice(rng, shares)]
         i = int(rng.integers(len(route)))
         heading = float(np.arctan2(-left[i, 0], left[i, 1]))
-        thing = kind.size.draw(rng, 0.0, 0.0, heading)
+        obstacle = kind.size.draw(rng, 0.0, 0.0, heading)
         if rng.random() < kind.moored:
             side = 1.0 if rng.random() < 0.5 else -1.0
             aside = side * (
-                float(half_width[i]) - thing.width / 2.0 - float(rng.uniform(0.05, 0.3))
+                float(half_width[i]) - obstacle.width / 2.0 - float(rng.uniform(0.05, 0.3))
             )
         else:
-            most = float(half_width[i]) - thing.width / 2.0
+            most = float(half_width[i]) - obstacle.width / 2.0
             aside = float(rng.uniform(-most, most))
-            yaw = 0.0 if thing.is_round else float(rng.uniform(-np.pi, np.pi))
-            thing = replace(thing, yaw=yaw)
+            yaw = 0.0 if obstacle.is_round else float(rng.uniform(-np.pi, np.pi))
+            obstacle = replace(obstacle, yaw=yaw)
         x, y = route[i] + left[i] * aside
-        furniture.offer(replace(thing, x=float(x), y=float(y)), float(along[i]))
+        obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(along[i]))
 
 
-def sunlit(
+def place_sun_patches(
     rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
-    """Patches of sun on the lane, from two to eight."""
+    """Two to eight patches of sun on a lane.
+
+    Args:
+        rng: Random generator.
+        route: Middle of the lane, m, (n, 2).
+        half_width: Half width of the lane, m, (n,).
+    """
     left = normals(route)
     lamps: list[Lamp] = []
     for _ in range(int(rng.integers(2, 9))):

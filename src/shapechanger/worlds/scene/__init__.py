@@ -1,4 +1,4 @@
-"""How a course looks in MuJoCo, and what of it can be touched."""
+"""Courses in MuJoCo: visual meshes with precomputed light, and collision geoms."""
 
 from __future__ import annotations
 

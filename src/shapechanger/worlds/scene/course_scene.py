@@ -1,4 +1,4 @@
-"""A course in a MuJoCo model: what is seen of it, and what can be touched."""
+"""A course in a MuJoCo model: visual meshes and hidden collision geoms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapechanger.worlds.scene.surfaces import (
     ceiling_patches,
     ground_patches,
     lamp_patches,
-    thing_patches,
+    obstacle_patches,
     verge_patches,
     wall_patches,
 )
@@ -31,32 +31,32 @@ __all__ = [
     "add_course",
 ]
 
-# MuJoCo lets two geoms touch if the type of one has a bit in common with the affinity of the other.
+# Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 SOLID_TYPE: Final = 1
 SOLID_AFFINITY: Final = 2
 GROUND_TYPE: Final = 4
 GROUND_AFFINITY: Final = 8
 
 HIDDEN: Final = 3
-"""Group of the geoms that are not drawn; MuJoCo draws groups 0 to 2."""
+"""Group of the collision geoms; MuJoCo renders groups 0 to 2."""
 
-# A wall is this thick, m, behind the side that is seen: thin enough not to come out on the far
-# side of a partition, and thicker than a vehicle moves in a step.
+# Thickness of a wall behind its visible side, m: thinner than a partition, and more than a vehicle
+# moves in a step.
 _THICKNESS: Final = 0.06
 # Sliding friction of rubber on dry concrete is 0.6 to 0.85 (Engineering Toolbox, "Friction and
-# Friction Coefficients"); polished stone is swept, a yard dusty. Hulls slide along walls: a guess.
+# Friction Coefficients"); yards are dusty. Friction of hulls on walls is a guess.
 _GROUND_FRICTION: Final = {"corridor": 0.85, "yard": 0.75}
 _DEFAULT_FRICTION: Final = 0.8
 _WALL_FRICTION: Final = 0.3
 
 
 def add_collision(spec: mujoco.MjSpec, course: Course) -> None:
-    """Add "world/ground", "world/wall/0" and on, and "world/thing/0" and on."""
+    """Add the collision geoms "world/ground", "world/wall/0" ... and "world/thing/0" ...."""
     body = spec.worldbody
     body.add_geom(
         name="world/ground",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],  # Without end.
+        size=[0.0, 0.0, 1.0],  # Infinite.
         friction=[_GROUND_FRICTION.get(course.world, _DEFAULT_FRICTION), 0.005, 0.0001],
         contype=GROUND_TYPE,
         conaffinity=GROUND_AFFINITY,
@@ -78,17 +78,17 @@ def add_collision(spec: mujoco.MjSpec, course: Course) -> None:
             [x, y, 0.5 * wall.height],
             float(np.arctan2(along[1], along[0])),
         )
-    for number, thing in enumerate(course.things):
-        half = 0.5 * thing.height
+    for number, obstacle in enumerate(course.obstacles):
+        half = 0.5 * obstacle.height
         _add_solid(
             spec,
             f"world/thing/{number}",
-            mujoco.mjtGeom.mjGEOM_CYLINDER if thing.is_round else mujoco.mjtGeom.mjGEOM_BOX,
-            [0.5 * thing.length, half, 0.0]
-            if thing.is_round
-            else [0.5 * thing.length, 0.5 * thing.width, half],
-            [thing.x, thing.y, half],
-            thing.yaw,
+            mujoco.mjtGeom.mjGEOM_CYLINDER if obstacle.is_round else mujoco.mjtGeom.mjGEOM_BOX,
+            [0.5 * obstacle.length, half, 0.0]
+            if obstacle.is_round
+            else [0.5 * obstacle.length, 0.5 * obstacle.width, half],
+            [obstacle.x, obstacle.y, half],
+            obstacle.yaw,
         )
 
 
@@ -113,27 +113,26 @@ def _add_solid(
     )
 
 
-# What the ground of each world shows.
+# Texture of the ground in each world.
 _GROUND: Final = {"corridor": "floor", "yard": "asphalt", "harbour": "water"}
 _DEFAULT_GROUND: Final = "asphalt"
-# What is nearer than the first, or farther than the second, is not drawn, m. The nearest that a
-# camera a few centimetres above the ground sees is its own bonnet.
+# Clipping planes, m. The nearest object that a camera sees is the vehicle's own bonnet.
 _NEAR: Final = 0.02
 _FAR: Final = 150.0
 
 
 def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
-    """Add a course to a model; the names of all its elements start with "world/".
+    """Add a course to a model, with element names that start with "world/".
 
-    What is drawn is a mesh per material, with its light worked out beforehand: neither shadows nor
-    MuJoCo's reflections, which take most of the time of a small picture. Its one lamp shines
-    straight up, and only meshes made for it answer to that; a vehicle needs materials with
-    `emission` 1. A glossy ground is a sheet through which the mirrored course is seen.
+    There is one visual mesh per material, with precomputed light, because shadows and MuJoCo's
+    reflections would take most of the time of a small picture. The only light shines straight up,
+    and only these meshes have normals made for it; vehicles need emissive materials. A glossy
+    ground is a translucent sheet over a mirrored copy of the course.
 
     Args:
-        spec: The model; its headlight, its clipping planes and its smoothing are set.
-        course: What to add.
-        look: In which light and colours.
+        spec: Model to extend; its headlight, clipping planes and antialiasing are set.
+        course: The course.
+        look: Light and colours.
     """
     _set_camera(spec)
     add_collision(spec, course)
@@ -142,32 +141,32 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     walls, plain = look.tone(look.wall), look.tone()
 
     def show(name: str, patches: Patches, colour: tuple[float, float, float]) -> None:
-        """Draw patches with the texture of that name."""
+        """Add patches with the texture of that name."""
         if patches:
             add_material(spec, f"world/{name}", texture(name, look.texture_seed), colour)
             add_patches(spec, f"world/{name}", patches, f"world/{name}", mirrored)
 
     for surface, patches in wall_patches(course, light).items():
         show(surface, patches, walls)
-    things = thing_patches(course, light)
+    obstacles = obstacle_patches(course, light)
     if course.ceiling_m > 0.0:
         show("ceiling", ceiling_patches(course, light), plain)
     else:
         _add_sky(spec, look)
     if course.world == "yard":
         show("grass", verge_patches(course, light), plain)
-    show("things", things, plain)
+    show("things", obstacles, plain)
     if course.lamps and course.ceiling_m > 0.0:
         _add_lamps(spec, course, look, mirrored)
     _add_ground(spec, course, look, light)
 
 
 def _set_camera(spec: mujoco.MjSpec) -> None:
-    """Let nothing but the light that was worked out be seen, from near to far."""
+    """Set the light, the clipping planes and the quality."""
     spec.visual.headlight.active = 0
     spec.visual.quality.shadowsize = 0
     spec.visual.quality.offsamples = 0
-    # The clipping planes are given in units of the extent, which would follow from the course.
+    # The clipping planes are in units of the extent, which would depend on the course.
     spec.stat.extent = 1.0
     spec.visual.map.znear = _NEAR
     spec.visual.map.zfar = _FAR
@@ -183,7 +182,7 @@ def _set_camera(spec: mujoco.MjSpec) -> None:
 
 
 def _add_ground(spec: mujoco.MjSpec, course: Course, look: Look, light: Light) -> None:
-    """The sheet that is seen; last, because it is drawn over what it mirrors."""
+    """Add the visible ground; last, because it is blended over the mirrored course."""
     name = _GROUND.get(course.world, _DEFAULT_GROUND)
     material = add_material(
         spec, "world/floor", texture(name, look.texture_seed), look.tone(look.ground)
@@ -193,7 +192,7 @@ def _add_ground(spec: mujoco.MjSpec, course: Course, look: Look, light: Light) -
 
 
 def _add_lamps(spec: mujoco.MjSpec, course: Course, look: Look, mirrored: bool) -> None:
-    """Lamps stay bright when the light is dim, as they do before a camera."""
+    """Add the lamps, which stay bright in dim light, as they do for a camera."""
     row, column = divmod(CELLS["lamp"], ROWS)
     place = (np.array([column, row]) + 0.5) / ROWS
     colour = tuple(c ** (1.0 / 4.0) for c in look.tone())
@@ -202,7 +201,7 @@ def _add_lamps(spec: mujoco.MjSpec, course: Course, look: Look, mirrored: bool) 
 
 
 def _add_sky(spec: mujoco.MjSpec, look: Look) -> None:
-    """MuJoCo draws the sky as it is painted, so its colour is painted too."""
+    """Add the sky, with its tone in the texture, because MuJoCo does not light skyboxes."""
     picture = texture("sky", look.texture_seed) * np.array(look.tone())
     height, width, channels = picture.shape
     sky = spec.add_texture(

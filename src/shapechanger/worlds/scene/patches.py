@@ -1,4 +1,4 @@
-"""Many small four-sided patches of one material, gathered into one mesh that is drawn at once."""
+"""Quadrilateral patches, collected into one mesh per material, and solids made of them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.paint import CELLS, ROWS
 
-__all__ = ["Array", "Patches", "add_box", "add_material", "add_patches", "add_turned"]
+__all__ = ["Array", "Patches", "add_box", "add_material", "add_patches", "add_turned", "grid_cells"]
 
 Array = NDArray[np.float64]
 
-# The corners of a patch run counter-clockwise for who sees it.
+# The corners of a patch are counter-clockwise seen from its front.
 _TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
-# A mirrored patch runs the other way round.
+# A mirrored patch has the opposite order.
 _MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
 _DOWN: Final = np.array([1.0, 1.0, -1.0])
 
 
 @dataclass(slots=True)
 class Patches:
-    """Patches with their place, their part of the texture and their light.
+    """Patches with texture coordinates and light.
 
-    Each is four corners that run counter-clockwise for who looks at its front; nobody sees its
-    back. In a texture u runs to the right and v down from the top, both 1 at the far edge.
+    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
+    coordinates are u to the right and v down, from 0 to 1.
     """
 
     _corners: list[Array] = field(default_factory=list[Array])
@@ -38,9 +38,9 @@ class Patches:
         """Add n patches.
 
         Args:
-            corners: Where their corners are, (n, 4, 3), m.
-            places: Where their corners are in the texture, (n, 4, 2).
-            lights: How bright each corner is, (n, 4), 0 to 1; or all of them.
+            corners: Corners, m, (n, 4, 3).
+            places: Texture coordinates of the corners, (n, 4, 2).
+            lights: Brightness of each corner, 0 to 1, (n, 4); or of all of them.
         """
         self._corners.append(corners)
         self._places.append(places)
@@ -50,9 +50,10 @@ class Patches:
         return bool(self._corners)
 
     def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """Points (m, 3), places in the texture (m, 2), lights (m,) and triangles (k, 3).
+        """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
 
-        Mirrored, all is there once more below the ground, where a glossy ground lets it be seen.
+        Args:
+            mirrored: Whether to add a copy mirrored below the ground, for a glossy ground.
         """
         points = np.concatenate(self._corners).reshape(-1, 3)
         places = np.concatenate(self._places).reshape(-1, 2)
@@ -70,7 +71,14 @@ class Patches:
 def add_material(
     spec: mujoco.MjSpec, name: str, picture: NDArray[np.uint8], colour: tuple[float, float, float]
 ) -> mujoco.MjsMaterial:
-    """A material that shows a texture in nothing but the light of `add_patches`."""
+    """Add a material whose only light is that of `add_patches`.
+
+    Args:
+        spec: Model to extend.
+        name: Name of the material and the texture.
+        picture: The texture, (H, W, 3).
+        colour: Factors on red, green and blue.
+    """
     height, width, channels = picture.shape
     texture = spec.add_texture(
         name=name,
@@ -90,11 +98,17 @@ def add_material(
 def add_patches(
     spec: mujoco.MjSpec, name: str, patches: Patches, material: str, mirrored: bool = False
 ) -> None:
-    """Draw patches; they touch nothing and weigh nothing.
+    """Add patches as a visual mesh, without mass and collisions.
 
-    MuJoCo keeps no brightness for a point, but a normal, and a lamp that shines straight up lights
-    each point by how far its normal leans down. So the normal is chosen to give the light wanted,
-    whichever way the patch really looks.
+    MuJoCo has no brightness per vertex, but a normal. The only light shines straight up, so the
+    normals are chosen for the brightness that they give, whatever the orientation of the patch.
+
+    Args:
+        spec: Model to extend.
+        name: Name of the mesh and the geom.
+        patches: The patches.
+        material: Name of their material.
+        mirrored: Whether to add a copy mirrored below the ground.
     """
     points, places, lights, triangles = patches.arrays(mirrored)
     lean = np.clip(lights, 0.0, 1.0)
@@ -119,11 +133,10 @@ def add_patches(
     )
 
 
-# What of a cell is left out at its edges, so that far away its neighbours do not shine through.
+# Margin of a texture cell, so that its neighbours do not bleed into it at a distance.
 _INSET: Final = 0.08
 _SIDES: Final = 10
-# Corners of a cube from -1 to 1: the four sides and the top, each counter-clockwise from outside
-# and from its lower left; nothing that stands is seen from below.
+# Corners of a cube from -1 to 1: four sides and the top, counter-clockwise from the lower left.
 _BOX: Final = np.array(
     [
         [(1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)],
@@ -141,7 +154,16 @@ _FOOT: Final = 0.75
 def add_box(
     patches: Patches, middle: Array, half: Array, yaw: float, stuff: str, light: float
 ) -> None:
-    """An upright box around `middle` (3,) with half sizes (3,), m, turned by `yaw`."""
+    """Add an upright box.
+
+    Args:
+        patches: Patches to extend.
+        middle: Its centre, m, (3,).
+        half: Half sizes, m, (3,).
+        yaw: Rotation about the vertical axis, rad.
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
     corners = _turned(_BOX * half, yaw) + middle
     lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
     lights[:4, :2] *= _FOOT
@@ -151,7 +173,16 @@ def add_box(
 def add_turned(
     patches: Patches, x: float, y: float, profile: Array, stuff: str, light: float
 ) -> None:
-    """A body turned on a lathe: `profile` (n, 2) is its radius and height, m, going up."""
+    """Add a solid of revolution.
+
+    Args:
+        patches: Patches to extend.
+        x: Position of its axis, m.
+        y: Position of its axis, m.
+        profile: Radius and height from below, m, (n, 2).
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
     angle = np.linspace(0.0, 2.0 * np.pi, _SIDES + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     points = np.empty((len(profile), _SIDES + 1, 3))
@@ -164,7 +195,7 @@ def add_turned(
     lights = np.empty((len(profile), _SIDES + 1, 1))
     lights[..., 0] = light * (0.82 + 0.18 * np.cos(angle - 0.7))
     lights[0] *= _FOOT
-    patches.add(_grid(points), _cell(stuff, _grid(places)), _grid(lights)[..., 0])
+    patches.add(grid_cells(points), _cell(stuff, grid_cells(places)), grid_cells(lights)[..., 0])
 
 
 def _square() -> Array:
@@ -172,7 +203,7 @@ def _square() -> Array:
 
 
 def _cell(stuff: str, places: Array) -> Array:
-    """Places from 0 to 1 within the cell of a stuff, as places within the whole picture."""
+    """Texture coordinates within a cell, as coordinates within the whole texture."""
     row, column = divmod(CELLS[stuff], ROWS)
     return (np.array([column, row]) + _INSET + (1.0 - 2.0 * _INSET) * places) / ROWS
 
@@ -182,6 +213,7 @@ def _turned(corners: Array, yaw: float) -> Array:
     return corners @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _grid(grid: Array) -> Array:
+def grid_cells(grid: Array) -> Array:
+    """Corners of each cell of a grid (rows, columns, k) with rows upwards: (n, 4, k)."""
     corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
     return np.stack(corners, axis=2).reshape(-1, 4, grid.shape[-1])

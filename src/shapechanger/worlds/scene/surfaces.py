@@ -1,4 +1,4 @@
-"""How bright each place of a course is."""
+"""Surfaces of a course as patches with precomputed light: ground, ceiling, walls and obstacles."""
 
 from __future__ import annotations
 
@@ -9,46 +9,46 @@ from typing import Final
 
 import numpy as np
 
-from shapechanger.worlds.course import Course, Thing, Wall
+from shapechanger.worlds.course import Course, Obstacle, Wall
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned
+from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned, grid_cells
 
 __all__ = [
     "Light",
     "ceiling_patches",
     "ground_patches",
     "lamp_patches",
-    "thing_patches",
+    "obstacle_patches",
     "verge_patches",
     "wall_patches",
 ]
 
-# Half of a lamp's light is gone this far to its side, m: about its height above the ground.
+# Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
-# What a wall that looks away from the sun keeps of its light.
+# Share of the light on a wall that faces away from the sun.
 _SHADE: Final = 0.72
-# What is left far from any lamp at full contrast, and under the open sky.
+# Light far from any lamp at full contrast, indoors and outdoors.
 _DARKEST: Final = 0.12
 _CLOUDED: Final = 0.6
 
 
 class Light:
-    """The light on walls and ground, worked out beforehand.
+    """Precomputed light on walls and ground.
 
     Args:
-        course: Its lamps, or patches of sun; without any, all is as bright as the sky.
-        look: Its contrast.
+        course: Course with its lamps or patches of sun; without any, the light is even.
+        look: Look with its contrast.
     """
 
     def __init__(self, course: Course, look: Look) -> None:
         self._lamps = np.array([(lamp.x, lamp.y) for lamp in course.lamps]).reshape(-1, 2)
         self._contrast = look.contrast
         self._darkest = _DARKEST if course.ceiling_m > 0.0 else _CLOUDED
-        # Where the sun is, or which side the lamps shine to, follows from the course.
+        # Direction of the sun, or of the lamps, which the course's seed determines.
         self._sun = np.random.default_rng([course.seed, 77]).uniform(-np.pi, np.pi)
 
     def on_ground(self, points: Array) -> Array:
-        """Light at points (..., 2), 0 to 1."""
+        """Light at points, m, (..., 2), from 0 to 1."""
         if not len(self._lamps):
             return np.ones(points.shape[:-1])
         flat = points.reshape(-1, 1, 2) - self._lamps
@@ -58,28 +58,28 @@ class Light:
         return (dark + (1.0 - dark) * total).reshape(points.shape[:-1])
 
     def facing(self, angle: float) -> float:
-        """What is left of it on a wall whose front looks along `angle`, rad; 0 to 1."""
+        """Factor on a wall whose front faces `angle`, rad; 0 to 1."""
         turned = 0.5 + 0.5 * np.cos(angle - self._sun)
         return float(1.0 - (1.0 - _SHADE) * min(1.0, 2.0 * self._contrast) * (1.0 - turned))
 
 
-# Size of a patch indoors, where the light changes, and outdoors, m.
+# Size of a ground patch indoors, where the light varies, and outdoors, m.
 _FINE: Final = 0.6
 _COARSE: Final = 3.0
-# How far the ground goes on behind the walls, m; farther out it is under the horizon's pixel.
+# Extent of the ground behind the walls, m; farther out it would be below one pixel.
 _INDOORS_BEHIND: Final = 0.8
 _OUTDOORS_BEHIND: Final = 30.0
-# Width of the picture on the ground, and on the ceiling, m.
+# Width of the ground's and the ceiling's texture, m.
 _GROUND_PERIOD: Final = 3.0
 _CEILING_PERIOD: Final = 2.4
-# Lamps hang this far below the ceiling, m; verges lie this far above the ground.
+# Distance of lamps below the ceiling, and of verges above the ground, m.
 _GAP: Final = 0.02
 _VERGE_RISE: Final = 0.004
 _VERGE_WIDTH: Final = 0.4
 
 
 def ground_patches(course: Course, light: Light) -> Patches:
-    """The ground under the lane and a little farther, seen from above."""
+    """Ground of the lane and a margin, seen from above."""
     corners = _tiles(course)
     patches = Patches()
     patches.add(
@@ -91,7 +91,7 @@ def ground_patches(course: Course, light: Light) -> Patches:
 
 
 def ceiling_patches(course: Course, light: Light) -> Patches:
-    """The ceiling, seen from below."""
+    """Ceiling, seen from below."""
     corners = _tiles(course)[:, ::-1]
     patches = Patches()
     patches.add(
@@ -103,7 +103,7 @@ def ceiling_patches(course: Course, light: Light) -> Patches:
 
 
 def lamp_patches(course: Course, place: Array) -> Patches:
-    """The lamps, seen from below; each shows the texture at one `place` (2,)."""
+    """Lamps, seen from below, with the texture coordinate `place`, (2,), everywhere."""
     patches = Patches()
     for lamp in course.lamps:
         cos, sin = np.cos(lamp.yaw), np.sin(lamp.yaw)
@@ -116,7 +116,7 @@ def lamp_patches(course: Course, place: Array) -> Patches:
 
 
 def verge_patches(course: Course, light: Light) -> Patches:
-    """Strips of grass along the feet of the walls."""
+    """Strips of grass along the walls."""
     patches = Patches()
     for wall in course.walls:
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
@@ -134,7 +134,7 @@ def verge_patches(course: Course, light: Light) -> Patches:
 
 
 def _tiles(course: Course) -> Array:
-    """Corners (n, 4, 2) of the tiles that cover the lane, counter-clockwise from above."""
+    """Corners of the tiles that cover the lane, counter-clockwise from above, m, (n, 4, 2)."""
     indoors = course.ceiling_m > 0.0
     size = _FINE if indoors else _COARSE
     reach = float(course.half_width.max()) + (_INDOORS_BEHIND if indoors else _OUTDOORS_BEHIND)
@@ -142,7 +142,7 @@ def _tiles(course: Course) -> Array:
     count = np.ceil((high - low) / size).astype(int)
     origin = low + size * np.argwhere(np.ones(count, bool))
     if indoors:
-        # Under what nobody gets to see there is no floor: the hall is long, and its lane narrow.
+        # Tiles far from the route are invisible.
         every = max(1, int(size / course.spacing))
         gaps = (origin + 0.5 * size)[:, None, :] - course.route[::every]
         near = (gaps * gaps).sum(axis=2).min(axis=1) < (reach + size) ** 2
@@ -150,7 +150,7 @@ def _tiles(course: Course) -> Array:
     return origin[:, None, :] + size * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 
 
-# Width of what a texture shows, m, of those that go on and on.
+# Width of repeating textures, m.
 _PERIOD: Final[Mapping[str, float]] = MappingProxyType(
     {
         "plaster": 4.0,
@@ -163,30 +163,30 @@ _PERIOD: Final[Mapping[str, float]] = MappingProxyType(
         "rock": 2.0,
     }
 )
-# Of those that show one whole thing, which is fitted into its wall.
+# Width of textures that show one object, which is fitted into its wall, m.
 _WHOLE: Final[Mapping[str, float]] = MappingProxyType(
     {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
 )
-# Share of the plastered walls that are clad in wood instead.
+# Share of the plastered walls with wooden panels.
 _CLAD: Final = 0.2
-# A texture of a brick wall is this high, m, and goes on above; the others are drawn out to fit.
+# Height of the brick texture, m, which repeats; the others are stretched to the wall.
 _BRICK_HEIGHT: Final = 1.8
-# A usual door with its frame, m; above it is the wall it stands in.
+# Height of a door with its frame, m, below plaster.
 _DOOR_HEIGHT: Final = 2.1
-# The longest patch, m: the light changes over about the distance between two lamps.
+# Longest patch of a wall, m: shorter than the distance between two lamps, over which light varies.
 _LONGEST: Final = 0.8
-# Places up a wall at which its light is worked out, and what is left there of it.
+# Relative heights at which a wall's light is computed, and its factor there.
 _ROWS: Final = np.array([0.0, 0.35, 1.0])
 _UPWARDS: Final = np.array([0.86, 1.0, 0.94])
 
 
 def wall_patches(course: Course, light: Light) -> dict[str, Patches]:
-    """Patches for each texture that the course has."""
+    """Patches of all walls by the name of their texture."""
     result: dict[str, Patches] = defaultdict(Patches)
     rng = np.random.default_rng([course.seed, 78])
     for number, wall in enumerate(course.walls):
         clad = rng.random() < _CLAD
-        # Walls of one kind do not start with the same part of the texture.
+        # Walls of one kind start with different parts of the texture.
         offset = (0.37 * number) % 1.0
         if wall.surface == "door" and wall.height > _DOOR_HEIGHT + 0.05:
             _add(result["door"], wall, light, 0.0, _DOOR_HEIGHT, offset)
@@ -200,7 +200,16 @@ def wall_patches(course: Course, light: Light) -> dict[str, Patches]:
 def _add(
     patches: Patches, wall: Wall, light: Light, low: float, high: float, offset: float
 ) -> None:
-    """The part of a wall between two heights, in pieces short enough for the light to change."""
+    """Add a wall between two heights, in pieces short enough for the light to vary.
+
+    Args:
+        patches: Patches to extend.
+        wall: The wall.
+        light: Light of the course.
+        low: Lower height, m.
+        high: Upper height, m.
+        offset: Start of the texture, 0 to 1.
+    """
     start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
     length = float(np.hypot(*(end - start)))
     if length <= 0.0:
@@ -208,7 +217,7 @@ def _add(
     columns = max(1, int(np.ceil(length / _LONGEST)))
     share = np.linspace(0.0, 1.0, columns + 1)
     across, down = _spread(wall, length, low, high)
-    # Who looks at the front has the end of the wall at the left.
+    # Seen from the front, the end of the wall is on the left.
     base = end + share[:, None] * (start - end)
     rows = low + _ROWS * (high - low)
     points = np.empty((len(rows), columns + 1, 3))
@@ -220,27 +229,21 @@ def _add(
     along = end - start
     facing = light.facing(float(np.arctan2(along[0], -along[1])))
     lights = _UPWARDS[:, None] * (facing * light.on_ground(base))[None, :]
-    patches.add(_cells(points), _cells(places), _cells(lights[..., None])[..., 0])
+    patches.add(grid_cells(points), grid_cells(places), grid_cells(lights[..., None])[..., 0])
 
 
 def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, float]:
-    """How often the texture is repeated along the wall, and upwards."""
+    """Repetitions of the texture along the wall and upwards."""
     if low > 0.0:
-        # Above a door: the upper part of the plaster, where there is no skirting board.
+        # Above a door: the upper part of the plaster, without its skirting board.
         return length / _PERIOD["plaster"], (high - low) / wall.height
     if wall.surface in _WHOLE:
         return float(max(1, round(length / _WHOLE[wall.surface]))), 1.0
     return length / _PERIOD[wall.surface], high / _BRICK_HEIGHT if wall.surface == "brick" else 1.0
 
 
-def _cells(grid: Array) -> Array:
-    """The four corners of each cell of a grid (rows, columns, k) whose rows go up: (n, 4, k)."""
-    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
-    return np.stack(corners, axis=2).reshape(-1, 4, grid.shape[-1])
-
-
-# Parts of each thing, from below: half sizes and middle as shares of its length, width and height,
-# then the stuff. A box from -0.5 to 0.5 in x and y, and 0 to 1 in z, is the whole thing.
+# Boxes of each obstacle: half sizes and centre as shares of its length, width and height, and the
+# texture cell. The whole obstacle is -0.5 to 0.5 in x and y, and 0 to 1 in z.
 _Part = tuple[tuple[float, float, float], tuple[float, float, float], str]
 _LEG: Final = (0.05, 0.06, 0.4)
 _BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
@@ -263,7 +266,7 @@ _BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
         ),
     }
 )
-# Turned bodies: radius as a share of the diameter, and height as a share of the height.
+# Solids of revolution: radius over the diameter, and height over the height.
 _Turned = tuple[tuple[tuple[float, float], ...], str]
 _ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
     {
@@ -283,24 +286,24 @@ _ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
 )
 
 
-def thing_patches(course: Course, light: Light) -> Patches:
-    """All things of a course; they share one texture."""
+def obstacle_patches(course: Course, light: Light) -> Patches:
+    """All obstacles of a course, which share one texture."""
     patches = Patches()
-    for thing in course.things:
-        bright = float(light.on_ground(np.array([thing.x, thing.y])))
-        if thing.is_round:
-            for outline, stuff in _ROUND[thing.kind]:
-                profile = np.array(outline) * (thing.length, thing.height)
-                add_turned(patches, thing.x, thing.y, profile, stuff, bright)
+    for obstacle in course.obstacles:
+        bright = float(light.on_ground(np.array([obstacle.x, obstacle.y])))
+        if obstacle.is_round:
+            for outline, stuff in _ROUND[obstacle.kind]:
+                profile = np.array(outline) * (obstacle.length, obstacle.height)
+                add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
         else:
-            _add_boxes(patches, thing, bright)
+            _add_boxes(patches, obstacle, bright)
     return patches
 
 
-def _add_boxes(patches: Patches, thing: Thing, bright: float) -> None:
-    size = np.array([thing.length, thing.width, thing.height])
-    cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
-    for half, place, stuff in _BOXES[thing.kind]:
+def _add_boxes(patches: Patches, obstacle: Obstacle, bright: float) -> None:
+    size = np.array([obstacle.length, obstacle.width, obstacle.height])
+    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    for half, place, stuff in _BOXES[obstacle.kind]:
         dx, dy, dz = np.array(place) * size
-        middle = np.array([thing.x + cos * dx - sin * dy, thing.y + sin * dx + cos * dy, dz])
-        add_box(patches, middle, np.array(half) * size, thing.yaw, stuff, bright)
+        middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
+        add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)

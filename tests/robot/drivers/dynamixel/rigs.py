@@ -1,4 +1,4 @@
-"""A rig of seven tendons on a twin's line, and its driver."""
+"""A rig of seven tendons on a simulated bus, and its driver."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
 from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
-from shapechanger.twin.servos.bus import LinePort, SimulatedBus
+from shapechanger.twin.servos.bus import SimulatedBus
+from shapechanger.twin.servos.port import ServoPort
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
@@ -39,8 +40,44 @@ def settings(**changes: Any) -> BusSettings:
     return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
 
 
+class FaultyPort(ServoPort):
+    """A port of a simulated bus that can fail, and keeps what was sent.
+
+    Attributes:
+        is_cut: Whether the cable is cut: bytes arrive nowhere.
+        is_gone: Whether the device is gone: every use raises OSError.
+        is_closed: Whether it was closed.
+        sent: Packets that were written.
+    """
+
+    def __init__(self, line: SimulatedBus) -> None:
+        super().__init__(self._reach)
+        self._line = line
+        self.is_cut = self.is_gone = self.is_closed = False
+        self.sent: list[bytes] = []
+
+    def inject(self, data: bytes) -> None:
+        """Let bytes arrive that no servo has sent."""
+        self._arrived += data
+
+    def closePort(self) -> None:
+        """Note that the port was closed."""
+        self.is_closed = True
+
+    def _reach(self, data: bytes) -> bytes:
+        if self.is_gone:
+            raise OSError(5, "Input/output error")
+        if data:
+            self.sent.append(data)
+        if self.is_cut:
+            return b""
+        if data:
+            self._line.receive(data)
+        return self._line.send()
+
+
 class Rig:
-    """The line, the port and the driver, whose clocks go together.
+    """The simulated bus, the port and the driver, on one clock.
 
     Args:
         bus: Its settings.
@@ -54,7 +91,7 @@ class Rig:
         if plans is None:
             plans = [ServoPlan(one.id, MODEL, angle=2.0 * one.id) for one in self.settings.servos]
         self.line = SimulatedBus(plans)
-        self.port = LinePort(self.line)
+        self.port = FaultyPort(self.line)
         self.bus = ServoBus(self.settings, lambda _: self.port)
 
     def start(self) -> Rig:

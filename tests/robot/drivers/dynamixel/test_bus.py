@@ -21,7 +21,7 @@ def test_all_that_are_missing_are_named() -> None:
 def test_another_model_is_refused() -> None:
     """The wrong model would pull with the wrong strength."""
     plans = [ServoPlan(i, "XL330-M288" if i == 3 else MODEL) for i in range(1, 8)]
-    with pytest.raises(RobotError, match=r"EIP \(id 3\) is no XL330-M077.* is 1200, not 1190"):
+    with pytest.raises(RobotError, match=r"EIP \(id 3\) is not an XL330-M077.* is 1200, not 1190"):
         Rig(plans=plans).bus.set_up()
 
 
@@ -209,13 +209,13 @@ def test_what_is_told_acts_without_a_cycle() -> None:
     rig = Rig()
     rig.bus.set_up()
     rig.port.sent.clear()
-    rig.bus.tell(dict.fromkeys(NAMES, 6.0))
+    rig.bus.send(dict.fromkeys(NAMES, 6.0))
     assert rig.port.sent == []
     rig.bus.hold()
     rig.port.sent.clear()
-    rig.bus.tell(dict.fromkeys(NAMES, 6.0))
+    rig.bus.send(dict.fromkeys(NAMES, 6.0))
     assert [packet[7] for packet in rig.port.sent] == [0x83]
     assert rig.pulls() == pytest.approx([0.205] * 7, abs=0.001)
     rig.port.is_gone = True
-    rig.bus.tell(dict.fromkeys(NAMES, 7.0))
+    rig.bus.send(dict.fromkeys(NAMES, 7.0))
     assert "is gone" in rig.bus.cycle(None, rig.line.now_ns).reason

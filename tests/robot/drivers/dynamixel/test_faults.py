@@ -145,7 +145,7 @@ def test_a_mute_servo_is_left_to_its_watchdog() -> None:
 @pytest.mark.parametrize(
     ("most_missed", "words"),
     [
-        (50, "was started afresh, as by a dip of its power, and has lost its zero"),
+        (50, "has restarted, for example after a dip of its power, and lost its zero"),
         (5, "does not answer, 5 cycles in a row"),
     ],
 )
@@ -192,7 +192,7 @@ def test_who_switched_itself_off_needs_a_reboot() -> None:
 def test_nothing_is_rebooted_while_it_is_held() -> None:
     """A tendon would be let go while the others pull."""
     rig = Rig().start()
-    with pytest.raises(RobotError, match="not started afresh while the bus is held"):
+    with pytest.raises(RobotError, match="cannot be rebooted while the bus is held"):
         rig.bus.reboot("EIP")
 
 
@@ -208,7 +208,7 @@ def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "r
     assert rig.pulls() == [0.0] * 7
     state = rig.run(10.0, 4)
     assert set(state.faults) == set(NAMES)
-    words = "was stopped by its own watchdog, for it heard nothing for 100 ms"
+    words = "was stopped by its own watchdog: it received nothing for 100 ms"
     assert words in state.faults["DI"] or "has let go by itself" in state.faults["DI"]
     assert rig.pulls() == [0.0] * 7
     assert _until(rig, lambda s: s.mode == "off").mode == "off"
@@ -245,7 +245,7 @@ def test_a_goal_that_a_servo_does_not_take_is_noticed() -> None:
     taken = rig.twin("PI").write
     rig.twin("PI").write = lambda at, data: None if at == 102 else taken(at, data)  # type: ignore[method-assign]
     state = rig.run(8.0, 8)
-    assert "Servo PI (id 7) keeps to a goal of 136 counts, and was told 273" in state.reason
+    assert "Servo PI (id 7) has a goal of 136 counts, and was sent 273" in state.reason
 
 
 def test_the_fast_way_is_given_up_where_it_does_not_work() -> None:

@@ -7,14 +7,14 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.twin.servos.protocol import packed, status
+from shapechanger.twin.servos.protocol import pack, status
 from tests.robot.drivers.dynamixel.rigs import NAMES, Rig
 
 _ids = st.integers(0, 255)
 # Bytes alone rarely look like a packet; so also packets with anything in them, and cut ones.
 _noise = st.one_of(
     st.binary(max_size=60),
-    st.builds(packed, _ids, st.integers(0, 255), st.binary(max_size=40)),
+    st.builds(pack, _ids, st.integers(0, 255), st.binary(max_size=40)),
     st.builds(status, _ids, st.integers(0, 255), st.binary(max_size=40)),
     st.builds(lambda p, n: p[:n], st.builds(status, _ids, st.just(0)), st.integers(0, 11)),
     st.binary(min_size=3, max_size=9).map(lambda tail: b"\xff\xff\xfd\x00" + tail),

@@ -9,8 +9,9 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
 from shapechanger.robot.drivers.dynamixel.protocol import PromptPort
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-from shapechanger.twin.servos.bus import LinePty, SimulatedBus
+from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
+from tests.robot.drivers.dynamixel.pty import ServoPty
 from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, settings
 
 # So long that a busy machine is never taken for a silent servo.
@@ -18,18 +19,18 @@ _PATIENT_MS = 20_000.0
 
 
 @pytest.fixture
-def pty() -> Iterator[LinePty]:
+def pty() -> Iterator[ServoPty]:
     """Seven servos behind a terminal; the first stands at -3 counts."""
     plans = [ServoPlan(i, MODEL, angle=-0.004 if i == 1 else 2.0 * i) for i in range(1, 8)]
-    with LinePty(SimulatedBus(plans)) as line:
+    with ServoPty(SimulatedBus(plans)) as line:
         yield line
 
 
-def _settings(pty: LinePty, **changes: float) -> BusSettings:
+def _settings(pty: ServoPty, **changes: float) -> BusSettings:
     return settings(device=pty.device, **({"answer_ms": _PATIENT_MS} | changes))
 
 
-def test_the_plain_sdk_pings_and_reads(pty: LinePty) -> None:
+def test_the_plain_sdk_pings_and_reads(pty: ServoPty) -> None:
     """Nothing of ours is between the SDK and the bytes."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
@@ -42,7 +43,7 @@ def test_the_plain_sdk_pings_and_reads(pty: LinePty) -> None:
     port.closePort()
 
 
-def test_stuffed_bytes_come_back_as_they_were(pty: LinePty) -> None:
+def test_stuffed_bytes_come_back_as_they_were(pty: ServoPty) -> None:
     """FD FF FF FF behind FF FF cannot go over the bus as it is: position -3 behind velocity -1."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
@@ -53,7 +54,7 @@ def test_stuffed_bytes_come_back_as_they_were(pty: LinePty) -> None:
 
 
 @pytest.mark.parametrize("fast", [False, True])
-def test_the_driver_pulls_over_a_real_serial_port(pty: LinePty, fast: bool) -> None:
+def test_the_driver_pulls_over_a_real_serial_port(pty: ServoPty, fast: bool) -> None:
     """From the first ping to the last byte."""
     bus = ServoBus(_settings(pty, fast=fast))
     bus.set_up()
@@ -67,10 +68,10 @@ def test_the_driver_pulls_over_a_real_serial_port(pty: LinePty, fast: bool) -> N
     bus.close()
 
 
-def test_a_silent_servo_is_named_over_a_real_serial_port(pty: LinePty) -> None:
+def test_a_silent_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
     """The wait for an answer that never comes has an end."""
     with pty.lock:
-        pty.line.servos[3].faults.mute = True
+        pty.bus.servos[3].faults.mute = True
     with pytest.raises(RobotError, match=r"no servo answers as EIP \(id 3\); those that do: FDP"):
         ServoBus(_settings(pty, answer_ms=300.0)).set_up()
 
@@ -103,7 +104,7 @@ def test_a_device_that_is_not_there_has_its_sentence() -> None:
         ServoBus(settings(device="/dev/nowhere"))
 
 
-def test_a_speed_that_the_sdk_does_not_know_has_its_sentence(pty: LinePty) -> None:
+def test_a_speed_that_the_sdk_does_not_know_has_its_sentence(pty: ServoPty) -> None:
     """4.5 Mbaud is one of the XM430, and not of the SDK."""
     with pytest.raises(RobotError, match="cannot have 4500000 baud; 57600"):
         ServoBus(settings(device=pty.device, baud=4_500_000))

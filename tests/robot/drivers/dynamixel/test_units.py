@@ -7,14 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import (
-    cap_count,
-    goal_count,
-    length_m,
-    lengthening,
-    tension_n,
-    within,
-)
 from shapechanger.robot.drivers.dynamixel.settings import MODELS, ServoSettings
 from tests.robot.drivers.dynamixel.rigs import servo
 
@@ -41,21 +33,21 @@ def test_no_command_pulls_more_than_the_cap_or_lets_out(one: ServoSettings, tens
     """Whatever number comes, the servo pulls between nothing and its cap, or it is refused."""
     if not math.isfinite(tension):
         with pytest.raises(RobotError, match="cannot pull"):
-            goal_count(one, tension)
+            one.goal_count(tension)
         with pytest.raises(RobotError, match="cannot pull"):
-            within(one, tension)
+            one.clip(tension)
         return
-    pulled = tension_n(one, goal_count(one, tension))
+    pulled = one.tension_n(one.goal_count(tension))
     assert 0.0 <= pulled <= one.most_tension_n * (1 + 1e-8)
-    assert abs(goal_count(one, tension)) <= cap_count(one)
-    assert one.pretension_n <= within(one, tension) <= one.most_tension_n
+    assert abs(one.goal_count(tension)) <= one.most_counts
+    assert one.pretension_n <= one.clip(tension) <= one.most_tension_n
 
 
 @given(one=_servos(), share=st.floats(0.0, 1.0))
 def test_a_tension_comes_back_less_than_one_count_smaller(one: ServoSettings, share: float) -> None:
     """It is rounded towards slack, and never by more than the servo's own step."""
-    wanted = share * cap_count(one) * one.newton_per_count
-    got = tension_n(one, goal_count(one, wanted))
+    wanted = share * one.most_counts * one.newton_per_count
+    got = one.tension_n(one.goal_count(wanted))
     assert got <= wanted + 1e-6
     assert wanted - got <= one.newton_per_count * (1 + 1e-6)
 
@@ -64,8 +56,8 @@ def test_the_numbers_of_a_known_spool() -> None:
     """An XL330-M288 with 5 mm pulls 0.071 N a count: 0.52 N·m / 1.47 A / 5 mm / 1000."""
     one = servo("FDP", model="XL330-M288")
     assert one.newton_per_count == pytest.approx(0.0708, abs=1e-4)
-    assert goal_count(one, 10.0) == 141
-    assert goal_count(servo("FDP", model="XL330-M288", direction=-1), 10.0) == -141
+    assert one.goal_count(10.0) == 141
+    assert servo("FDP", model="XL330-M288", direction=-1).goal_count(10.0) == -141
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -73,6 +65,6 @@ def test_winding_in_makes_the_tendon_shorter(direction: int) -> None:
     """One turn is the circumference of the spool, whichever way it turns."""
     one = servo("FDP", direction=direction)
     turn = 2 * math.pi * 0.005
-    assert length_m(one, 100 + direction * 4096, 100) == pytest.approx(-turn)
-    assert lengthening(one, direction * 1.0) == pytest.approx(-0.005)
-    assert tension_n(one, direction * 100) > 0.0
+    assert one.length_m(100 + direction * 4096, 100) == pytest.approx(-turn)
+    assert one.lengthening(direction * 1.0) == pytest.approx(-0.005)
+    assert one.tension_n(direction * 100) > 0.0

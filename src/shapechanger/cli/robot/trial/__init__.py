@@ -1,4 +1,4 @@
-"""Trials of a robot on its twin: faults are made, and the ledger says when it stopped."""
+"""Fault trials of a robot on its twin, judged by the twin's ledger."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""A program that drives at full throttle until it is stopped, in a process of its own.
+"""Program that drives at full throttle in a separate process.
 
-It is started by path, reads from its standard input where the robot is, and writes each command
-that it has sent to its standard output: the time, in nanoseconds of the machine's monotonic clock,
-on a line of its own.
+It is started by path, reads the robot's address from standard input, and prints the time of each
+sent command on a line: monotonic, ns.
 """
 
 from __future__ import annotations
@@ -28,16 +27,16 @@ _STARTED_S: Final = 30.0
 
 
 class Driver:
-    """A process that drives.
+    """The driving process.
 
     Args:
         robot: The robot.
-        within: The command that starts it elsewhere, such as in another network namespace.
+        within: Command prefix, such as one that enters a network namespace.
     """
 
     def __init__(self, robot: KnownRobot, within: Sequence[str] = ()) -> None:
         self.process = subprocess.Popen(
-            # By path, so that it loads nothing of the command line.
+            # By path, so that the command line is not imported.
             [*within, sys.executable, "-P", __file__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -56,7 +55,7 @@ class Driver:
             reader.start()
 
     def __enter__(self) -> Self:
-        """The driver itself."""
+        """Return the driver."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -65,14 +64,14 @@ class Driver:
 
     @property
     def sent(self) -> list[int]:
-        """When it sent each command so far, ns."""
+        """Return the time of each sent command, ns."""
         return list(self._sent)
 
     def await_commands(self, count: int) -> None:
-        """Wait until it has sent so many.
+        """Wait until it has sent `count` commands.
 
         Raises:
-            RobotError: If it ends before, or does not get that far.
+            RobotError: If it ends before, or takes too long.
         """
         until_s = time.monotonic() + _STARTED_S
         while len(self._sent) < count:
@@ -82,7 +81,7 @@ class Driver:
             time.sleep(0.002)
 
     def close(self) -> None:
-        """End it without any farewell."""
+        """Kill it."""
         self.process.kill()
         self.process.wait()
         for reader in self._readers:
@@ -113,7 +112,7 @@ def main() -> None:
         seq = 0
         while True:
             seq = client.observation(seq).message.seq
-            # Written before it is sent: a kill in between must not hide a command.
+            # Printed before it is sent, so that a kill in between cannot hide a command.
             sys.stdout.write(f"{time.monotonic_ns()}\n")
             sys.stdout.flush()
             client.command(values, answers=seq)

@@ -1,4 +1,4 @@
-"""What can go wrong with a robot that drives, each as something that can be done to its twin."""
+"""Faults of a driving robot, injected into its twin."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from shapechanger.twin.robot import Operator, RunningRobot
 __all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
 
 _LATE_S: Final = 1.0
-# What takes no time takes no longer than this, or the machine stood still meanwhile.
+# Longest duration of an instantaneous fault; a longer one means that the machine was paused.
 _AT_ONCE_MS: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everybody who takes part in a trial.
+    """Participants of a trial.
 
     Attributes:
         robot: The robot.
-        driver: Who drives it.
-        network: What lies between the two.
-        operator: Who stands beside the twin.
-        strangers: Connections that somebody opened and keeps open.
+        driver: The driving process.
+        network: The network between them.
+        operator: The operator beside the twin.
+        strangers: Open connections without authentication.
     """
 
     robot: RunningRobot
@@ -48,28 +48,25 @@ class Scene:
     strangers: list[socket.socket] = field(default_factory=list[socket.socket])
 
 
-# Does something, and says when, on the machine's monotonic clock in ns.
+# Performs an action and returns its time: monotonic, ns.
 Make = Callable[[Scene], int]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that goes wrong.
+    """A fault.
 
     Attributes:
-        name: What it is, in words.
-        make: Does it.
-        within_ms: What is promised: how long after that all that propels is at rest, on top of
-            `after`.
-        after: What the robot may wait for before it knows: nothing, its deadline, or the age at
-            which a picture is stale.
-        undo: Takes it back, so that the robot can be used again.
-        then: What becomes of the robot: it goes on, its processes start afresh, or it is gone.
-        needs: What the profile must have: "", "camera", "bumper", "button" or "one-shot".
-        harms: Whether it keeps the driver from driving. What does not is followed by the driver's
-            own end, so that a stop is measured all the same.
-        silences: Whether commands count no more from then on, however many the driver sends.
-        guards_late: Whether the guard itself fails, so that its promised time comes on top.
+        name: Description.
+        make: Injects it.
+        within_ms: Promised time to rest after `after`, ms.
+        after: How the robot can notice it: at once, by its deadline, or by the age of a frame.
+        undo: Reverts it.
+        then: The robot afterwards: it continues, its processes restart, or it is gone.
+        needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot".
+        harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
+        silences: Whether later commands of the driver do not count.
+        guards_late: Whether the guard itself fails, which adds its own promised time.
     """
 
     name: str
@@ -84,17 +81,17 @@ class Fault:
     guards_late: bool = False
 
     def limit_ms(self, limits: LimitPlan) -> float:
-        """What is promised for a robot with these limits, ms."""
+        """Return the promised time to rest for these limits, ms."""
         waits = {"": 0, "deadline": limits.deadline_ms, "camera": limits.camera_stale_ms}
         return self.within_ms + waits[self.after]
 
 
 class Untimely(RobotError):
-    """Nobody knows when the fault happened, because the machine stood still meanwhile."""
+    """The time of the fault is unknown, because the machine was paused."""
 
 
 def _now(act: Callable[[Scene], object]) -> Make:
-    """Something that begins now, and may take a while."""
+    """Wrap an action that starts now and may take a while."""
 
     def make(scene: Scene) -> int:
         at_ns = time.monotonic_ns()
@@ -105,7 +102,7 @@ def _now(act: Callable[[Scene], object]) -> Make:
 
 
 def _at_once(act: Callable[[Scene], object]) -> Make:
-    """Something that takes no time; if it did, its time is not known."""
+    """Wrap an instantaneous action; its time is unknown if it took long."""
 
     def make(scene: Scene) -> int:
         at_ns = _now(act)(scene)
@@ -126,7 +123,7 @@ def _signal(program: Literal["guard", "daemon"], number: signal.Signals) -> Make
 
 
 def _kill_both(scene: Scene) -> int:
-    """Kill the supervisor and the guard before either can do something for the other."""
+    """Kill the supervisor and the guard before either can react."""
     guard = scene.robot.pid_of("guard")
     os.kill(scene.robot.supervisor.pid, signal.SIGSTOP)
     at_ns = time.monotonic_ns()
@@ -181,19 +178,19 @@ def _command_without_the_lease(client: RobotClient) -> None:
 
 
 def _stand_at_the_door(scene: Scene) -> None:
-    """Open connections and never say hello, for as long as the robot lets them."""
+    """Open connections without authenticating, as many as the robot accepts."""
     for _ in range(40):
         scene.strangers.append(socket.create_connection(("127.0.0.1", scene.robot.port)))
 
 
 def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
-    """Let somebody else act, over a connection of their own."""
+    """Act over a connection of another client."""
 
     def make(scene: Scene) -> int:
         with scene.robot.client(role=role, frames=False) as client:
             at_ns = time.monotonic_ns()
             act(client)
-            client.ping()  # So that what was said has arrived before the connection ends.
+            client.ping()  # Lets the message arrive before the connection closes.
             return at_ns
 
     return make
@@ -318,7 +315,7 @@ FAULTS: Final[dict[str, Fault]] = {
             100.0,
             then="is gone",
         ),
-        # Only hardware is left then: the one-shot of the enable line, 100 ms, and its slack.
+        # Only hardware remains: the one-shot of the enable line, 100 ms, and its tolerance.
         Fault(
             "guard and supervisor killed",
             _kill_both,

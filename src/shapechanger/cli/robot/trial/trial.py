@@ -1,4 +1,4 @@
-"""One robot on its twin, driven at full throttle and broken again and again."""
+"""Trials: drive a robot on its twin at full throttle and inject faults."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ from shapechanger.twin.wiring import TwinWiring
 __all__ = ["Trial", "TrialResult", "has"]
 
 _ATTEMPTS: Final = 3
-# A busy machine, unlike a robot that cannot be driven, stays so for a while.
+# Unlike a broken robot, a busy machine recovers.
 _UNTIMELY_ATTEMPTS: Final = 10
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
-# How long after the promise is looked at whether everything stays at rest.
+# Time after the promise for which everything must stay at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
-# How much later than its deadline a command may act.
+# Tolerance beyond the deadline of a command.
 _LATE_MS: Final = 20.0
-# A supervisor gives up after five restarts within a minute, which here would be a promise kept.
+# A supervisor gives up after five restarts within a minute, which would count as a kept promise.
 _MOST_RESTARTS: Final = 4
 
 
 class _NotDriven(RobotError):
-    """The robot could not be driven, so nothing was tried."""
+    """The robot could not be driven."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """What one trial came to.
+    """Result of one trial.
 
     Attributes:
         fault: Name of the fault.
-        stopped_ms: From the fault until all that propels is at rest for good; infinite for never.
-        limit_ms: What is promised.
-        drove: Whether it was driving when the fault came, without which the trial means nothing.
-        unauthorised: When something propelled without a fresh command.
+        stopped_ms: Time from the fault to permanent rest, ms; infinite for never.
+        limit_ms: The promised time, ms.
+        drove: Whether it was driving at the fault; the trial is void otherwise.
+        unauthorised: Times of propulsion without a fresh command.
     """
 
     fault: str
@@ -69,12 +69,12 @@ class TrialResult:
 
     @property
     def kept(self) -> bool:
-        """Whether the promise was kept."""
+        """Return whether the promise was kept."""
         return self.drove and self.stopped_ms <= self.limit_ms and not self.unauthorised
 
 
 def has(profile: Profile, needs: str) -> bool:
-    """Whether a robot has what a fault needs."""
+    """Return whether a robot has the part that a fault needs."""
     return {
         "": True,
         "camera": profile.camera is not None,
@@ -85,7 +85,7 @@ def has(profile: Profile, needs: str) -> bool:
 
 
 class Trial:
-    """A robot that can be tried with one fault after the other.
+    """A robot for successive trials.
 
     Args:
         profile: The robot.
@@ -103,15 +103,15 @@ class Trial:
         self._folder: TemporaryDirectory[str] | None = None
 
     def __enter__(self) -> Self:
-        """The trial itself."""
+        """Return the trial."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the robot."""
+        """Stop the robot."""
         self.close()
 
     def close(self) -> None:
-        """End the robot, and remove its files."""
+        """Stop the robot and remove its files."""
         if self._robot is not None:
             self._robot.close()
             self._robot = None
@@ -124,11 +124,10 @@ class Trial:
             self._folder = None
 
     def run(self, fault: Fault) -> TrialResult:
-        """Drive, let the fault happen, and judge by the ledger.
+        """Drive, inject a fault, and judge by the ledger.
 
-        A robot that cannot be driven, because a busy machine kept its guard from beating and it
-        started afresh, is replaced before anything is judged; and so is one whose fault came at a
-        time that is not known.
+        A robot that cannot be driven, because a busy machine made it restart, is replaced first; so
+        is one whose fault has an unknown time.
 
         Raises:
             RobotError: If no robot can be driven.
@@ -159,10 +158,10 @@ class Trial:
     def _driven(
         self, robot: RunningRobot, operator: Operator, network: BadNetwork
     ) -> Generator[Driver]:
-        """Somebody who drives the robot.
+        """Return a driver of the robot.
 
         Raises:
-            _NotDriven: If it cannot be driven.
+            _NotDriven: If the robot cannot be driven.
         """
         try:
             _calm(robot)
@@ -179,12 +178,12 @@ class Trial:
             yield driver
 
     def _tried(self, fault: Fault, scene: Scene, began_ns: int) -> TrialResult:
-        """Let the fault happen, and judge."""
+        """Inject the fault and judge."""
         if fault.then == "starts afresh":
             scene.robot.forget_ready()
         at_ns = fault.make(scene)
         if not fault.harms:
-            # The driver must be able to go on, and a stop is measured by its own end.
+            # The driver must still work, and the stop is measured by killing it.
             count = len(scene.driver.sent)
             scene.driver.await_commands(count + _COMMANDS)
             self._await_drive(scene.operator)
@@ -200,7 +199,7 @@ class Trial:
     def _running(self) -> RunningRobot:
         if self._robot is None:
             self._folder = TemporaryDirectory(prefix="shapechanger-trial-")
-            # Its own, so that it outlives all processes of the robot, as hardware does.
+            # Separate, so that it outlives the robot's processes, as hardware does.
             self._board = start_board(
                 self._plan,
                 clock="real",
@@ -219,7 +218,7 @@ class Trial:
             self.close()
 
     def _await_drive(self, operator: Operator) -> None:
-        """Wait until it moves; a camera that was just mended may take a while to be read again."""
+        """Wait until it moves; a restored camera may take a while."""
         until_s = time.monotonic() + _DRIVES_S
         while time.monotonic() < until_s:
             outputs = self._wiring.read(operator.levels(), time.monotonic_ns())
@@ -228,7 +227,7 @@ class Trial:
             time.sleep(_LOOK_S)
 
     def _await_rest(self, operator: Operator, limit_ms: float) -> None:
-        """Wait until the robot has been at rest for a while, or surely breaks its promise."""
+        """Wait until the robot has been at rest for a while, or has broken its promise."""
         until_s = time.monotonic() + 10.0 * limit_ms / 1e3
         rest_since_s = math.inf
         while time.monotonic() < until_s:
@@ -252,7 +251,7 @@ class Trial:
             for sent_ns in sent
             if not (fault.silences and sent_ns > at_ns + _LATE_MS * 1e6)
         ]
-        # A fault of the guard itself is promised a time of its own.
+        # A fault of the guard itself has its own promised time.
         slack_ms = fault.within_ms if fault.guards_late else _LATE_MS
         strangers = unauthorised(ledger, self._wiring, commands, deadline_ms, slack_ms)
         return TrialResult(
@@ -265,16 +264,16 @@ class Trial:
 
     @property
     def ledger_path(self) -> Path:
-        """The ledger of the robot that runs.
+        """Return the ledger of the running robot.
 
         Raises:
-            RobotError: If none runs.
+            RobotError: If no robot runs.
         """
         return self._running().ledger_path
 
 
 def _calm(robot: RunningRobot) -> None:
-    """Let a person end what the last trial left behind: an emergency stop, and being armed."""
+    """Clear the state of the last trial: an emergency stop, or being armed."""
     with robot.client(role="person", frames=False, name="trial") as person:
         person.take()
         person.arm()

@@ -1,4 +1,7 @@
-"""The servos of a rig as one."""
+"""Bus of servos that pull tendons, in current mode.
+
+The bus has no thread, never sleeps, and takes the time from its caller.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,6 @@ from shapechanger.robot.drivers.dynamixel.health import (
     Mode,
     ServoHealth,
     ServoState,
-    cap_count,
-    goal_count,
-    length_m,
-    lengthening,
-    tension_n,
-    within,
 )
 from shapechanger.robot.drivers.dynamixel.protocol import (
     ALERT,
@@ -32,41 +29,41 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
     RETURN_DELAY,
     TORQUE_ENABLE,
     WATCHDOG_STEP_NS,
-    Asking,
     OpenPort,
     Register,
+    RegisterBus,
+    ServoPoller,
     ServoReply,
-    Wire,
     decode_present,
     hardware_errors,
     open_serial_port,
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = ["Ramp", "ServoBus", "find", "grip", "make_ready", "watchdog_steps"]
+__all__ = ["Ramp", "ServoBus", "check_servos", "enable_torque", "prepare_servo", "watchdog_steps"]
 
 
 class Ramp:
-    """From some tensions to others, in a straight line over time.
+    """Linear ramp of tensions.
 
     Args:
-        start: Tension of each tendon at the beginning, N, by name.
-        end: At the end; the same names.
-        since_ns: When it begins.
-        ramp_ms: How long it takes.
+        start: First tension of each tendon, N, by name.
+        end: Last tension of each tendon, N; no tendon starts below it.
+        since_ns: Time of the start.
+        ramp_ms: Duration, ms.
     """
 
     def __init__(
         self, start: Mapping[str, float], end: Mapping[str, float], since_ns: int, ramp_ms: int
     ) -> None:
-        # Nobody pulls harder because of a stop.
+        # A stop never pulls harder.
         self._start = {name: max(value, end[name]) for name, value in start.items()}
         self._end = dict(end)
         self._since_ns = since_ns
         self._ramp_ns = ramp_ms * 1_000_000
 
     def tensions(self, now_ns: int) -> dict[str, float]:
-        """What each tendon pulls now, N."""
+        """Return the tension of each tendon, N."""
         left = self._left(now_ns)
         return {
             name: self._end[name] + left * (value - self._end[name])
@@ -74,11 +71,11 @@ class Ramp:
         }
 
     def is_over(self, now_ns: int) -> bool:
-        """Whether all of them are at the end."""
+        """Return whether the ramp has ended."""
         return self._left(now_ns) == 0.0
 
     def _left(self, now_ns: int) -> float:
-        """How much of the way is left, 1 to 0."""
+        """Return the share of the ramp that is left, 1 to 0."""
         gone_ns = now_ns - self._since_ns
         if gone_ns >= self._ramp_ns:
             return 0.0
@@ -86,17 +83,17 @@ class Ramp:
 
 
 def watchdog_steps(bus: BusSettings) -> int:
-    """The time of the watchdog in steps of 20 ms."""
+    """Return the time of the watchdog in steps of 20 ms."""
     return bus.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
 
 
-def find(wire: Wire, bus: BusSettings) -> None:
-    """Check that every servo answers and is what it should be.
+def check_servos(registers: RegisterBus, bus: BusSettings) -> None:
+    """Check that every servo answers and has the right model.
 
     Raises:
         RobotError: If one is missing, is of another model, or its firmware is too old.
     """
-    models = {servo.id: wire.ping(servo.id) for servo in bus.servos}
+    models = {servo.id: registers.ping(servo.id) for servo in bus.servos}
     if missing := [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is None]:
         there = [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is not None]
         raise RobotError(
@@ -108,10 +105,10 @@ def find(wire: Wire, bus: BusSettings) -> None:
         known, number = servo.known, models[servo.id]
         if number != known.number:
             raise RobotError(
-                f"{servo.words} is no {known.name}: its model number is {number}, "
+                f"{servo.words} is not an {known.name}: its model number is {number}, "
                 f"not {known.number}."
             )
-        firmware = wire.read(servo.id, FIRMWARE)
+        firmware = registers.read(servo.id, FIRMWARE)
         if firmware < known.least_firmware:
             raise RobotError(
                 f"{servo.words} has firmware {firmware}; its own watchdog needs "
@@ -119,62 +116,60 @@ def find(wire: Wire, bus: BusSettings) -> None:
             )
 
 
-def make_ready(wire: Wire, bus: BusSettings, servo: ServoSettings) -> None:
-    """Make one servo ready to pull: current mode, its caps, no goal, and no torque.
+def prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
+    """Prepare a servo: current mode, its current limit, no goal, and no torque.
 
     Raises:
         RobotError: If it does not answer, refuses, or has switched itself off.
     """
-    wire.write(servo.id, TORQUE_ENABLE, 0)
-    wire.write(
-        servo.id, BUS_WATCHDOG, 0
-    )  # A watchdog that has tripped keeps all goals as they are.
-    if error := wire.read(servo.id, HARDWARE_ERROR):
+    registers.write(servo.id, TORQUE_ENABLE, 0)
+    registers.write(servo.id, BUS_WATCHDOG, 0)  # A tripped watchdog blocks all goals.
+    if error := registers.read(servo.id, HARDWARE_ERROR):
         words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
         raise RobotError(
             f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque again, "
-            "after which it must find its zero afresh."
+            "after which its zero must be found again."
         )
-    # These last without power, and wear out: they are written only where they differ.
-    _keep(wire, servo, RETURN_DELAY, 0)
-    _keep(wire, servo, DRIVE_MODE, 0)
-    _keep(wire, servo, OPERATING_MODE, CURRENT_MODE)
-    _keep(wire, servo, CURRENT_LIMIT, cap_count(servo))
-    # A change of the mode sets the goal to the limit.
-    wire.write(servo.id, GOAL_CURRENT, 0)
-    wire.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+    # These are in the EEPROM, which wears out: write them only if they differ.
+    _ensure(registers, servo, RETURN_DELAY, 0)
+    _ensure(registers, servo, DRIVE_MODE, 0)
+    _ensure(registers, servo, OPERATING_MODE, CURRENT_MODE)
+    _ensure(registers, servo, CURRENT_LIMIT, servo.most_counts)
+    # A change of mode sets the goal to the limit.
+    registers.write(servo.id, GOAL_CURRENT, 0)
+    registers.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
 
 
-def grip(wire: Wire, bus: BusSettings, servo: ServoSettings) -> None:
-    """Give one servo torque; it pulls nothing yet, and its watchdog looks after it.
+def enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
+    """Enable the torque of a servo, with a goal of 0 and a running watchdog.
 
     Raises:
         RobotError: If it does not answer or refuses.
     """
-    wire.write(servo.id, BUS_WATCHDOG, 0)
-    wire.write(servo.id, GOAL_CURRENT, 0)
-    wire.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
-    wire.write(servo.id, TORQUE_ENABLE, 1)
+    registers.write(servo.id, BUS_WATCHDOG, 0)
+    registers.write(servo.id, GOAL_CURRENT, 0)
+    registers.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+    registers.write(servo.id, TORQUE_ENABLE, 1)
 
 
-def _keep(wire: Wire, servo: ServoSettings, register: Register, value: int) -> None:
-    if wire.read(servo.id, register) != value:
-        wire.write(servo.id, register, value)
+def _ensure(registers: RegisterBus, servo: ServoSettings, register: Register, value: int) -> None:
+    if registers.read(servo.id, register) != value:
+        registers.write(servo.id, register, value)
 
 
-# One of them is read in each cycle; so a trip is known after four.
+# One of them is read in each cycle, so a trip is detected within four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
 
 
 class ServoBus:
-    """Pulls tendons.
+    """A bus of servos that pull tendons.
 
-    `set_up` is done once, then `hold`, then `cycle` again and again, and `stop` in the end. Whoever
-    stops calling `cycle` leaves the servos to their own watchdogs.
+    Call `set_up` once, then `hold`, then `cycle` regularly, and finally `stop`. Without further
+    cycles the servos' own watchdogs stop them.
 
     Args:
-        settings: What is attached.
-        open_port: What opens the port; a twin brings its own.
+        settings: The bus and its servos.
+        open_port: Opens the port; a twin has its own.
 
     Raises:
         RobotError: If the port cannot be opened.
@@ -183,61 +178,61 @@ class ServoBus:
     def __init__(self, settings: BusSettings, open_port: OpenPort = open_serial_port) -> None:
         self._settings = settings
         self._servos = {servo.name: servo for servo in settings.servos}
-        self._wire = Wire(open_port(settings), settings.device)
+        self._registers = RegisterBus(open_port(settings), settings.device)
         self._ids = {servo.id: servo for servo in settings.servos}
-        self._asking = Asking(self._wire, tuple(self._ids), fast=settings.fast)
+        self._poller = ServoPoller(self._registers, tuple(self._ids), fast=settings.fast)
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
         self._zeros: dict[str, int] = {}
         self._mode: Mode = "off"
         self._ramp: Ramp | None = None
-        self._goals = dict.fromkeys(self._ids, 0)  # Counts, as sent last.
-        self._asked = dict.fromkeys(self._servos, 0.0)  # N, as asked for last.
+        self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
+        self._requested = dict.fromkeys(self._servos, 0.0)  # N, as last requested.
         self._cycles = 0
         self._gone = ""
         self._is_ready = False
 
     @property
     def mode(self) -> Mode:
-        """What the bus does."""
+        """Mode of the bus."""
         return self._mode
 
     @property
     def zeros(self) -> dict[str, int]:
-        """Position of each servo at the zero of its tendon, in counts; who has none is missing."""
+        """Position of each servo at the zero of its tendon, in counts, for those with a zero."""
         return dict(self._zeros)
 
     @property
     def faults(self) -> dict[str, str]:
-        """What is wrong, as in `BusState.faults`."""
+        """Faults, as in `BusState.faults`."""
         return self._faults()
 
     @property
     def is_ready(self) -> bool:
-        """Whether it was set up."""
+        """True if `set_up` has succeeded."""
         return self._is_ready
 
     def set_up(self) -> None:
-        """Find the servos, make them ready without torque, and forget all faults.
+        """Check and prepare all servos, without torque, and clear all faults.
 
         Raises:
-            RobotError: If one is missing, is something else, refuses, or has switched itself off.
+            RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
         """
         self._mode, self._ramp, self._gone, self._is_ready = "off", None, "", False
         self._goals = dict.fromkeys(self._ids, 0)
-        self._wire.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
-        find(self._wire, self._settings)
+        self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
+        check_servos(self._registers, self._settings)
         for servo in self._settings.servos:
-            make_ready(self._wire, self._settings, servo)
-        self._asking.suspects.clear()
+            prepare_servo(self._registers, self._settings, servo)
+        self._poller.suspects.clear()
         for health in self._health.values():
             health.clear()
         self._is_ready = True
 
     def hold(self) -> None:
-        """Give all servos torque. They pull nothing until the first cycle.
+        """Enable the torque of all servos, which pull nothing until the first cycle.
 
         Raises:
-            RobotError: If there is a fault, or one does not obey: then all have let go.
+            RobotError: If there is a fault, or a servo refuses; then all have let go.
         """
         if self._mode != "off" or self._faults() or not self._is_ready:
             why = " ".join(self._faults().values())
@@ -246,17 +241,17 @@ class ServoBus:
         self._goals = dict.fromkeys(self._ids, 0)
         try:
             for servo in self._settings.servos:
-                grip(self._wire, self._settings, servo)
+                enable_torque(self._registers, self._settings, servo)
         except RobotError:
             self.release()
             raise
         self._mode = "held"
 
     def set_zeros(self, zeros: Mapping[str, int]) -> None:
-        """Say where the tendons have their zeros, as `Homing` finds them.
+        """Set the zeros of tendons, as `Homing` finds them.
 
         Args:
-            zeros: Position in counts, by name; the others keep theirs.
+            zeros: Position in counts, by name; other tendons keep theirs.
 
         Raises:
             UnknownName: If there is no such tendon.
@@ -267,30 +262,30 @@ class ServoBus:
             self._health[self._servos[name].id].was_reset = False
 
     def cycle(self, tensions: Mapping[str, float] | None, now_ns: int) -> BusState:
-        """Tell the servos what to pull, and hear what they do.
+        """Send the goals of all servos and read their state.
 
         Args:
-            tensions: N for each tendon, by name. It is kept between pretension and cap, and counts
-                only while the bus is "held". None keeps what was asked for last.
-            now_ns: The time.
+            tensions: Tension of each tendon, N, by name, clipped to its range. It takes effect only
+                while the bus is "held". None keeps the last request.
+            now_ns: Time, ns.
 
         Raises:
-            RobotError: If a tension is missing or no number. Then nothing is sent.
+            RobotError: If a tension is missing or not finite. Then nothing is sent.
             UnknownName: If there is no such tendon.
         """
         if tensions is not None:
-            self._ask_for(tensions)
+            self._request(tensions)
         if self._mode == "silent":
             return BusState(now_ns, "silent", {}, self._missed(), self._faults())
         heard: dict[int, ServoReply] = {}
-        self._wire.has_stray = False
+        self._registers.has_stray = False
         try:
-            self._tell(now_ns)
-            heard = self._asking.read(PRESENT)
+            self._send_goals(now_ns)
+            heard = self._poller.read(PRESENT)
             self._audit(heard)
         except RobotError as error:
             self._gone = self._gone or str(error)
-        servos = self._judge(heard, now_ns, late=self._wire.has_stray)
+        servos = self._evaluate(heard, now_ns, late=self._registers.has_stray)
         if self._faults() and self._mode == "held":
             self.stop(now_ns)
         if self._ramp is not None and self._ramp.is_over(now_ns):
@@ -298,45 +293,48 @@ class ServoBus:
         self._cycles += 1
         return BusState(now_ns, self._mode, servos, self._missed(), self._faults())
 
-    def tell(self, tensions: Mapping[str, float]) -> None:
-        """Tell the servos what to pull, and ask nothing: for what cannot wait for a cycle.
+    def send(self, tensions: Mapping[str, float]) -> None:
+        """Send tensions at once, without reading anything.
 
-        Like `cycle`, it counts only while the bus is "held". A bus that is gone is a fault, which
-        the next cycle says.
+        As with `cycle`, they take effect only while the bus is "held". If the bus is gone, the next
+        cycle reports it.
+
+        Args:
+            tensions: Tension of each tendon, N, by name.
 
         Raises:
-            RobotError: If a tension is missing or no number. Then nothing is sent.
+            RobotError: If a tension is missing or not finite. Then nothing is sent.
             UnknownName: If there is no such tendon.
         """
-        self._ask_for(tensions)
+        self._request(tensions)
         if self._mode != "held":
             return
         try:
-            self._tell(0)  # Only a ramp needs the time.
+            self._send_goals(0)  # The time matters only to a ramp.
         except RobotError as error:
             self._gone = self._gone or str(error)
 
     def stop(self, now_ns: int) -> None:
-        """Begin to take the tensions down; the cycles after this one do it, and then let go."""
+        """Start to ramp the tensions down in the coming cycles, and then to let go."""
         if self._mode == "held":
-            # Where nothing was pulled yet, a stop does not begin to.
+            # A tendon that was not pulled yet stays so.
             start = {one.name: self._goal_n(one) for one in self._settings.servos}
             end = {name: min(self._servos[name].pretension_n, n) for name, n in start.items()}
             self._ramp = Ramp(start, end, now_ns, self._settings.ramp_ms)
             self._mode = "stopping"
 
     def release(self) -> None:
-        """Let go at once.
+        """Disable the torque of all servos at once.
 
-        A servo that does not confirm it, twice asked, gets no more packets, and nobody else does:
-        then its own watchdog stops it. `set_up` speaks again.
+        If a servo does not confirm it, even when asked twice, the bus falls silent, so that the
+        watchdog of that servo stops it. `set_up` ends the silence.
         """
         self._ramp = None
         self._goals = dict.fromkeys(self._ids, 0)
         holding = set(self._ids)
         try:
             for _ in range(2):
-                self._wire.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
+                self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
                 holding -= self._let_go()
                 if not holding:
                     self._mode = "off"
@@ -349,7 +347,7 @@ class ServoBus:
         self._mode = "silent"
 
     def reboot(self, name: str) -> None:
-        """Start one servo afresh, without torque; its tendon loses its zero.
+        """Reboot one servo, without torque; its tendon loses its zero.
 
         Raises:
             UnknownName: If there is no such tendon.
@@ -357,69 +355,69 @@ class ServoBus:
         """
         servo = self._servo(name)
         if self._mode != "off":
-            raise RobotError(f"{servo.words} is not started afresh while the bus is {self._mode}.")
+            raise RobotError(f"{servo.words} cannot be rebooted while the bus is {self._mode}.")
         self._zeros.pop(name, None)
         self._is_ready = False
-        self._wire.reboot(servo.id)
+        self._registers.reboot(servo.id)
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Let go of all tendons and close the port."""
         if self._mode != "silent":
             self.release()
-        self._wire.close()
+        self._registers.close()
 
     def _let_go(self) -> set[int]:
-        """Who says that it has no torque."""
-        groups = [[*self._asking.trusted], *([one] for one in self._asking.suspects)]
+        """Return the servos that confirm that they have no torque."""
+        groups = [[*self._poller.trusted], *([one] for one in self._poller.suspects)]
         return {
             servo_id
             for group in filter(None, groups)
-            for servo_id, answer in self._wire.sync_read(TORQUE_ENABLE, group).items()
+            for servo_id, answer in self._registers.sync_read(TORQUE_ENABLE, group).items()
             if TORQUE_ENABLE.decode(answer.data) == 0
         }
 
-    def _ask_for(self, tensions: Mapping[str, float]) -> None:
+    def _request(self, tensions: Mapping[str, float]) -> None:
         for name in tensions:
             self._servo(name)
         if missing := [name for name in self._servos if name not in tensions]:
             raise RobotError(f"There is no tension for {', '.join(missing)}.")
         for name, servo in self._servos.items():
-            within(servo, tensions[name])  # All are looked at before one counts.
-        self._asked = {name: tensions[name] for name in self._servos}
+            servo.clip(tensions[name])  # Check all before using any.
+        self._requested = {name: tensions[name] for name in self._servos}
 
-    def _tell(self, now_ns: int) -> None:
+    def _send_goals(self, now_ns: int) -> None:
         if self._mode == "off":
             return
-        wanted = self._asked if self._ramp is None else self._ramp.tensions(now_ns)
+        wanted = self._requested if self._ramp is None else self._ramp.tensions(now_ns)
         for name, servo in self._servos.items():
-            # What is at fault pulls no more, while the others go down in their time.
-            ill = self._mode == "stopping" and self._health[servo.id].fault
-            pull = wanted[name] if self._ramp is not None else within(servo, wanted[name])
-            self._goals[servo.id] = 0 if ill else goal_count(servo, pull)
-        self._wire.sync_write(GOAL_CURRENT, self._goals)
+            # A servo with a fault lets go at once, while the others ramp down.
+            failed = self._mode == "stopping" and self._health[servo.id].fault
+            pull = wanted[name] if self._ramp is not None else servo.clip(wanted[name])
+            self._goals[servo.id] = 0 if failed else servo.goal_count(pull)
+        self._registers.sync_write(GOAL_CURRENT, self._goals)
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
-        """Read what shows whether they still obey; who cannot be trusted is no longer heard."""
-        # Who was away may have been without power: then its position means something else.
+        """Read a register that shows obedience, and drop servos that may have restarted."""
+        # A servo that was away may have lost power, and with it the meaning of its position.
         back = [one for one in heard if self._health[one].missed]
-        known = self._look(BUS_WATCHDOG, back)
+        known = self._audit_register(BUS_WATCHDOG, back)
         for one in back:
             if one not in known:
                 del heard[one]
-        alarmed = [one for one, answer in heard.items() if answer.error & ALERT]
-        # An alarm cannot wait for its turn.
-        register = HARDWARE_ERROR if alarmed else _AUDITED[self._cycles % len(_AUDITED)]
-        self._look(register, alarmed or [*heard])
+        alerting = [one for one, answer in heard.items() if answer.error & ALERT]
+        # An alert cannot wait for its turn.
+        register = HARDWARE_ERROR if alerting else _AUDITED[self._cycles % len(_AUDITED)]
+        self._audit_register(register, alerting or [*heard])
 
-    def _look(self, register: Register, ids: list[int]) -> set[int]:
-        """Hand a register of some servos to who judges them; who was heard."""
-        answers = self._wire.sync_read(register, ids) if ids else {}
+    def _audit_register(self, register: Register, ids: list[int]) -> set[int]:
+        """Evaluate a register of some servos; return those that answered."""
+        answers = self._registers.sync_read(register, ids) if ids else {}
         for one, answer in answers.items():
             pulls, goal = self._mode != "off", self._goals[one]
             self._health[one].audit(register, register.decode(answer.data), pulls=pulls, goal=goal)
         return set(answers)
 
-    def _judge(
+    def _evaluate(
         self, heard: Mapping[int, ServoReply], now_ns: int, *, late: bool
     ) -> dict[str, ServoState]:
         states: dict[str, ServoState] = {}
@@ -432,22 +430,23 @@ class ServoBus:
                 continue
             present = decode_present(heard[servo_id].data)
             zero = self._zeros.get(servo.name)
-            length = None if zero is None else length_m(servo, present.position, zero)
+            length = None if zero is None else servo.length_m(present.position, zero)
             health.see(present, length, now_ns, pulls=self._mode != "off")
             states[servo.name] = ServoState(
                 position=present.position,
                 length_m=length,
-                lengthening_m_per_s=lengthening(servo, present.speed),
-                tension_n=tension_n(servo, present.current),
+                lengthening_m_per_s=servo.lengthening(present.speed),
+                tension_n=servo.tension_n(present.current),
                 goal_n=self._goal_n(servo),
-                is_capped=self._mode == "held" and self._asked[servo.name] > servo.most_tension_n,
+                is_capped=self._mode == "held"
+                and self._requested[servo.name] > servo.most_tension_n,
                 voltage_v=present.voltage,
                 temperature_c=present.temperature,
             )
         return states
 
     def _goal_n(self, servo: ServoSettings) -> float:
-        return tension_n(servo, self._goals[servo.id])
+        return servo.tension_n(self._goals[servo.id])
 
     def _missed(self) -> dict[str, int]:
         return {servo.name: self._health[one].missed for one, servo in self._ids.items()}

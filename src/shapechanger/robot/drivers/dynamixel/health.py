@@ -1,16 +1,13 @@
-"""Judges one servo by what it says; nothing here knows a bus or a clock."""
+"""State of the bus, and fault detection of each servo from its readings."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
-from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.protocol import (
     BUS_WATCHDOG,
-    COUNTS_PER_TURN,
     GOAL_CURRENT,
     HARDWARE_ERROR,
     TORQUE_ENABLE,
@@ -26,38 +23,31 @@ __all__ = [
     "Mode",
     "ServoHealth",
     "ServoState",
-    "Slack",
-    "cap_count",
-    "goal_count",
-    "length_m",
-    "length_per_count",
-    "lengthening",
-    "tension_n",
-    "within",
+    "SlackDetector",
 ]
 
 Mode = Literal["off", "held", "stopping", "silent"]
-"""What the bus does.
+"""Mode of the bus.
 
-"off": no servo has torque. "held": they pull what they are told. "stopping": the tensions go down,
-then the servos let go. "silent": nothing is sent any more, so that the servos' own watchdogs stop
-them.
+"off": no servo has torque. "held": servos pull the requested tensions. "stopping": tensions ramp
+down, then the servos let go. "silent": nothing is sent any more, so that the servos' own watchdogs
+stop them.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class ServoState:
-    """What one servo said in this cycle.
+    """Readings of one servo in a cycle.
 
     Attributes:
-        position: Counts of 1/4096 turn, over many turns.
-        length_m: Length of the tendon beyond its zero, m; None while it has no zero.
-        lengthening_m_per_s: How fast it gets longer, m/s.
-        tension_n: What its present current pulls, N, the gears' friction aside.
-        goal_n: What it was told to pull, N, after the caps and in whole counts.
-        is_capped: Whether more was asked of it than it may pull.
-        voltage_v: V.
-        temperature_c: Degrees Celsius.
+        position: Position over many turns, in counts of 1/4096 turn.
+        length_m: Length of the tendon beyond its zero, m; None without a zero.
+        lengthening_m_per_s: Rate of change of that length, m/s.
+        tension_n: Tension of its present current, N, without the gears' friction.
+        goal_n: Tension of its goal current, N: limited and in whole counts.
+        is_capped: Whether the requested tension was above the limit.
+        voltage_v: Voltage, V.
+        temperature_c: Temperature, degrees Celsius.
     """
 
     position: int
@@ -75,13 +65,12 @@ class BusState:
     """The bus after a cycle.
 
     Attributes:
-        at_ns: The time of the cycle.
-        mode: What the bus does from now on.
-        servos: What was heard in this cycle, by the name of the tendon; who was not heard is not in
-            it, and nothing old is said again.
-        missed: How many cycles in a row each servo was not heard.
-        faults: What is wrong, in sentences, by the name of the tendon, or "" for the bus. They stay
-            until `ServoBus.set_up`.
+        at_ns: Time of the cycle.
+        mode: Mode from now on.
+        servos: Readings of this cycle by tendon, without servos that did not answer.
+        missed: Cycles in a row without an answer, by tendon.
+        faults: Faults as sentences, by tendon, or "" for the bus. They stay until
+            `ServoBus.set_up`.
     """
 
     at_ns: int
@@ -92,87 +81,22 @@ class BusState:
 
     @property
     def reason(self) -> str:
-        """All faults as one text; empty without any."""
+        """All faults as one text; empty without faults."""
         return " ".join(self.faults.values())
 
 
-_ROUNDING: Final = 1e-9  # Of a quotient that is a whole number: 3.0 may come out as 2.9999999999.
+class SlackDetector:
+    """Detects a tendon that has snapped or come off.
 
-
-def cap_count(servo: ServoSettings) -> int:
-    """The current limit, in counts: the largest that pulls no more than the most tension."""
-    return math.floor(servo.most_tension_n / servo.newton_per_count + _ROUNDING)
-
-
-def within(servo: ServoSettings, tension: float) -> float:
-    """A tension, kept between the pretension and the most tension, N.
-
-    Raises:
-        RobotError: If it is no number: nobody knows what was meant.
-    """
-    if not math.isfinite(tension):
-        raise RobotError(f"{servo.words} cannot pull {tension} N.")
-    return min(max(tension, servo.pretension_n), servo.most_tension_n)
-
-
-def goal_count(servo: ServoSettings, tension: float) -> int:
-    """The goal current for a tension, in counts with the sign that winds in; never above the cap.
-
-    It is rounded towards slack.
+    There are two signs. A tendon that is wound in further than the finger allows is lost for
+    certain, at any tension, but this needs a zero. A servo that winds in nearly as fast as without
+    load shows it earlier, but only if its current overcomes the gears by far. A tendon that snaps
+    while its servo stands still at the pretension is detected with the next pull.
 
     Args:
-        servo: Who pulls.
-        tension: N; below 0 counts as 0, for a tendon does not push.
-
-    Raises:
-        RobotError: If it is no number.
-    """
-    if not math.isfinite(tension):
-        raise RobotError(f"{servo.words} cannot pull {tension} N.")
-    # Clipped first: a number near the largest that there is would divide to infinity.
-    pulled = min(max(tension, 0.0), servo.most_tension_n)
-    counts = math.floor(pulled / servo.newton_per_count + _ROUNDING)
-    return servo.direction * min(counts, cap_count(servo))
-
-
-def tension_n(servo: ServoSettings, current: int) -> float:
-    """What a current pulls, N; below 0 for one that lets out."""
-    return servo.direction * current * servo.newton_per_count
-
-
-def length_per_count(servo: ServoSettings) -> float:
-    """How much longer the tendon gets with one more count, m; below 0 if it winds in."""
-    return -servo.direction * 2.0 * math.pi * servo.spool_radius_m / COUNTS_PER_TURN
-
-
-def length_m(servo: ServoSettings, position: int, zero: int) -> float:
-    """Length of the tendon beyond its zero, m.
-
-    Args:
-        servo: Whose tendon.
-        position: Present position, in counts.
-        zero: Position at the zero.
-    """
-    return (position - zero) * length_per_count(servo)
-
-
-def lengthening(servo: ServoSettings, speed: float) -> float:
-    """How fast the tendon gets longer, m/s, for a speed of the servo in rad/s."""
-    return -servo.direction * speed * servo.spool_radius_m
-
-
-class Slack:
-    """One tendon.
-
-    Two signs tell. It is wound in further than the finger could let it: certain, at any tension,
-    but it needs a zero. Or it winds in nearly as fast as the servo turns without load, for a while:
-    earlier, but only where the current overcomes the gears by far. A tendon that snaps while its
-    servo stands still at the pretension is noticed when it is next pulled.
-
-    Args:
-        shortest_m: Length that the finger cannot shorten it to, m.
-        most_m_per_s: Speed from which on it carries nothing, m/s.
-        slack_ms: For how long.
+        shortest_m: Length to which the finger cannot let the tendon shorten, m.
+        most_m_per_s: Speed of winding in of a servo without load, m/s.
+        slack_ms: Time for which it must be so fast, ms.
     """
 
     def __init__(self, shortest_m: float, most_m_per_s: float, slack_ms: int) -> None:
@@ -182,15 +106,15 @@ class Slack:
         self._since_ns: int | None = None
 
     def see(self, length: float | None, lengthening: float, now_ns: int) -> str:
-        """Take in how long the tendon is, and how fast it gets longer.
+        """Evaluate one reading.
 
         Args:
-            length: Beyond its zero, m; None without one.
-            lengthening: m/s; below 0 while it is wound in.
-            now_ns: The time.
+            length: Length beyond the zero, m; None without a zero.
+            lengthening: Rate of change of the length, m/s; negative while winding in.
+            now_ns: Time, ns.
 
         Returns:
-            Why it must be slack, in words; empty where it need not be.
+            Reason why the tendon is lost; empty if it is not.
         """
         if length is not None and length < self._shortest_m:
             return f"it is wound in by {-1e3 * length:.0f} mm, further than the finger lets it"
@@ -204,21 +128,21 @@ class Slack:
         return ""
 
 
-# A goal that is not there once was lost on its way, and the next one replaces it.
-_MOST_GOALS_REFUSED = 2
+# One wrong goal was lost on the way and is replaced by the next.
+_MAX_WRONG_GOALS = 2
 
 
 class ServoHealth:
-    """One servo.
+    """Fault detection of one servo.
 
     Args:
         servo: The servo.
         bus: Its bus.
 
     Attributes:
-        fault: What is wrong first, as a sentence; empty while nothing is. It stays until `clear`.
-        missed: How many cycles in a row it was not heard.
-        was_reset: Whether it has forgotten where its zero is.
+        fault: First fault, as a sentence, until `clear`; empty without a fault.
+        missed: Cycles in a row without an answer.
+        was_reset: Whether it has restarted, and so lost its zero.
     """
 
     def __init__(self, servo: ServoSettings, bus: BusSettings) -> None:
@@ -228,75 +152,75 @@ class ServoHealth:
         self.clear()
 
     def clear(self) -> None:
-        """Forget what was wrong."""
+        """Clear the fault."""
         model, bus = self._servo.known, self._bus
         most_m_per_s = bus.slack_share * model.no_load_rad_per_s * self._servo.spool_radius_m
-        self._slack = Slack(self._servo.shortest_m, most_m_per_s, bus.slack_ms)
+        self._slack = SlackDetector(self._servo.shortest_m, most_m_per_s, bus.slack_ms)
         self._wrong_volts = self._hot = self._refused = 0
         self._was_late = False
         self.fault = ""
         self.missed = 0
 
     def miss(self, *, late: bool) -> None:
-        """It was not heard in this cycle.
+        """Count a cycle without an answer.
 
         Args:
-            late: Whether bytes of a late answer were seen.
+            late: Whether bytes of a late answer have arrived.
         """
         self.missed += 1
         self._was_late |= late
         if self.missed >= self._bus.most_missed:
             what = "answers too late" if self._was_late else "does not answer"
-            self._say(f"{what}, {self.missed} cycles in a row")
+            self._fail(f"{what}, {self.missed} cycles in a row")
 
     def see(self, present: Present, length: float | None, now_ns: int, *, pulls: bool) -> None:
-        """Take in what it said.
+        """Evaluate the readings of a cycle.
 
         Args:
-            present: What it said.
-            length: Length of its tendon beyond its zero, m; None without one.
-            now_ns: The time.
-            pulls: Whether it has torque.
+            present: Readings of the servo.
+            length: Length of its tendon beyond the zero, m; None without a zero.
+            now_ns: Time, ns.
+            pulls: Whether it should have torque.
         """
         self.missed, self._was_late = 0, False
         model = self._servo.known
         volts, degrees = present.voltage, present.temperature
         self._wrong_volts = 0 if model.least_v <= volts <= model.most_v else self._wrong_volts + 1
         if self._wrong_volts >= self._bus.believed_cycles:
-            self._say(f"has {volts:.1f} V, and needs {model.least_v:g} to {model.most_v:g} V")
+            self._fail(f"has {volts:.1f} V, and needs {model.least_v:g} to {model.most_v:g} V")
         most_c = model.most_c - self._bus.margin_c
         self._hot = self._hot + 1 if degrees > most_c else 0
         if self._hot >= self._bus.believed_cycles:
-            self._say(f"has {degrees:.0f} C, more than {most_c:g} C")
+            self._fail(f"has {degrees:.0f} C, more than {most_c:g} C")
         if pulls:
-            speed = lengthening(self._servo, present.speed)
+            speed = self._servo.lengthening(present.speed)
             if words := self._slack.see(length, speed, now_ns):
-                self._say(f"has lost its tendon: {words}")
+                self._fail(f"has lost its tendon: {words}")
 
     def audit(self, register: Register, value: int, *, pulls: bool, goal: int) -> None:
-        """Take in one of the registers that say whether it still obeys.
+        """Evaluate a register that shows whether the servo still obeys.
 
         Args:
-            register: Which one.
-            value: What is in it.
-            pulls: Whether it should have torque.
-            goal: The goal current that it was sent last, in counts.
+            register: The register.
+            value: Its value.
+            pulls: Whether the servo should have torque.
+            goal: Goal current that was last sent, in counts.
         """
         if register == HARDWARE_ERROR and value:
             words = ", ".join(hardware_errors(value)) or f"it gives the unknown code {value}"
-            self._say(f"has switched itself off: {words}. Only a reboot gives it torque again")
+            self._fail(f"has switched itself off: {words}. Only a reboot gives it torque again")
         elif register == BUS_WATCHDOG and value == TRIPPED:
-            words = f"it heard nothing for {self._bus.watchdog_ms} ms"
-            self._say(f"was stopped by its own watchdog, for {words}")
+            words = f"it received nothing for {self._bus.watchdog_ms} ms"
+            self._fail(f"was stopped by its own watchdog: {words}")
         elif register == BUS_WATCHDOG and value == 0:
             self.was_reset = True
-            self._say("was started afresh, as by a dip of its power, and has lost its zero")
+            self._fail("has restarted, for example after a dip of its power, and lost its zero")
         elif register == TORQUE_ENABLE and pulls and value == 0:
-            self._say("has let go by itself")
+            self._fail("has let go by itself")
         elif register == GOAL_CURRENT and pulls:
             self._refused = 0 if value == goal else self._refused + 1
-            if self._refused >= _MOST_GOALS_REFUSED:
-                self._say(f"keeps to a goal of {value} counts, and was told {goal}")
+            if self._refused >= _MAX_WRONG_GOALS:
+                self._fail(f"has a goal of {value} counts, and was sent {goal}")
 
-    def _say(self, what: str) -> None:
+    def _fail(self, what: str) -> None:
         self.fault = self.fault or f"{self._servo.words} {what}."

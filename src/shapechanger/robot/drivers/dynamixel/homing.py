@@ -1,11 +1,11 @@
-"""Finds the zero of each tendon: pull gently until nothing moves."""
+"""Find the zero of each tendon by pulling gently until nothing moves."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState, length_per_count
+from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
 __all__ = ["Homing"]
@@ -22,34 +22,34 @@ class _Tendon:
 
     def see(self, position: int, now_ns: int) -> None:
         self.position = position
-        step = abs(length_per_count(self.servo))
+        step = abs(self.servo.metre_per_count)
         if abs(position - self._reference) * step > _STILL_M:
             self._reference, self.still_since_ns = position, now_ns
 
     @property
     def wound_m(self) -> float:
-        return -(self.position - self.start) * length_per_count(self.servo)
+        return -(self.position - self.start) * self.servo.metre_per_count
 
 
 class Homing:
-    """All tendons at once, so that they hold the finger against each other in a known posture.
+    """Homing of all tendons at once, so that they hold the finger in a known posture.
 
-    Who uses it gives `tensions` to the bus in each cycle, and the state to `see`, until `zeros` are
-    there or `failure` says why not. Tendons that were slack take up their slack meanwhile.
+    In each cycle send `tensions` to the bus and pass its state to `see`, until there are `zeros`,
+    or a `failure`. Slack tendons are taken up meanwhile.
 
     Args:
         settings: The bus.
-        still_ms: How long nothing may have moved.
-        within_ms: How long it may take.
-        travel_m: How far a tendon may be wound in, m.
+        still_ms: Time for which no servo may move, ms.
+        within_ms: Time limit, ms.
+        travel_m: Limit of winding in, m.
 
     Attributes:
         zeros: Position of each servo at the zero of its tendon, in counts, by name; None before.
-        failure: Why there is no zero, as a sentence; empty otherwise.
+        failure: Reason why there are no zeros, as a sentence; empty without one.
 
     Raises:
-        RobotError: If a servo's gears would hold against what it pulls: it would stand still at
-            once, with its tendon slack.
+        RobotError: If the gears' friction of a servo is above its homing tension: it would stand
+            still at once, with its tendon slack.
     """
 
     def __init__(
@@ -78,23 +78,23 @@ class Homing:
 
     @property
     def tensions(self) -> dict[str, float]:
-        """What each tendon pulls now, N."""
+        """Tension to send for each tendon, N."""
         if self.failure:
             return {name: servo.pretension_n for name, servo in self._servos.items()}
         return {name: servo.homing_tension_n for name, servo in self._servos.items()}
 
     def see(self, state: BusState) -> None:
-        """Take in what the bus says after a cycle."""
+        """Evaluate the state of the bus after a cycle."""
         if self.failure or self.zeros is not None:
             return
         now_ns = state.at_ns
         if self._since_ns is None:
             self._since_ns = now_ns
-        for name, said in state.servos.items():
+        for name, reading in state.servos.items():
             if name not in self._tendons:
-                self._tendons[name] = _Tendon(self._servos[name], said.position, now_ns)
-            self._tendons[name].see(said.position, now_ns)
-        self.failure = self._why_not(state)
+                self._tendons[name] = _Tendon(self._servos[name], reading.position, now_ns)
+            self._tendons[name].see(reading.position, now_ns)
+        self.failure = self._find_failure(state)
         if not self.failure and self._is_still(now_ns):
             self.zeros = {name: one.position for name, one in self._tendons.items()}
 
@@ -103,7 +103,7 @@ class Homing:
             now_ns - one.still_since_ns >= self._still_ns for one in self._tendons.values()
         )
 
-    def _why_not(self, state: BusState) -> str:
+    def _find_failure(self, state: BusState) -> str:
         if state.faults:
             return f"No zero: {state.reason}"
         for one in self._tendons.values():

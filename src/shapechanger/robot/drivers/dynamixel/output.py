@@ -1,26 +1,184 @@
-"""One tendon as an output: 0 is its pretension, 1 the most that it may pull."""
+"""Driver of a tendon as an output, and the servo bus that all tendons of a robot share.
+
+The sensor runs the one cycle of each tick, which reads all servos. The outputs only stage their
+tensions, which are sent in one packet when all of them are staged.
+"""
 
 from __future__ import annotations
 
-from shapechanger.robot.drivers.dynamixel.shared import SharedBus, join_bus
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.health import BusState
+from shapechanger.robot.drivers.dynamixel.settings import (
+    ServoSettings,
+    bus_settings,
+    servo_settings,
+)
+from shapechanger.robot.drivers.settings import text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["TendonOutput", "open_driver"]
+if TYPE_CHECKING:  # It needs the SDK, which is loaded when a bus is opened.
+    from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+
+__all__ = ["SharedBus", "TendonOutput", "bus_at", "join_bus", "open_driver"]
+
+
+class SharedBus:
+    """All servos at one device; see `SharedDevice`.
+
+    Args:
+        hardware: Hardware of the bus.
+        settings: Settings of any output on it, which include those of the bus.
+    """
+
+    def __init__(self, hardware: Hardware, settings: Mapping[str, object]) -> None:
+        self.device = text(settings, "device")
+        self._hardware = hardware
+        self._settings = settings
+        self._servos: dict[str, ServoSettings] = {}
+        self._zeros: dict[str, int] = {}
+        self._tensions: dict[str, float] = {}
+        self._bus: ServoBus | None = None
+
+    def add(self, plan: OutputPlan) -> ServoSettings:
+        """Add a servo.
+
+        Raises:
+            RobotError: If a setting is out of range, or the bus is already in use.
+        """
+        if self._bus is not None:
+            raise RobotError(f"The bus at {self.device} is in use: {plan.name} comes too late.")
+        servo = servo_settings(plan)
+        self._servos[plan.name] = servo
+        self._zeros[plan.name] = whole(plan.settings, "zero")
+        self._tensions[plan.name] = servo.pretension_n
+        return servo
+
+    def begin(self) -> None:
+        """Set up all servos, without torque; see `SharedDevice.begin`."""
+        from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+
+        settings = bus_settings(self._settings, tuple(self._servos.values()))
+        bus = ServoBus(settings, self._hardware.servo_port)
+        try:
+            bus.set_up()
+        except BaseException:
+            bus.close()
+            raise
+        bus.set_zeros(self._zeros)
+        self._bus = bus
+
+    def ready(self) -> None:
+        """Clear all faults; see `SharedDevice.ready`."""
+        bus = self._open_bus()
+        if bus.faults or not bus.is_ready:
+            if bus.mode not in ("off", "silent"):
+                bus.release()
+            bus.set_up()
+        if lost := [name for name in self._servos if name not in bus.zeros]:
+            raise RobotError(
+                f"{', '.join(lost)} lost the power, and so the zero of its tendon: find the zeros "
+                "with `shapechanger robot home`, and serve the robot afresh."
+            )
+
+    def stage(self, name: str, tension: float) -> bool:
+        """Set the tension of a tendon from the next `flush` on.
+
+        Args:
+            name: Name of the tendon.
+            tension: Tension, N.
+
+        Returns:
+            Whether it will be pulled; a bus with a fault lets go.
+        """
+        self._tensions[name] = tension
+        return not self._open_bus().faults
+
+    def flush(self, *, grip: bool) -> None:
+        """Send the tensions of all servos; see `SharedDevice.flush`."""
+        bus = self._open_bus()
+        if bus.faults:
+            return  # The bus is stopping, which its cycles complete.
+        if bus.mode == "off" and grip:
+            bus.hold()
+        if bus.mode == "held":
+            bus.send(self._tensions)
+
+    def let_go(self) -> None:
+        """Switch the torque of all servos off."""
+        bus = self._open_bus()
+        if bus.mode not in ("off", "silent"):
+            bus.release()
+
+    def cycle(self, now_ns: int) -> BusState:
+        """Run a cycle of the bus.
+
+        Raises:
+            RobotError: If the bus is not in use.
+        """
+        return self._open_bus().cycle(None, now_ns)
+
+    def leave(self, name: str) -> None:
+        """Remove a servo; the last one closes the bus."""
+        self._servos.pop(name, None)
+        if not self._servos:
+            _OPEN.pop((id(self._hardware), self.device), None)
+            if self._bus is not None:
+                self._bus.close()
+                self._bus = None
+
+    def _open_bus(self) -> ServoBus:
+        if self._bus is None:
+            raise RobotError(f"The bus at {self.device} is not in use.")
+        return self._bus
+
+
+# Open buses of this process, by hardware and device.
+_OPEN: Final[dict[tuple[int, str], tuple[Hardware, SharedBus]]] = {}
+
+
+def join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSettings]:
+    """Add the servo of an output to its bus, and return both.
+
+    Raises:
+        RobotError: If a setting is out of range.
+    """
+    key = (id(hardware), text(plan.settings, "device"))
+    _, bus = _OPEN.get(key, (hardware, None))
+    if bus is None:
+        bus = SharedBus(hardware, plan.settings)
+    servo = bus.add(plan)
+    _OPEN[key] = (hardware, bus)
+    return bus, servo
+
+
+def bus_at(device: str, hardware: Hardware) -> SharedBus:
+    """Return the bus at a device.
+
+    Raises:
+        RobotError: If no output is on it.
+    """
+    _, bus = _OPEN.get((id(hardware), device), (hardware, None))
+    if bus is None:
+        raise RobotError(f"No output is on the servo bus at {device}.")
+    return bus
 
 
 class TendonOutput:
-    """A servo on a bus; see `OutputDriver`.
+    """A tendon as an output: 0 is its pretension, 1 its largest tension; see `OutputDriver`.
 
     Args:
-        plan: The servo.
-        hardware: Where its bus is.
+        plan: The output.
+        hardware: Hardware of its bus.
 
     Attributes:
-        device: The bus, which acts when all outputs have been written.
+        device: The bus, which acts when all outputs are written.
 
     Raises:
-        RobotError: If the servo cannot be as its settings say.
+        RobotError: If a setting is out of range.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
@@ -30,24 +188,28 @@ class TendonOutput:
         self._least_n, self._most_n = servo.pretension_n, servo.most_tension_n
 
     def write(self, value: float, now_ns: int) -> float:
-        """Pull so much from the next flush on; below 0 counts as 0.
+        """Set the value from the next flush on.
+
+        Args:
+            value: From 0, the pretension, to 1; negative values count as 0.
+            now_ns: Not used.
 
         Returns:
-            The same, or 0 where the bus has a fault and lets go.
+            The value in effect: 0 if the bus has a fault and lets go.
         """
         value = min(max(value, 0.0), 1.0)
         tension = self._least_n + value * (self._most_n - self._least_n)
         return value if self.device.stage(self._name, tension) else 0.0
 
     def release(self) -> None:
-        """Take the torque from it and all others on its bus."""
+        """Switch the torque of all servos on the bus off."""
         self.device.let_go()
 
     def close(self) -> None:
-        """Let go, and leave the bus."""
+        """Leave the bus."""
         self.device.leave(self._name)
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> TendonOutput:
-    """Join the bus; nothing is sent yet."""
+    """Join the bus, without sending anything yet."""
     return TendonOutput(plan, hardware)

@@ -1,4 +1,4 @@
-"""The serial port below the SDK."""
+"""Serial port, registers and packets of Dynamixel protocol 2.0, on top of the SDK."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 __all__ = [
     "ALERT",
     "BUS_WATCHDOG",
-    "COUNTS_PER_TURN",
     "CURRENT_LIMIT",
     "CURRENT_MODE",
     "DRIVE_MODE",
@@ -29,85 +28,85 @@ __all__ = [
     "TORQUE_ENABLE",
     "TRIPPED",
     "WATCHDOG_STEP_NS",
-    "Asking",
     "OpenPort",
     "Port",
     "Present",
     "PromptPort",
     "Register",
+    "RegisterBus",
+    "ServoPoller",
     "ServoReply",
-    "Wire",
     "decode_present",
     "hardware_errors",
     "open_serial_port",
 ]
 
 try:
-    from dynamixel_sdk import PortHandler
+    from dynamixel_sdk import PacketHandler, PortHandler
 except ImportError as error:
     raise MissingExtra("dynamixel-sdk", "finger") from error
 
 
-# Bytes that may still be read when the time for an answer is over. They lay there before the
-# process was let run again; more is noise that never ends, and the SDK would read it for ever.
-_MOST_LATE_BYTES: Final = 1024
+# Bytes that may still be read after the timeout of an answer: they arrived while the process did
+# not run. More is endless noise, which the SDK would read for ever.
+_MAX_LATE_BYTES: Final = 1024
 
 
 class Port(Protocol):
-    """What the SDK's packet handler asks of a port; its `PortHandler` is one."""
+    """Port of the SDK's packet handler, such as its `PortHandler`."""
 
     is_using: bool
 
     def clearPort(self) -> None:
-        """Forget what has arrived."""
+        """Discard what has arrived."""
         ...
 
     def writePort(self, packet: Sequence[int]) -> int:
-        """Send bytes; how many were taken."""
+        """Send bytes and return how many were accepted."""
         ...
 
     def readPort(self, length: int) -> bytes:
-        """At most so many bytes of what has arrived."""
+        """Return at most `length` bytes of what has arrived."""
         ...
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the time that an answer of so many bytes may take."""
+        """Start the timeout of an answer of so many bytes."""
         ...
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Start the time that an answer may take."""
+        """Start a timeout."""
         ...
 
     def isPacketTimeout(self) -> bool:
-        """Whether that time is over."""
+        """Return whether the timeout has passed."""
         ...
 
     def getBytesAvailable(self) -> int:
-        """How many bytes have arrived and were not read."""
+        """Return the number of bytes that have arrived and were not read."""
         ...
 
     def getBaudRate(self) -> int:
-        """Bits a second."""
+        """Return the baud rate."""
         ...
 
     def closePort(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
         ...
 
 
 OpenPort = Callable[[BusSettings], Port]
-"""What opens the port of a bus."""
+"""Opens the port of a bus."""
 
 
 class PromptPort(PortHandler):
-    """The SDK's port, which waits for an answer only as long as the bus needs.
+    """The SDK's port with a timeout as short as the bus allows.
 
-    As it comes the SDK waits 34 ms for each missing answer, on the clock that a change of the date
-    moves, and asks the processor all the while. A stop cannot wait for that.
+    The SDK alone waits 34 ms for each missing answer, by a clock that changes with the date, and
+    keeps the processor busy meanwhile. A stop cannot wait for that.
 
     Args:
-        device: Where it is.
-        answer_ms: How long the servos may take to begin to answer.
+        device: Serial device.
+        answer_ms: Time for the servos to start an answer, ms.
     """
 
     def __init__(self, device: str, answer_ms: float) -> None:
@@ -116,20 +115,20 @@ class PromptPort(PortHandler):
         self._late_bytes = 0
 
     def getCurrentTime(self) -> float:
-        """Milliseconds that no change of the date moves."""
+        """Return the monotonic time in milliseconds."""
         return time.monotonic_ns() / 1e6
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the time that an answer of so many bytes may take."""
+        """Start the timeout of an answer of so many bytes."""
         self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self._answer_ms)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Start the time that an answer may take."""
-        self._late_bytes = _MOST_LATE_BYTES
+        """Start a timeout."""
+        self._late_bytes = _MAX_LATE_BYTES
         super().setPacketTimeoutMillis(msec)
 
     def readPort(self, length: int) -> bytes:
-        """At most so many bytes; waits for the first of them while there is time."""
+        """Return at most `length` bytes, waiting for the first until the timeout."""
         if length <= 0:
             return b""
         left_ms = self.packet_timeout - self.getTimeSinceStart()
@@ -145,7 +144,7 @@ def open_serial_port(settings: BusSettings) -> PromptPort:
     """Open the port of a bus.
 
     Raises:
-        RobotError: If it cannot be opened, or not at this speed.
+        RobotError: If it cannot be opened with this baud rate.
     """
     port = PromptPort(settings.device, settings.answer_ms)
     try:
@@ -162,13 +161,13 @@ def open_serial_port(settings: BusSettings) -> PromptPort:
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """Where a number lies in the control table.
+    """A register of the control table.
 
     Attributes:
-        name: What the manual calls it.
-        address: Of its first byte.
-        size: Bytes, the lowest first.
-        signed: Whether it may be negative (two's complement).
+        name: Name in the manual.
+        address: Address of its first byte.
+        size: Size in bytes, little-endian.
+        signed: Whether it is signed (two's complement).
     """
 
     name: str
@@ -177,18 +176,18 @@ class Register:
     signed: bool = False
 
     def encode(self, value: int) -> bytes:
-        """A number as the servo stores it."""
+        """Encode a value."""
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, data: bytes) -> int:
-        """The number in the first bytes of `data`."""
+        """Decode the value at the start of `data`."""
         return int.from_bytes(data[: self.size], "little", signed=self.signed)
 
 
 FIRMWARE: Final = Register("firmware version", 6, 1)
 RETURN_DELAY: Final = Register("return delay time", 9, 1)
 DRIVE_MODE: Final = Register("drive mode", 10, 1)
-"""Bit 0 turns all signs round, bit 3 lets a goal switch the torque on: neither is wanted here."""
+"""Bit 0 reverses all signs, bit 3 lets a goal enable the torque; the driver clears both."""
 OPERATING_MODE: Final = Register("operating mode", 11, 1)
 CURRENT_LIMIT: Final = Register("current limit", 38, 2)
 TORQUE_ENABLE: Final = Register("torque enable", 64, 1)
@@ -196,12 +195,11 @@ HARDWARE_ERROR: Final = Register("hardware error status", 70, 1)
 BUS_WATCHDOG: Final = Register("bus watchdog", 98, 1)
 GOAL_CURRENT: Final = Register("goal current", 102, 2, signed=True)
 PRESENT: Final = Register("present current to present temperature", 126, 21)
-"""One block without a gap: current, velocity, position, two trajectories, voltage, temperature."""
+"""Block of current, velocity, position, two trajectories, voltage and temperature, without gaps."""
 
 CURRENT_MODE: Final = 0
-COUNTS_PER_TURN: Final = 4096
 TRIPPED: Final = 0xFF
-"""What the bus watchdog reads after it has stopped the servo."""
+"""Value of the bus watchdog after it has stopped the servo."""
 WATCHDOG_STEP_NS: Final = 20_000_000
 
 _A_VELOCITY: Final = 0.229 * 6.283185307179586 / 60.0  # rad/s: 0.229 rpm.
@@ -215,14 +213,14 @@ _HARDWARE_ERRORS: Final = {
 
 
 class Present(NamedTuple):
-    """What a servo says of itself.
+    """Present values of a servo.
 
     Attributes:
-        current: In its own counts.
-        speed: rad/s.
-        position: Counts of 1/4096 turn, over many turns.
-        voltage: V.
-        temperature: Degrees Celsius.
+        current: Current, in counts of the model.
+        speed: Speed, rad/s.
+        position: Position over many turns, in counts of 1/4096 turn.
+        voltage: Voltage, V.
+        temperature: Temperature, degrees Celsius.
     """
 
     current: int
@@ -233,7 +231,7 @@ class Present(NamedTuple):
 
 
 def decode_present(data: bytes) -> Present:
-    """What is in the 21 bytes of `PRESENT`."""
+    """Decode the 21 bytes of `PRESENT`."""
 
     def signed(start: int, size: int) -> int:
         return int.from_bytes(data[start : start + size], "little", signed=True)
@@ -248,29 +246,23 @@ def decode_present(data: bytes) -> Present:
 
 
 def hardware_errors(bits: int) -> tuple[str, ...]:
-    """What the hardware error status says, in words."""
+    """Describe the bits of the hardware error status."""
     return tuple(words for bit, words in _HARDWARE_ERRORS.items() if bits >> bit & 1)
 
 
-try:
-    from dynamixel_sdk import PacketHandler
-except ImportError as error:
-    raise MissingExtra("dynamixel-sdk", "finger") from error
-
-
 ALERT: Final = 0x80
-"""Bit of a status packet's error: the hardware error status is worth a look."""
+"""Bit of a status packet's error: the hardware error status is not 0."""
 
 # Results of the SDK (robotis_def.py).
 _SUCCESS: Final = 0
 _RX_TIMEOUT: Final = -3001
 _RX_CORRUPT: Final = -3002
-# Damaged packets that are read past while waiting for good ones.
-_MOST_JUNK: Final = 8
-# A single lost packet must not keep a rig from starting. In a cycle nothing is asked twice.
+# Damaged packets to skip while waiting for valid ones.
+_MAX_DAMAGED: Final = 8
+# A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
 _BROADCAST: Final = 0xFE
-# Bytes of a block of a fast answer besides its data: error, id and CRC.
+# Bytes of error, id and CRC in each block of a fast answer.
 _FAST_EXTRA: Final = 4
 
 _REFUSALS: Final = {
@@ -285,23 +277,26 @@ _REFUSALS: Final = {
 
 
 class ServoReply(NamedTuple):
-    """What a servo said.
+    """Answer of a servo.
 
     Attributes:
-        error: The error byte of its status packet.
-        data: What was asked for.
+        error: Error byte of the status packet.
+        data: Data of the status packet.
     """
 
     error: int
     data: bytes
 
 
-class Wire:
-    """The bus.
+class RegisterBus:
+    """Reads and writes registers of the servos on a bus.
 
     Args:
-        port: What the bytes go over.
-        device: What it is called in a sentence.
+        port: Port of the bus.
+        device: Name of the bus in messages.
+
+    Attributes:
+        has_stray: Whether a late answer was found before a request; the reader resets it.
     """
 
     def __init__(self, port: Port, device: str) -> None:
@@ -309,32 +304,28 @@ class Wire:
         self._device = device
         self._sdk = PacketHandler(2.0)
         self.has_stray = False
-        """Whether bytes lay there when something was said: somebody had answered too late.
-
-        It stays until its reader takes it back.
-        """
 
     def ping(self, servo_id: int) -> int | None:
-        """The model number of a servo; None if it does not answer.
+        """Return the model number of a servo; None if it does not answer.
 
         Raises:
             RobotError: If the bus is gone.
         """
         for _ in range(_TRIES):
-            with self._speaking():
+            with self._request():
                 model, result, _ = self._sdk.ping(self._port, servo_id)
                 if result == _SUCCESS:
                     return model
         return None
 
     def read(self, servo_id: int, register: Register) -> int:
-        """One register of one servo.
+        """Read a register of one servo.
 
         Raises:
             RobotError: If it does not answer or refuses.
         """
         for _ in range(_TRIES):
-            with self._speaking():
+            with self._request():
                 data, result, error = self._sdk.readTxRx(
                     self._port, servo_id, register.address, register.size
                 )
@@ -342,39 +333,39 @@ class Wire:
                     self._check(servo_id, f"read its {register.name}", error)
                     if len(data) == register.size:
                         return register.decode(bytes(data))
-        raise self._silence(servo_id)
+        raise self._no_answer(servo_id)
 
     def write(self, servo_id: int, register: Register, value: int) -> None:
-        """Set one register of one servo, and wait until it says that it has done so.
+        """Write a register of one servo and wait for its confirmation.
 
         Raises:
             RobotError: If it does not answer or refuses.
         """
         data = register.encode(value)
         for _ in range(_TRIES):
-            with self._speaking():
+            with self._request():
                 result, error = self._sdk.writeTxRx(
                     self._port, servo_id, register.address, register.size, data
                 )
                 if result == _SUCCESS:
                     self._check(servo_id, f"set its {register.name} to {value}", error)
                     return
-        raise self._silence(servo_id)
+        raise self._no_answer(servo_id)
 
     def reboot(self, servo_id: int) -> None:
-        """Start a servo afresh.
+        """Reboot a servo.
 
         Raises:
             RobotError: If it does not answer.
         """
-        with self._speaking():
+        with self._request():
             result, _ = self._sdk.reboot(self._port, servo_id)
             if result == _SUCCESS:
                 return
-        raise self._silence(servo_id)
+        raise self._no_answer(servo_id)
 
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
-        """Set a register of several servos in one packet. Nobody answers.
+        """Write a register of several servos in one packet, which has no answer.
 
         Raises:
             RobotError: If the bus is gone.
@@ -382,7 +373,7 @@ class Wire:
         data: list[int] = []
         for servo_id, value in values.items():
             data += [servo_id, *register.encode(value)]
-        with self._speaking():
+        with self._request():
             result = self._sdk.syncWriteTxOnly(
                 self._port, register.address, register.size, data, len(data)
             )
@@ -393,12 +384,20 @@ class Wire:
     def sync_read(
         self, register: Register, ids: Sequence[int], *, fast: bool = False
     ) -> dict[int, ServoReply]:
-        """A register of several servos, asked in one packet; who was not heard is not in it.
+        """Read a register of several servos with one packet.
+
+        Args:
+            register: The register.
+            ids: Ids of the servos.
+            fast: Whether to use the fast sync read.
+
+        Returns:
+            The answers by id, without servos that did not answer.
 
         Raises:
             RobotError: If the bus is gone.
         """
-        with self._speaking():
+        with self._request():
             result = self._sdk.syncReadTx(
                 self._port, register.address, register.size, list(ids), len(ids), fast
             )
@@ -407,15 +406,15 @@ class Wire:
         raise RobotError(f"The bus at {self._device} does not take what is written to it.")
 
     def close(self) -> None:
-        """Let go of the port."""
-        with contextlib.suppress(OSError, termios.error):  # A device that is gone is closed.
+        """Close the port."""
+        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
             self._port.closePort()
 
     def _plain(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
-        # The SDK's GroupSyncRead gives up at the first servo that is missing, drops what the others
-        # said, and keeps no error byte; so the packets are taken here, one by one.
+        # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
+        # keeps no error byte; so the packets are received one by one here.
         heard: dict[int, ServoReply] = {}
-        for _ in range(len(ids) + _MOST_JUNK):
+        for _ in range(len(ids) + _MAX_DAMAGED):
             packet, result = self._receive()
             if result == _RX_TIMEOUT:
                 break
@@ -436,7 +435,7 @@ class Wire:
         if result != _SUCCESS or len(raw) != size * len(ids):
             return {}
         blocks = [raw[i * size : (i + 1) * size] for i in range(len(ids))]
-        # Whether servos stuff bytes here nobody says; where one did, the ids would not fit.
+        # It is undocumented whether servos stuff bytes here; if they did, the ids would not match.
         if [block[1] for block in blocks] != list(ids):
             return {}
         return {block[1]: ServoReply(block[0], bytes(block[2:-2])) for block in blocks}
@@ -444,54 +443,54 @@ class Wire:
     def _receive(self) -> tuple[list[int], int]:
         try:
             return self._sdk.rxPacket(self._port, False)
-        except IndexError:  # The SDK trusts the length that a packet states.
+        except IndexError:  # The SDK trusts the length in a packet.
             return [], _RX_CORRUPT
 
     @contextlib.contextmanager
-    def _speaking(self) -> Generator[None]:
-        """Turn what the device raises into words; what the SDK stumbles over is no answer."""
-        self._port.is_using = False  # The SDK leaves it set when something was raised.
+    def _request(self) -> Generator[None]:
+        """Turn errors of the device into RobotError, and malformed answers into missing ones."""
+        self._port.is_using = False  # The SDK leaves it set after an exception.
         try:
             self.has_stray |= self._port.getBytesAvailable() > 0
             yield
         except (OSError, termios.error) as error:
             raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
         except IndexError:
-            pass  # As in _receive. Whoever asked goes on as without an answer.
+            pass  # As in `_receive`: the caller continues as without an answer.
 
     def _check(self, servo_id: int, what: str, error: int) -> None:
         if number := error & ~ALERT:
             why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
             raise RobotError(f"Servo {servo_id} at {self._device} refuses to {what}: {why}.")
 
-    def _silence(self, servo_id: int) -> RobotError:
+    def _no_answer(self, servo_id: int) -> RobotError:
         return RobotError(f"Servo {servo_id} at {self._device} does not answer.")
 
 
-# In so many cycles in a row the fast way may fail before it is given up.
-_MOST_FAST_FAILURES: Final = 3
+# Failed cycles in a row after which the fast sync read is abandoned.
+_MAX_FAST_FAILURES: Final = 3
 
 
-class Asking:
-    """Who is asked, and how.
+class ServoPoller:
+    """Reads a register of all servos in each cycle, although some may not answer.
 
-    In a sync read each servo waits for the one before it; so a silent one may silence those behind
-    it. The first that is missing is suspected, and the others are asked once more without it. From
-    then on it is asked alone, one suspect in each cycle: whatever is missing, a cycle waits twice
-    at most, or three times while the fast way is tried.
+    In a sync read each servo waits for the one before it, so a silent one may silence those behind
+    it. The first missing servo becomes a suspect, and the others are read once more without it.
+    Suspects are read alone, one per cycle. So a cycle waits for at most two timeouts, or three
+    while the fast sync read is tried, whatever is missing.
 
     Args:
-        wire: The bus.
-        ids: Who is there.
+        bus: The bus.
+        ids: Ids of the servos.
         fast: Whether to try the fast sync read.
 
     Attributes:
-        suspects: Who was missing when last asked.
-        fast: Whether the fast way is still tried.
+        suspects: Servos that did not answer when they were last read.
+        fast: Whether the fast sync read is still tried.
     """
 
-    def __init__(self, wire: Wire, ids: Sequence[int], *, fast: bool) -> None:
-        self._wire = wire
+    def __init__(self, bus: RegisterBus, ids: Sequence[int], *, fast: bool) -> None:
+        self._bus = bus
         self._ids = tuple(ids)
         self._fast_failures = 0
         self.suspects: list[int] = []
@@ -499,37 +498,37 @@ class Asking:
 
     @property
     def trusted(self) -> tuple[int, ...]:
-        """Who answered when last asked."""
+        """Servos that answered when they were last read."""
         return tuple(one for one in self._ids if one not in self.suspects)
 
     def read(self, register: Register) -> dict[int, ServoReply]:
-        """A register of everybody; who was not heard is not in it.
+        """Read a register of all servos; those that did not answer are missing.
 
         Raises:
             RobotError: If the bus is gone.
         """
         asked = self.trusted
-        heard = self._ask(register, asked)
+        heard = self._read(register, asked)
         missing = [one for one in asked if one not in heard]
         if missing:
             first, *behind = missing
             self.suspects.append(first)
-            heard |= self._wire.sync_read(register, behind) if behind else {}
+            heard |= self._bus.sync_read(register, behind) if behind else {}
             self.suspects += [one for one in behind if one not in heard][:1]
         elif self.suspects:
             suspect = self.suspects.pop(0)
-            heard |= (answer := self._wire.sync_read(register, [suspect]))
+            heard |= (answer := self._bus.sync_read(register, [suspect]))
             if not answer:
                 self.suspects.append(suspect)
         return heard
 
-    def _ask(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
+    def _read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         if not ids:
             return {}
         if self.fast:
-            if heard := self._wire.sync_read(register, ids, fast=True):
+            if heard := self._bus.sync_read(register, ids, fast=True):
                 self._fast_failures = 0
                 return heard
             self._fast_failures += 1
-            self.fast = self._fast_failures < _MOST_FAST_FAILURES
-        return self._wire.sync_read(register, ids)
+            self.fast = self._fast_failures < _MAX_FAST_FAILURES
+        return self._bus.sync_read(register, ids)

@@ -1,9 +1,9 @@
-"""The tendons of a servo bus as a sensor: lengths, speeds and tensions."""
+"""Driver of the tendons of a servo bus as a sensor: lengths, speeds and tensions."""
 
 from __future__ import annotations
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.shared import bus_at
+from shapechanger.robot.drivers.dynamixel.output import bus_at
 from shapechanger.robot.drivers.settings import text
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
@@ -12,11 +12,11 @@ __all__ = ["TendonSensor", "open_driver"]
 
 
 class TendonSensor:
-    """Runs a cycle of the bus in each reading; see `SensorDriver`.
+    """Runs one cycle of the bus per reading; see `SensorDriver`.
 
     Args:
-        plan: Which bus.
-        hardware: Where it is.
+        plan: The sensor.
+        hardware: Hardware of the bus.
 
     Raises:
         RobotError: If no output is on that bus.
@@ -26,30 +26,34 @@ class TendonSensor:
         self._bus = bus_at(text(plan.settings, "device"), hardware)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """What the servos say in this cycle; who was not heard is left out.
+        """Run a cycle and return its readings, without servos that did not answer.
+
+        Args:
+            now_ns: Time, ns.
+            direction: Not used.
 
         Returns:
-            For each tendon `FDP/length`, m beyond its zero, where it has one, `FDP/speed`, m/s,
-            above 0 while it gets longer, and `FDP/tension`, N, at least 0.
+            For each tendon, such as FDP, `FDP/length`, its length beyond its zero, m, if it has
+            one; `FDP/speed`, m/s, positive while it gets longer; and `FDP/tension`, N, at least 0.
 
         Raises:
-            RobotError: If there is a fault, and what it is.
+            RobotError: If there is a fault.
         """
         state = self._bus.cycle(now_ns)
         if state.reason:
             raise RobotError(state.reason)
-        said: dict[str, float] = {}
+        readings: dict[str, float] = {}
         for name, servo in state.servos.items():
             if servo.length_m is not None:
-                said[f"{name}/length"] = servo.length_m
-            said[f"{name}/speed"] = servo.lengthening_m_per_s
-            said[f"{name}/tension"] = max(servo.tension_n, 0.0)
-        return said
+                readings[f"{name}/length"] = servo.length_m
+            readings[f"{name}/speed"] = servo.lengthening_m_per_s
+            readings[f"{name}/tension"] = max(servo.tension_n, 0.0)
+        return readings
 
     def close(self) -> None:
-        """Nothing: the bus belongs to the outputs."""
+        """Do nothing: the bus belongs to the outputs."""
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> TendonSensor:
-    """The tendons of a bus whose outputs are open."""
+    """Open the tendons of a bus whose outputs are open."""
     return TendonSensor(plan, hardware)

@@ -1,4 +1,4 @@
-"""What is attached to the bus, and how far it may go."""
+"""Settings of a servo bus: models, servos with their tendons, and limits."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 
 __all__ = [
+    "COUNTS_PER_TURN",
     "MODELS",
     "BusSettings",
     "ServoModel",
@@ -24,22 +25,29 @@ __all__ = [
 ]
 
 
+COUNTS_PER_TURN: Final = 4096
+"""Counts of position per turn."""
+
+_ROUNDING: Final = 1e-9
+"""Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
+
+
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """One model.
+    """Model of a servo.
 
     Attributes:
-        name: What it is called.
-        number: What it answers to a ping.
+        name: Name of the model.
+        number: Model number, its answer to a ping.
         ampere_per_count: Unit of its currents, A.
-        most_counts: Largest value of its current limit.
-        torque_constant: Torque at the output per ampere, N·m/A: stall torque over stall current.
-        no_load_rad_per_s: Speed without load.
-        least_v: Lowest voltage it works at, V.
-        most_v: Highest.
-        most_c: Temperature at which it switches itself off, degrees Celsius.
-        least_firmware: First version whose bus watchdog can be trusted.
-        friction_nm: What its gears hold against, at the output, N·m; None where nobody measured it.
+        most_counts: Largest value of its current limit, in that unit.
+        torque_constant: Torque at the output per current, N·m/A: stall torque over stall current.
+        no_load_rad_per_s: Speed without load, rad/s.
+        least_v: Lowest operating voltage, V.
+        most_v: Highest operating voltage, V.
+        most_c: Temperature at which it shuts itself off, degrees Celsius.
+        least_firmware: First version with a reliable bus watchdog.
+        friction_nm: Friction of its gears at the output, N·m; None where it was not measured.
     """
 
     name: str
@@ -71,11 +79,11 @@ _MODELS: Final = (
 )
 
 MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for one in _MODELS})
-"""The models that the driver knows, by name."""
+"""Models that the driver supports, by name."""
 
 
 def model_named(name: str) -> ServoModel:
-    """A model.
+    """Return a model by its name.
 
     Raises:
         UnknownName: If there is no such model.
@@ -85,27 +93,30 @@ def model_named(name: str) -> ServoModel:
     return MODELS[name]
 
 
-_MOST_ID: Final = 252  # Protocol 2.0: 253 to 255 are reserved, 254 is everybody.
+_MOST_ID: Final = 252  # Protocol 2.0: 253 to 255 are reserved, 254 is broadcast.
 _MOST_WATCHDOG_MS: Final = 127 * 20
 
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """One servo and its tendon.
+    """A servo and its tendon.
+
+    A tension is that of the current without friction. The gears take some newtons of it when the
+    spool winds in, and add as much when the tendon pulls it out; see `ServoModel.friction_nm`.
 
     Attributes:
         name: Name of the tendon, such as "FDP".
-        id: Its number on the bus, 0 to 252.
+        id: Id on the bus, 0 to 252.
         model: Name of its model; see `MODELS`.
         spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
-        most_tension_n: What it may pull at most, N. The servo's own current limit is set to it.
-        pretension_n: What it always pulls while it is held, N.
+        most_tension_n: Largest tension, N. The servo's own current limit is set to it.
+        pretension_n: Smallest tension while it holds the tendon, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
-        torque_constant: N·m/A; None for what the data sheet implies. One that was measured with the
-            spool on a scale is better.
-        homing_n: What it pulls to find its zero, N; None for the pretension.
-        shortest_m: Length, counted from its zero, that the finger cannot shorten it to, m: who
-            winds in further has no tendon. Below 0.
+        torque_constant: Torque per current, N·m/A; None for that of the data sheet. Measuring it
+            with the spool on a scale is better.
+        homing_n: Tension for finding the zero, N; None for the pretension.
+        shortest_m: Length from the zero, m, below 0, to which the finger cannot let the tendon
+            shorten: a servo that winds in further has lost its tendon.
     """
 
     name: str
@@ -125,7 +136,7 @@ class ServoSettings:
             self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
         if self.direction not in (1, -1):
             self._refuse(f"its direction must be 1 or -1, not {self.direction}")
-        for what, value in (
+        for label, value in (
             ("spool radius", self.spool_radius_m),
             ("torque constant", self.newton_metre_per_ampere),
             ("most tension", self.most_tension_n),
@@ -133,51 +144,107 @@ class ServoSettings:
             ("tension for homing", self.homing_tension_n),
         ):
             if not 0.0 < value < math.inf:  # Also refuses NaN.
-                self._refuse(f"its {what} must be above 0, not {value:g}")
+                self._refuse(f"its {label} must be above 0, not {value:g}")
         if not -math.inf < self.shortest_m < 0.0:
             self._refuse(f"its shortest length must be below 0, not {self.shortest_m:g} m")
         least, most = self.newton_per_count, known.most_counts * self.newton_per_count
         if not least <= self.most_tension_n <= most:
             words = f"{least:.2g} to {most:.0f} N with this spool, not {self.most_tension_n:g} N"
             self._refuse(f"its most tension must be {words}")
-        for what, value in (
+        for label, value in (
             ("pretension", self.pretension_n),
             ("tension for homing", self.homing_tension_n),
         ):
             if not least <= value <= self.most_tension_n:
                 words = f"{least:.2g} to {self.most_tension_n:g} N, not {value:g} N"
-                self._refuse(f"its {what} must be {words}")
+                self._refuse(f"its {label} must be {words}")
 
     @property
     def known(self) -> ServoModel:
-        """Its model."""
+        """Model of the servo."""
         return model_named(self.model)
 
     @property
     def newton_metre_per_ampere(self) -> float:
-        """Its torque constant."""
+        """Torque constant in use, N·m/A."""
         given = self.torque_constant
         return self.known.torque_constant if given is None else given
 
     @property
     def newton_per_count(self) -> float:
-        """What one count of current pulls, N."""
+        """Tension per count of current, N."""
         return self.newton_metre_per_ampere * self.known.ampere_per_count / self.spool_radius_m
 
     @property
     def homing_tension_n(self) -> float:
-        """What it pulls to find its zero, N."""
+        """Tension for finding the zero, N."""
         return self.pretension_n if self.homing_n is None else self.homing_n
 
     @property
     def friction_n(self) -> float | None:
-        """What its gears hold against, N at the tendon; None where nobody knows."""
+        """Friction of the gears at the tendon, N; None where it is unknown."""
         friction = self.known.friction_nm
         return None if friction is None else friction / self.spool_radius_m
 
     @property
+    def most_counts(self) -> int:
+        """Current limit in counts: the largest that pulls at most `most_tension_n`."""
+        return math.floor(self.most_tension_n / self.newton_per_count + _ROUNDING)
+
+    @property
+    def metre_per_count(self) -> float:
+        """Change of the tendon's length per count of position, m; negative if it winds in."""
+        return -self.direction * 2.0 * math.pi * self.spool_radius_m / COUNTS_PER_TURN
+
+    def clip(self, tension: float) -> float:
+        """Clip a tension to the range from pretension to `most_tension_n`, N.
+
+        Raises:
+            RobotError: If it is not finite.
+        """
+        if not math.isfinite(tension):
+            raise RobotError(f"{self.words} cannot pull {tension} N.")
+        return min(max(tension, self.pretension_n), self.most_tension_n)
+
+    def goal_count(self, tension: float) -> int:
+        """Return the goal current for a tension, rounded towards slack and at most the limit.
+
+        Args:
+            tension: Tension, N; a negative one counts as 0, because a tendon does not push.
+
+        Returns:
+            Counts, with the sign that winds in.
+
+        Raises:
+            RobotError: If the tension is not finite.
+        """
+        if not math.isfinite(tension):
+            raise RobotError(f"{self.words} cannot pull {tension} N.")
+        # Clip first: the quotient of a huge number could overflow to infinity.
+        pulled = min(max(tension, 0.0), self.most_tension_n)
+        counts = math.floor(pulled / self.newton_per_count + _ROUNDING)
+        return self.direction * min(counts, self.most_counts)
+
+    def tension_n(self, current: int) -> float:
+        """Return the tension of a current in counts, N; negative for one that lets out."""
+        return self.direction * current * self.newton_per_count
+
+    def length_m(self, position: int, zero: int) -> float:
+        """Return the length of the tendon beyond its zero, m, which grows as it is let out.
+
+        Args:
+            position: Present position, in counts.
+            zero: Position at the zero, in counts.
+        """
+        return (position - zero) * self.metre_per_count
+
+    def lengthening(self, speed: float) -> float:
+        """Return how fast the tendon gets longer, m/s, for a speed of the servo in rad/s."""
+        return -self.direction * speed * self.spool_radius_m
+
+    @property
     def words(self) -> str:
-        """What it is called in a sentence."""
+        """Name and id for messages."""
         return f"Servo {self.name} (id {self.id})"
 
     def _refuse(self, why: str) -> None:
@@ -186,24 +253,24 @@ class ServoSettings:
 
 @dataclass(frozen=True, slots=True)
 class BusSettings:
-    """The bus and its servos.
+    """A bus and its servos.
 
     Attributes:
-        device: Where it is, such as "/dev/ttyUSB0".
-        servos: What is attached, in the order in which it is asked.
-        baud: Bits a second; one that the SDK knows.
-        answer_ms: How long the servos may take to begin to answer. The latency timer of an FTDI
-            adapter must be below: `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, 16 ms as it
-            comes and 1 ms at best.
-        watchdog_ms: After so long without a word the servos stop by themselves; steps of 20 ms.
-        most_missed: A servo that is not heard in so many cycles in a row is a fault.
-        ramp_ms: How long a stop takes to go down to the pretension.
-        believed_cycles: How many cycles a voltage or temperature must be wrong to be believed.
-        margin_c: How far below its own limit a temperature is too hot, degrees.
-        slack_share: Share of the speed without load from which on a tendon that winds in carries
-            nothing.
-        slack_ms: For how long.
-        fast: Whether to try the fast sync read; what does not answer it is read the plain way.
+        device: Serial device, such as "/dev/ttyUSB0".
+        servos: Servos, in the order in which they are read.
+        baud: Baud rate; one that the SDK supports.
+        answer_ms: Time for the servos to start an answer, ms. The latency timer of an FTDI adapter
+            must be below: `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, by default 16 ms and
+            at best 1 ms.
+        watchdog_ms: Silence after which the servos stop by themselves, ms; a multiple of 20.
+        most_missed: Missed cycles in a row that make a fault.
+        ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
+        believed_cycles: Cycles in a row for which a wrong voltage or temperature makes a fault.
+        margin_c: Margin below the model's temperature limit that makes a fault, K.
+        slack_share: Share of the speed without load at which a servo that winds in has lost its
+            tendon.
+        slack_ms: Time for which it must wind in so fast, ms.
+        fast: Whether to try the fast sync read, with the plain one as a fallback.
     """
 
     device: str
@@ -222,19 +289,19 @@ class BusSettings:
     def __post_init__(self) -> None:
         if not self.servos:
             raise RobotError(f"The bus at {self.device} needs at least one servo.")
-        for what, values in (
+        for label, values in (
             ("id", [one.id for one in self.servos]),
             ("name", [one.name for one in self.servos]),
         ):
             value, times = Counter[object](values).most_common(1)[0]
             if times > 1:
-                raise RobotError(f"The bus at {self.device} has {times} servos of {what} {value}.")
+                raise RobotError(f"The bus at {self.device} has {times} servos of {label} {value}.")
         if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % 20:
             raise RobotError(
                 f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
                 f"not {self.watchdog_ms}."
             )
-        for what, value, least in (
+        for label, value, least in (
             ("answer_ms", self.answer_ms, 0.1),
             ("most_missed", self.most_missed, 1),
             ("ramp_ms", self.ramp_ms, 0),
@@ -244,14 +311,14 @@ class BusSettings:
             ("slack_ms", self.slack_ms, 1),
         ):
             if not least <= value < math.inf:
-                raise RobotError(f"{what} must be {least:g} or more, not {value:g}.")
+                raise RobotError(f"{label} must be {least:g} or more, not {value:g}.")
 
 
 def servo_settings(plan: OutputPlan) -> ServoSettings:
-    """The servo of an output, by the name of the output.
+    """Return the servo of an output; its name is that of the output.
 
     Raises:
-        RobotError: If it cannot be as it is set.
+        RobotError: If a setting is out of range.
         UnknownName: If there is no such model.
     """
     settings = plan.settings
@@ -268,14 +335,14 @@ def servo_settings(plan: OutputPlan) -> ServoSettings:
 
 
 def bus_settings(settings: Mapping[str, object], servos: tuple[ServoSettings, ...]) -> BusSettings:
-    """A bus with these servos.
+    """Return a bus with these servos.
 
     Args:
-        settings: Of any of its outputs: each has those of the bus too.
-        servos: What is on it.
+        settings: Settings of any of its outputs, which include those of the bus.
+        servos: Its servos.
 
     Raises:
-        RobotError: If it cannot be as it is set, or two servos have one id.
+        RobotError: If a setting is out of range, or two servos have the same id or name.
     """
     return BusSettings(
         device=text(settings, "device"),

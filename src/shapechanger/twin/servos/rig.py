@@ -1,0 +1,171 @@
+"""Servos of a robot by the names of their tendons, and what the tendons pull."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, Literal, Protocol, get_args, runtime_checkable
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.settings import number, text, whole
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.twin.servos.bus import SimulatedBus
+from shapechanger.twin.servos.motor import EndStops, Load, Tendon
+from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
+from shapechanger.worlds.world import World
+
+__all__ = ["Rig", "ServoFault", "TendonWorld"]
+
+ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
+"""Faults of a servo.
+
+"mute": it obeys without answering. "deaf": it receives nothing. "hot", "overload": it shuts itself
+off. "snapped": its tendon is torn for good. "power": its power fails for a moment. "" repairs
+"mute", "deaf" and "hot".
+"""
+
+_COUNTS_PER_RAD: Final = 4096 / (2.0 * math.pi)
+_HOT_C: Final = 75.0
+_WELL_C: Final = 30.0
+
+
+@runtime_checkable
+class TendonWorld(Protocol):
+    """A world that tendons pull at."""
+
+    @property
+    def cable_stiffness(self) -> float:
+        """Stiffness of the tendons, N/m."""
+        ...
+
+    def connect(self, tendons: Sequence[str], rig: Rig) -> Load:
+        """Attach the tendons of a rig.
+
+        Args:
+            tendons: Names, in the order of the servos.
+            rig: The rig; its `settle` is to be called after each change of posture.
+
+        Returns:
+            The load of the tendons.
+
+        Raises:
+            RobotError: If the world has other tendons.
+        """
+        ...
+
+    def travels(self) -> Sequence[float]:
+        """Return how far the end of each tendon is towards its spool, m; see `Load.pull`."""
+        ...
+
+
+class Rig:
+    """Servos on a bus, by the names of their tendons.
+
+    Args:
+        plan: The robot, which has outputs with the driver "dynamixel".
+        world: World of the robot; in a world without tendons the servos pull springs.
+
+    Attributes:
+        bus: The bus.
+
+    Raises:
+        RobotError: If the world has other tendons.
+    """
+
+    def __init__(self, plan: GuardPlan, world: World) -> None:
+        outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
+        settings = [output.settings for output in outputs]
+        self._device = text(settings[0], "device")
+        self._names = tuple(output.name for output in outputs)
+        self._world = world if isinstance(world, TendonWorld) else None
+        stiffness = Tendon().stiffness if self._world is None else self._world.cable_stiffness
+        plans = [
+            ServoPlan(
+                id=whole(one, "id"),
+                model=text(one, "model"),
+                tendon=Tendon(number(one, "spool_radius_m"), whole(one, "direction"), stiffness),
+                # In the middle of a count, as it stands while the finger is straight.
+                angle=(whole(one, "zero") + 0.5) / _COUNTS_PER_RAD,
+            )
+            for one in settings
+        ]
+        load: Load = EndStops(len(plans))
+        if self._world is not None:
+            load = self._world.connect(self._names, self)
+        self.bus = SimulatedBus(plans, load, whole(settings[0], "baud"))
+        self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
+        self.settle()
+
+    @classmethod
+    def of(cls, plan: GuardPlan, world: World) -> Rig | None:
+        """Return the rig of a robot; None for one without a servo bus.
+
+        Raises:
+            RobotError: If the world has other tendons.
+        """
+        has_bus = any(output.driver == "dynamixel" for output in plan.outputs)
+        return cls(plan, world) if has_bus else None
+
+    def require(self, device: str) -> None:
+        """Check that the bus is at a device.
+
+        Raises:
+            RobotError: If it is at another one.
+        """
+        if device != self._device:
+            raise RobotError(f"There is no {device} at this twin, only {self._device}.")
+
+    def servo(self, tendon: str) -> SimulatedServo:
+        """Return the servo of a tendon.
+
+        Raises:
+            UnknownName: If there is no such tendon.
+        """
+        if tendon not in self._servos:
+            raise UnknownName("tendon", tendon, self._servos)
+        return self._servos[tendon]
+
+    def tensions(self) -> dict[str, float]:
+        """Return the tension of each tendon, N, by name."""
+        return {name: servo.motor.tension for name, servo in self._servos.items()}
+
+    def settle(self) -> None:
+        """Turn all spools until their tendons are just taut, as a person does by hand."""
+        if self._world is None:
+            return
+        travels = list(self._world.travels())
+        for servo, travel in zip(self._servos.values(), travels, strict=True):
+            tendon, motor = servo.plan.tendon, servo.motor
+            motor.angle = servo.plan.angle + travel / (tendon.direction * tendon.spool_radius_m)
+            motor.speed = motor.tension = 0.0
+        self.bus.set_travels(travels)
+
+    def break_servo(self, tendon: str, fault: ServoFault | str) -> None:
+        """Make a servo fail.
+
+        Args:
+            tendon: Name of its tendon.
+            fault: The fault; "" repairs what can be repaired.
+
+        Raises:
+            UnknownName: If there is no such tendon, or no such fault.
+        """
+        servo = self.servo(tendon)
+        match fault:
+            case "":
+                servo.faults.mute = servo.faults.deaf = False
+                servo.motor.temperature = min(servo.motor.temperature, _WELL_C)
+            case "mute":
+                servo.faults.mute = True
+            case "deaf":
+                servo.faults.deaf = True
+            case "hot":
+                servo.motor.temperature = _HOT_C
+            case "overload":
+                servo.overload()
+            case "snapped":
+                servo.plan.tendon.snapped = True
+            case "power":
+                servo.lose_power()
+            case _:
+                raise UnknownName("fault of a servo", fault, get_args(ServoFault))

@@ -1,0 +1,321 @@
+"""Which models get a fast model, and which must not."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.envs.ant import AntEnv
+from shapechanger.envs.pendulum import InvertedPendulumEnv
+from shapechanger.envs.stepping import ModelWatch, find_fast_model
+from shapechanger.envs.stepping import fast_model as twin
+from shapechanger.envs.stepping.fast_model import moves_equally
+
+_ISLAND = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+_MIDPHASE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+_SPRING = int(mujoco.mjtDisableBit.mjDSBL_SPRING)
+_DAMPER = int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+_FRICTION = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+_SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+
+_BALL = '<geom name="{0}" size="0.1" {1}/>'
+_SCENE = """
+<mujoco>
+  <option timestep="0.005"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1" {floor}/>
+    {fixed}
+    <body name="trunk" pos="0 0 0.3">
+      <freejoint/>
+      <geom name="trunk" size="0.1" {trunk}/>
+      {more}
+      <body name="leg" pos="0.25 0 0">
+        <joint name="hip" axis="0 1 0" range="-40 40" limited="true"/>
+        <geom name="thigh" type="capsule" fromto="0 0 0 0.2 0 0" size="0.05" {legs}/>
+        <body name="shin" pos="0.25 0 0">
+          <joint name="knee" axis="0 1 0" range="-160 160" limited="true"/>
+          <geom name="shin" type="capsule" fromto="0 0 0 0.2 0 0" size="0.05" {legs}/>
+        </body>
+      </body>
+    </body>
+    {other}
+  </worldbody>
+  {rest}
+  <actuator><motor joint="hip" gear="5"/><motor joint="knee" gear="5"/></actuator>
+</mujoco>
+"""
+_SILENT = 'conaffinity="0"'
+
+
+def _scene(**parts: str) -> mujoco.MjSpec:
+    """One trunk with a leg on a floor; its geoms touch nothing but the floor unless told to."""
+    given = dict.fromkeys(("floor", "fixed", "trunk", "more", "legs", "other", "rest"), "")
+    given |= {"trunk": _SILENT, "legs": _SILENT} | parts
+    return mujoco.MjSpec.from_string(_SCENE.format(**given))
+
+
+def _searches(fast: mujoco.MjModel) -> bool:
+    """Whether it looks for contacts as the original does, and not for islands."""
+    flags = fast.opt.disableflags
+    return bool(flags & _ISLAND) and not flags & (_MIDPHASE | _CONTACT)
+
+
+def _fast_model_of(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
+    model = spec.compile()
+    return model, find_fast_model(ModelWatch(model), spec.copy)
+
+
+def _knows_its_pairs(model: mujoco.MjModel) -> bool:
+    return bool(model.npair) and not model.geom_contype.any()
+
+
+def test_one_tree_on_one_floor_knows_its_contacts() -> None:
+    """No search, no islands; the public model is untouched."""
+    model, fast = _fast_model_of(_scene())
+    assert fast is not None
+    assert _knows_its_pairs(fast)
+    assert fast.npair == 3
+    assert fast.opt.disableflags & _ISLAND
+    assert not model.npair
+    assert not model.opt.disableflags
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"floor": 'margin="0.01"', "trunk": f'{_SILENT} margin="0.02"'},
+        {"floor": 'margin="0.03" gap="0.01"', "legs": f'{_SILENT} margin="0.02" gap="0.005"'},
+        {"floor": 'friction="0.2 0.1 0.1"', "legs": f'{_SILENT} friction="1 0.01 0.3"'},
+        {"floor": 'solref="0.05 0.5" solmix="3"', "legs": f'{_SILENT} solimp="0.5 0.9 0.01 0.3 3"'},
+        {"floor": 'solref="-500 -5"', "legs": f'{_SILENT} solref="-300 -9"'},
+        {"floor": 'solmix="0"', "legs": f'{_SILENT} solmix="0" solref="0.1 1"'},
+        {"floor": 'solmix="0" solref="0.3 1"', "legs": f'{_SILENT} solref="0.1 1"'},
+        {"floor": 'solmix="2" solref="0.3 1"', "legs": f'{_SILENT} solref="0.1 1" solmix="0"'},
+        {"floor": 'condim="1"', "legs": f'{_SILENT} condim="6"', "trunk": f'{_SILENT} condim="4"'},
+    ],
+    ids=["margins", "gaps", "friction", "mixed", "direct", "none", "legs", "floor", "condim"],
+)
+def test_pairs_get_the_numbers_that_the_search_would_mix(parts: dict[str, str]) -> None:
+    """Margins are summed, friction is the larger, stiffness is mixed: all by comparison."""
+    model, fast = _fast_model_of(_scene(**parts))
+    assert fast is not None
+    assert _knows_its_pairs(fast)
+    _roll(model, fast, 400)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"legs": "", "trunk": ""},
+        {"more": _BALL.format("bump", 'pos="0 0.2 0" conaffinity="0"')},
+        {"fixed": _BALL.format("stone", 'pos="0.3 0 0"')},
+        {"legs": f'{_SILENT} priority="1"'},
+    ],
+    ids=["touches itself", "two geoms on a body", "a stone on the floor", "priorities"],
+)
+def test_where_the_order_is_open_the_search_stays(parts: dict[str, str]) -> None:
+    """Every pair that the stock model could generate is still looked for."""
+    model, fast = _fast_model_of(_scene(**parts))
+    assert fast is not None
+    assert not fast.npair
+    np.testing.assert_array_equal(fast.geom_contype, model.geom_contype)
+    assert _searches(fast)
+    _roll(model, fast, 400)
+
+
+_FREE = '<body name="ball" pos="1 0 0.5"><freejoint/><geom name="ball" size="0.1"/></body>'
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"other": _FREE},
+        {"rest": '<tendon><fixed name="t"><joint joint="hip" coef="1"/></fixed></tendon>'},
+        {"rest": '<equality><joint joint1="hip" joint2="knee"/></equality>'},
+        {"other": '<body name="hand" mocap="true"><geom name="hand" size="0.1"/></body>'},
+        {"rest": '<option><flag energy="enable"/></option>'},
+    ],
+    ids=["two trees", "tendon", "equality", "mocap", "energy"],
+)
+def test_what_the_rules_do_not_know_has_no_fast_model(parts: dict[str, str]) -> None:
+    """The stock model steps it."""
+    assert _fast_model_of(_scene(**parts))[1] is None
+
+
+def test_pairs_of_the_model_stay_as_they_are() -> None:
+    """They have their own numbers, and the search adds others."""
+    pair = '<contact><pair geom1="shin" geom2="trunk" friction="2 2 0.1 0.1 0.1"/></contact>'
+    model, fast = _fast_model_of(_scene(rest=pair))
+    assert fast is not None
+    assert fast.npair == 1
+    assert _searches(fast)
+    _roll(model, fast, 400)
+
+
+def test_a_pendulum_touches_nothing() -> None:
+    """Where nothing can collide, nothing is looked for."""
+    env = InvertedPendulumEnv()
+    env.reset(seed=0)
+    env.step(np.zeros(1))
+    assert env._bound.stepping.opt.disableflags & _CONTACT
+
+
+def _stiff(spec: Any) -> None:
+    spec.joint("hip").stiffness = [20.0, 0.0, 0.0]
+
+
+def _stiffening(spec: Any) -> None:
+    """Only where it is bent."""
+    spec.joint("hip").stiffness = [0.0, 20.0, 0.0]
+
+
+def _rough(spec: Any) -> None:
+    spec.joint("hip").frictionloss = 0.2
+
+
+def _sensing(spec: Any) -> None:
+    spec.add_sensor(
+        type=mujoco.mjtSensor.mjSENS_JOINTPOS, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname="hip"
+    )
+
+
+@pytest.mark.parametrize(
+    ("add", "flag"),
+    [(_stiff, _SPRING), (_stiffening, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)],
+)
+def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
+    """A spring, friction and a sensor are felt as before."""
+    _, plain = _fast_model_of(_scene())
+    spec = _scene()
+    add(spec)
+    model, fast = _fast_model_of(spec)
+    assert plain is not None
+    assert fast is not None
+    assert plain.opt.disableflags & flag
+    assert not fast.opt.disableflags & flag
+    _roll(model, fast, 400)
+
+
+def test_without_dampers_the_springs_stay() -> None:
+    """Where MuJoCo is told to leave out both, it leaves out gravity compensation as well."""
+    spec = _scene()
+    spec.option.disableflags = _DAMPER
+    spec.body("shin").gravcomp = 1.0
+    model, fast = _fast_model_of(spec)
+    assert fast is not None
+    assert not fast.opt.disableflags & _SPRING
+    _roll(model, fast, 400)
+
+
+@pytest.mark.parametrize(("medium", "amount"), [("density", 1000.0), ("viscosity", 10.0)])
+@pytest.mark.parametrize("flags", [0, _DAMPER])
+def test_a_fluid_is_felt(medium: str, amount: float, flags: int) -> None:
+    """A density alone or a viscosity alone acts on the fast model as on the original."""
+    spec = _scene()
+    spec.option.disableflags = flags
+    setattr(spec.option, medium, amount)
+    model, fast = _fast_model_of(spec)
+    assert fast is not None
+    assert bool(fast.opt.disableflags & _SPRING) is not bool(flags)
+    assert getattr(fast.opt, medium) == amount
+    _roll(model, fast, 200)
+    dry, wet = mujoco.MjData(model), mujoco.MjData(model)
+    wet.qvel[0] = dry.qvel[0] = 3.0
+    mujoco.mj_step(fast, wet, 5)
+    setattr(model.opt, medium, 0.0)
+    mujoco.mj_step(model, dry, 5)
+    assert dry.qvel[0] > wet.qvel[0] + 1e-3
+
+
+def test_a_filter_of_contacts_is_obeyed() -> None:
+    """Explicit pairs would not ask it."""
+    mujoco.set_mjcb_contactfilter(lambda *_: 0)
+    try:
+        assert _fast_model_of(_scene(floor='friction="0.77 0.1 0.1"'))[1] is None
+    finally:
+        mujoco.set_mjcb_contactfilter(None)
+
+
+def test_a_wrong_margin_is_found_out() -> None:
+    """The test sees what the rules would have got wrong: here the larger margin, not the sum."""
+    ant = AntEnv()
+    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
+    assert moves_equally(ant.model, fast)
+    fast.pair_margin[:] = 0.01
+    assert not moves_equally(ant.model, fast)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda model: model.pair_friction.__setitem__((3, 0), 0.9),
+        lambda model: model.pair_solimp.__setitem__((12, 0), 0.89),
+        lambda model: model.pair_gap.__setitem__(5, 0.3),
+        lambda model: model.body_mass.__setitem__(4, 0.1),
+        lambda model: setattr(model.opt, "iterations", 1),
+        lambda model: setattr(model.opt, "jacobian", mujoco.mjtJacobian.mjJAC_SPARSE),
+    ],
+    ids=["friction", "impedance", "gap", "mass", "iterations", "sparse"],
+)
+def test_any_other_difference_is_found_out(change: Any) -> None:
+    """Of one pair, of one body, of the solver."""
+    ant = AntEnv()
+    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
+    change(fast)
+    assert not moves_equally(ant.model, fast)
+
+
+def test_a_fast_model_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not in the first steps of a body, unless another env has found it."""
+    monkeypatch.setattr(AntEnv, "patience", 3)
+    twin.forget_fast_models()
+    first, second = AntEnv(), AntEnv()
+    for env in (first, second):
+        env.reset(seed=0)
+        for step in range(5):
+            env.step(np.zeros(8))
+            assert env._bound.has_fast_model is (True if step >= 3 or env is second else None)
+
+
+def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one finds serves all, so their steps count together."""
+    monkeypatch.setattr(AntEnv, "patience", 6)
+    twin.forget_fast_models()
+    envs = [AntEnv(), AntEnv(), AntEnv()]
+    for env in envs:
+        env.reset(seed=0)
+    for step in range(4):
+        for env in envs:
+            env.step(np.zeros(8))
+            assert env._bound.has_fast_model is (True if step >= 2 else None)
+
+
+def test_fast_models_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A training with a new body in each episode must not grow."""
+    monkeypatch.setattr(twin, "_REMEMBERED", 2)
+    twin.forget_fast_models()
+    for friction in (0.3, 0.4, 0.5, 0.4):
+        assert _fast_model_of(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
+    assert len(twin._twins) == 2
+
+
+def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
+    """Both models give the same bits under random pushes."""
+    rng = np.random.default_rng(1)
+    one, two = mujoco.MjData(model), mujoco.MjData(model)
+    contacts = 0
+    for _ in range(steps):
+        one.ctrl[:] = two.ctrl[:] = rng.uniform(-1.0, 1.0, model.nu)
+        mujoco.mj_step(model, one)
+        mujoco.mj_step(fast, two)
+        mujoco.mj_rnePostConstraint(model, one)
+        mujoco.mj_rnePostConstraint(fast, two)
+        assert one.qpos.tobytes() == two.qpos.tobytes()
+        assert one.cfrc_ext.tobytes() == two.cfrc_ext.tobytes()
+        contacts += one.ncon
+    assert contacts > 50

@@ -1,0 +1,132 @@
+"""Joint and friction parameters, from simulated and measured motion."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+from shapechanger.bodies.finger import JOINTS, NOMINAL, FingerParameters
+from shapechanger.errors import MissingExtra
+from shapechanger.identify import FingerLog, motion
+from shapechanger.identify.kinematics import ARMS, Kinematics
+from shapechanger.identify.motion import (
+    FACTORS,
+    MOTOR_KG,
+    cut_windows,
+    fit_dynamics,
+    steps_per_period,
+    with_motors,
+)
+from shapechanger.identify.motors import Motors
+from tests.identify.logs import recorded
+
+ARM_SD_M = 2e-4
+
+
+@functools.cache
+def short() -> tuple[FingerLog, FingerParameters]:
+    """Two windows of a finger that is stiffer and less damped than the nominal one, and rubs."""
+    parameters = NOMINAL.replace(
+        joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
+        joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
+        tendon_friction=0.3,
+        command_delay=0.02,
+    )
+    return recorded(2.6, parameters=parameters)
+
+
+def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
+    """Kinematics as they would come out of the log without noise, or with other arms."""
+    log, _ = short()
+    count = int(ARMS.sum())
+    return Kinematics(
+        arms=arms,
+        arms_covariance=ARM_SD_M**2 * np.eye(count),
+        compliance=0.0,
+        compliance_sd=1e-9,
+        joint_noise=np.full(4, 1e-6),
+        length_noise=1e-6,
+        angles=log.angles,
+    )
+
+
+def motors(**changes: float) -> Motors:
+    """Motors as they would come out of the log."""
+    found = Motors(0.020, 0.022, 1.0, (1e-4, 1e-4, 0.0), saturates=False, tension_noise=0.0)
+    return dataclasses.replace(found, **changes)  # pyright: ignore[reportArgumentType]
+
+
+def test_joints_and_friction_are_found() -> None:
+    """Each parameter to 5 %, friction to 15 %, and the motion to half a degree."""
+    log, truth = short()
+    found = fit_dynamics(log, exact(), motors())
+    for name in ("joint_stiffness", "joint_damping"):
+        values = [found.values[f"{name}/{joint}"] for joint in JOINTS]
+        np.testing.assert_allclose(values, getattr(truth, name), rtol=0.05)
+    assert found.values["tendon_friction"] == pytest.approx(0.3, rel=0.15)
+    assert found.rms < np.radians(0.5)
+    assert set(found.sd) == set(FACTORS)
+    assert all(1e-3 < sd < 0.2 for sd in found.sd.values())
+    np.testing.assert_array_equal(found.arms, NOMINAL.arms)
+
+
+def test_arms_can_be_fitted_with_the_motion() -> None:
+    """Arms that are a standard error off come closer to the truth."""
+    log, _ = short()
+    rng = np.random.default_rng(1)
+    wrong = NOMINAL.arms.copy()
+    wrong[ARMS] += ARM_SD_M * rng.standard_normal(int(ARMS.sum()))
+    found = fit_dynamics(log, exact(wrong), motors(), 80, with_arms=True)
+    before = np.abs(wrong - NOMINAL.arms)[ARMS]
+    after = np.abs(found.arms - NOMINAL.arms)[ARMS]
+    assert np.sqrt(np.mean(after**2)) < 0.95 * np.sqrt(np.mean(before**2))
+    assert (found.arms[~ARMS] == 0.0).all()
+
+
+def test_windows_begin_in_the_measured_state() -> None:
+    """One second each, from 0.3 s on, with velocities and activations of their first row."""
+    log, _ = short()
+    dt = log.control_dt
+    windows = cut_windows(log, exact(), motors())
+    assert [window.start for window in windows] == pytest.approx(log.t[0] + [0.3, 1.3])
+    for window in windows:
+        row = round((window.start - log.t[0]) / dt)
+        np.testing.assert_array_equal(window.angles, log.angles[row : row + round(1.0 / dt) + 1])
+        ahead, back = log.angles[row + 1], log.angles[row - 1]
+        np.testing.assert_allclose(window.velocities, (ahead - back) / (2 * dt), atol=0.5)
+        assert np.corrcoef(window.velocities, (ahead - back) / (2 * dt))[0, 1] > 0.99
+        # Between the commands of the last rows, which act late and with a lag.
+        acting = log.commands[max(row - 4, 0) : row + 1]
+        assert (acting.min(axis=0) - 1e-3 <= window.activations).all()
+        assert (window.activations <= acting.max(axis=0) + 1e-3).all()
+    assert len(cut_windows(log, exact(), motors(), 80)) == 1
+    assert len(cut_windows(log, exact(), motors(), None, 0.5, 0.0)) == 5
+
+
+def test_control_periods_are_whole_numbers_of_steps() -> None:
+    """As few as possible, none longer than the model's step."""
+    assert steps_per_period(0.02, 0.002) == 10
+    assert steps_per_period(0.021, 0.002) == 11
+    assert steps_per_period(0.0005, 0.002) == 1
+
+
+def test_motors_are_those_known_or_else_those_found() -> None:
+    """Known motors give their range of tensions, mass and damping; the lag is always fitted."""
+    found = with_motors(motors(lag=0.03, strength=0.5), None)
+    assert found.motor_lag == 0.03
+    assert found.motor_kg == MOTOR_KG
+    np.testing.assert_allclose(found.most_tension, 0.5 * np.array(NOMINAL.most_tension))
+    known = NOMINAL.replace(
+        most_tension=(9.0,) * 7, least_tension=1.0, motor_kg=2.0, tendon_damping=70.0
+    )
+    assert with_motors(motors(lag=0.03, strength=0.5), known) == known.replace(motor_lag=0.03)
+
+
+def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without its dependencies, `mujoco.sysid` can be imported but is empty."""
+    monkeypatch.setattr(motion.importlib, "import_module", lambda name: object())
+    with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
+        fit_dynamics(short()[0], exact(), motors())

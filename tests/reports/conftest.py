@@ -1,0 +1,21 @@
+"""The study that most tests of the report look at."""
+
+from __future__ import annotations
+
+import pytest
+
+from shapechanger.reports.study import report_html
+from shapechanger.transfer.study import Study
+from tests.reports.studies import make_study
+
+
+@pytest.fixture(scope="session")
+def study() -> Study:
+    """A study in which transfer helps."""
+    return make_study(terms=("reward_forward", "reward_survive"))
+
+
+@pytest.fixture(scope="session")
+def page(study: Study) -> str:
+    """Its report."""
+    return report_html(study, picture_note="No picture can be drawn here.")

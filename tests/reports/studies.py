@@ -1,0 +1,160 @@
+"""Studies that nobody ran: curves are drawn from a seed, and everything else follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.methods import RunResult
+from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
+from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
+from shapechanger.transfer.study import Study
+
+STEPS = np.linspace(0, 10_240, 11)
+
+SETTINGS = PpoSettings(
+    n_envs=4,
+    n_steps=64,
+    batch_size=64,
+    n_epochs=2,
+    learning_rate=1e-3,
+    steps=10_240,
+    eval_every=1024,
+    eval_episodes=5,
+)
+
+
+def rising(
+    start: float, end: float, half: float, seeds: int = 5, noise: float = 20.0, seed: int = 0
+) -> NDArray[np.float64]:
+    """Curves from `start` to `end`, half way there after `half` steps, shape (seeds, 11)."""
+    rng = np.random.default_rng(seed)
+    way = 1.0 - 0.5 ** (STEPS / half)
+    return start + (end - start) * way + rng.normal(0.0, noise, (seeds, STEPS.size))
+
+
+def body_map() -> BodyMap:
+    """From a body with one leg to one with two, of which one is new; the tail has gone."""
+    source = ("torso/z", "leg_1/angle", "tail/angle")
+    target = ("torso/z", "leg_1/angle", "leg_2/angle")
+    return BodyMap.between(
+        Layout(tuple(Feature(name, "rad") for name in source)),
+        Layout(tuple(Feature(name, "rad") for name in target)),
+        Layout((Feature("leg_1/motor", "1", -1.0, 1.0), Feature("tail/motor", "1", -1.0, 1.0))),
+        Layout((Feature("leg_1/motor", "1", -1.0, 1.0), Feature("leg_2/motor", "1", -1.0, 1.0))),
+        rules={"leg_2/motor": "copy leg_1/motor"},
+    )
+
+
+def same_body() -> BodyMap:
+    """A body that only changes its masses."""
+    layout = Layout((Feature("hinge/angle", "rad"),))
+    return BodyMap.identity(layout, Layout((Feature("slide/motor", "1", -1.0, 1.0),)))
+
+
+def results(
+    kind: RunKind, returns: NDArray[np.float64], terms: Sequence[str] = ()
+) -> list[RunResult]:
+    """The runs of one kind, from returns of shape (seeds, evaluations)."""
+    return [
+        RunResult(
+            Run(kind, index),
+            seed=1000 + index,
+            curve=tuple(
+                Evaluation(
+                    int(steps),
+                    float(value),
+                    mean_length=100.0,
+                    terms={name: float(value) / len(terms) for name in terms},
+                )
+                for steps, value in zip(STEPS[: row.size], row, strict=True)
+            ),
+            wall_s=12.5,
+        )
+        for index, row in enumerate(returns)
+    ]
+
+
+def make_study(
+    *,
+    scratch: NDArray[np.float64] | None = None,
+    fine_tune: NDArray[np.float64] | None = None,
+    zero_shot: NDArray[np.float64] | None = None,
+    random: NDArray[np.float64] | None = None,
+    arms: tuple[Arm, ...] = ARMS,
+    source_steps: int = 2048,
+    given: bool = False,
+    terms: Sequence[str] = (),
+    source: EnvRef | None = None,
+    target: EnvRef | None = None,
+    the_map: BodyMap | None = None,
+    normalise: bool = False,
+    command: str = "shapechanger transfer Ant BigAnt --seeds 5",
+    shift: str = "pole: length 0.6 m -> 1.2 m (x2)",
+) -> Study:
+    """A study in which transfer helps, unless other curves are given."""
+    scratch = rising(0.0, 1000.0, 3000.0) if scratch is None else scratch
+    seeds = scratch.shape[0]
+    drawn: dict[RunKind, NDArray[np.float64]] = {
+        "source": rising(0.0, 1000.0, 2500.0, seeds, seed=1),
+        "random": np.linspace(5.0, 15.0, seeds)[:, np.newaxis] if random is None else random,
+        "scratch": scratch,
+        "zero-shot": (
+            np.linspace(350.0, 450.0, seeds)[:, np.newaxis] if zero_shot is None else zero_shot
+        ),
+        "fine-tune": (
+            rising(400.0, 1000.0, 1000.0, seeds, seed=2) if fine_tune is None else fine_tune
+        ),
+    }
+    wanted: list[RunKind] = [*([] if given else ["source"]), "random", *arms]
+    plan = Plan(
+        task=TransferTask(
+            source or EnvRef("shapechanger/Ant-v1"), target or EnvRef("shapechanger/BigAnt-v1")
+        ),
+        body_map=the_map or body_map(),
+        learner="ppo-balance",
+        settings=msgspec.structs.replace(SETTINGS, normalise=normalise),
+        steps=10_240,
+        source_steps=source_steps,
+        seeds=seeds,
+        arms=arms,
+        seed=7,
+        source_policy="ab" * 32 if given else "",
+        versions={"shapechanger": "0.1.0", "numpy": "2.4.0"},
+    )
+    return Study(
+        plan=plan,
+        command=command,
+        machine="Linux x86_64",
+        shift=shift,
+        runs=tuple(run for kind in wanted for run in results(kind, drawn[kind], terms)),
+        source_return=() if given else tuple(float(row[-1]) for row in drawn["source"]),
+        summaries=_summaries(plan, drawn),
+    )
+
+
+def _summaries(plan: Plan, drawn: dict[RunKind, NDArray[np.float64]]) -> dict[Arm, Summary]:
+    """The measures, with few resamples."""
+    scratch = LearningCurves(STEPS, drawn["scratch"])
+    reference = Reference.of(scratch, drawn["random"], plan.last_k)
+    return {
+        arm: summarise(
+            scratch,
+            LearningCurves(STEPS[: drawn[arm].shape[1]], drawn[arm]),
+            reference,
+            source_steps=plan.source_steps,
+            rng=np.random.default_rng(plan.seed),
+            last_k=plan.last_k,
+            n_resamples=300,
+        )
+        for arm in plan.arms
+        if arm != "scratch"
+    }

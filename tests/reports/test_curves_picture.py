@@ -1,0 +1,66 @@
+"""The learning curves as a drawing."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from shapechanger.reports.charts import Counting, learning_curves
+from shapechanger.transfer.study import Study
+from tests.reports.studies import make_study, rising
+
+COUNTINGS: tuple[Counting, ...] = ("target", "total")
+
+
+def same(level: float, seeds: int = 5) -> np.ndarray:
+    """Curves without any spread."""
+    return np.full((seeds, 11), level)
+
+
+STUDIES = {
+    "ten seeds": make_study(scratch=rising(0.0, 1000.0, 3000.0, seeds=10)),
+    "two seeds": make_study(scratch=rising(-9e5, -1e5, 3e3, seeds=2)),
+    "huge": make_study(
+        scratch=rising(0.0, 1e29, 3e3, noise=1e27), fine_tune=rising(1e28, 1e29, 1e3, noise=1e27)
+    ),
+    "flat": make_study(
+        scratch=same(0.0), fine_tune=same(0.0), zero_shot=same(0.0)[:, :1], random=same(0.0)[:, :1]
+    ),
+    "zero-shot only": make_study(arms=("scratch", "zero-shot")),
+    "long source": make_study(source_steps=51_200, given=True),
+    "no source steps": make_study(source_steps=0),
+}
+
+
+@pytest.mark.parametrize("counting", COUNTINGS)
+def test_the_same_study_gives_the_same_drawing(study: Study, counting: Counting) -> None:
+    """To the last byte, and without a date, so that reports can be compared."""
+    drawing = learning_curves(study, counting)
+    assert drawing == learning_curves(study, counting)
+    assert "<dc:date>" not in drawing
+    assert "<metadata>" not in drawing
+
+
+def test_the_settings_of_the_user_do_not_matter(study: Study) -> None:
+    """Whatever a matplotlibrc says, the drawing is ours, and the settings stay theirs."""
+    plain = learning_curves(study, "target")
+    with mpl.rc_context({"lines.linewidth": 9.0, "axes.facecolor": "black", "font.size": 4.0}):
+        assert learning_curves(study, "target") == plain
+        assert mpl.rcParams["font.size"] == 4.0
+
+
+def test_counting_moves_the_curves(study: Study) -> None:
+    """Two panels, two drawings."""
+    assert learning_curves(study, "target") != learning_curves(study, "total")
+
+
+@pytest.mark.parametrize("counting", COUNTINGS)
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_can_be_drawn(name: str, counting: Counting) -> None:
+    """Without a warning, as well-formed XML that scales with the page."""
+    root = ET.fromstring(learning_curves(STUDIES[name], counting))
+    assert root.tag.endswith("svg")
+    assert "viewBox" in root.attrib

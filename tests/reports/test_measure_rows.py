@@ -1,0 +1,151 @@
+"""The table of measures, against numbers worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.reports.numbers import estimate_text
+from shapechanger.reports.verdict import MeasureRow, arm_rows, measure_rows
+from shapechanger.transfer.metrics import DEFAULT_THRESHOLDS
+from shapechanger.transfer.study import Study
+from tests.reports.studies import STEPS, make_study, rising
+
+# Straight lines, so that areas and crossings can be read off. Scratch rises from 0 to 1000 in
+# 10,240 steps and then ends, on average, at the mean of its last three evaluations: 900.
+SLOPE = STEPS / STEPS[-1]
+
+
+def by_name(study: Study, arm: str) -> dict[str, MeasureRow]:
+    """The rows of one arm."""
+    return {row.measure: row for row in measure_rows(study) if row.arm == arm}
+
+
+@pytest.fixture(scope="module")
+def lines() -> Study:
+    """Two seeds each: scratch from 0 to 1000, fine-tune 450 above it; random is worth 0."""
+    return make_study(
+        scratch=np.array([1000.0 * SLOPE - 9.0, 1000.0 * SLOPE + 9.0]),
+        fine_tune=np.array([1000.0 * SLOPE + 450.0, 1000.0 * SLOPE + 450.0]),
+        zero_shot=np.array([[450.0], [450.0]]),
+        random=np.array([[-1.0], [1.0]]),
+        source_steps=1024,
+    )
+
+
+def test_gains_by_hand(lines: Study) -> None:
+    """450 of 900 is a gain of 0.5; s of scratch is 9 · sqrt(2), so 0.5 ± 12.706 · 9 / 900."""
+    rows = by_name(lines, "fine-tune")
+    for name in ("Jumpstart", "Total reward gain", "Asymptotic gain"):
+        assert rows[name].target == "+0.50 [+0.37, +0.63]"
+        assert rows[name].unit == "score"
+        assert rows[name].method == "Welch's t"
+    # In total steps scratch is read at step 1024, where it has come to 100.
+    assert rows["Jumpstart"].total == "+0.39 [+0.26, +0.52]"
+
+
+def test_times_by_hand(lines: Study) -> None:
+    """A score of 0.75 is 675: scratch is there after 675 / 1000 of 10,240 steps, 6,912."""
+    row = by_name(lines, "fine-tune")["Time to threshold 0.75: steps saved"]
+    # Fine-tune needs 225 more than its 450: 2,304 steps, or 3,328 with the source.
+    assert row.target.startswith("+4,608 [")
+    assert row.total.startswith("+3,584 [")
+    assert row.unit == "steps"
+    assert row.note == (
+        "Reached by 2 of 2 seeds of fine-tune after a mean of 2,304 steps; in total steps by 2 of "
+        "2 seeds after 3,328; by 2 of 2 seeds of scratch after 6,912."
+    )
+
+
+def test_runs_that_never_reach_it_are_noted() -> None:
+    """They count with the budget, and the note says which they are."""
+    study = make_study(fine_tune=rising(0.0, 300.0, 1000.0, seed=2))
+    note = by_name(study, "fine-tune")["Time to threshold 0.9: steps saved"].note
+    assert "0 of 5 seeds of fine-tune after a mean of 10,240 steps" in note
+    assert note.endswith("Runs that did not reach it count as 10,240.")
+
+
+def test_every_arm_has_every_measure(study: Study) -> None:
+    """Five measures and one row for each threshold, in the order of the plan."""
+    rows = measure_rows(study)
+    assert [row.arm for row in rows] == ["zero-shot"] * 9 + ["fine-tune"] * 9
+    names = [row.measure for row in rows[:9]]
+    assert names[:3] == ["Jumpstart", "Total reward gain", "Asymptotic gain"]
+    assert names[3:5] == ["auc_ratio", "Forward transfer"]
+    assert names[5:] == [f"Time to threshold {t:g}: steps saved" for t in DEFAULT_THRESHOLDS]
+
+
+def test_rows_say_what_the_summary_says(study: Study) -> None:
+    """The text is that of the estimates, both ways of counting in their own column."""
+    summary = study.summaries["fine-tune"]
+    rows = by_name(study, "fine-tune")
+    ratio = rows["auc_ratio"]
+    assert ratio.target == estimate_text(summary.in_target_steps.auc_ratio)
+    assert ratio.total == estimate_text(summary.in_total_steps.auc_ratio)
+    assert not ratio.target.startswith("+")
+    assert ratio.unit == rows["Forward transfer"].unit == "pure number"
+    assert ratio.method == summary.in_target_steps.auc_ratio.method
+
+
+def test_what_is_undefined_says_why() -> None:
+    """Zero-shot spans no area; without a score there is no ratio."""
+    rows = by_name(make_study(arms=("scratch", "zero-shot")), "zero-shot")
+    assert rows["auc_ratio"].target == rows["auc_ratio"].total == "undefined"
+    assert rows["auc_ratio"].method == "none"
+    assert rows["auc_ratio"].note.startswith("Undefined: it needs a learning curve")
+    not_learnt = make_study(scratch=rising(-50.0, -50.0, 1e3))
+    rows = by_name(not_learnt, "fine-tune")
+    assert rows["Jumpstart"].unit == "return"
+    assert "there is no score" in rows["Time to threshold 0.5: steps saved"].note
+
+
+def test_notes_of_one_way_of_counting_say_which() -> None:
+    """With the whole budget spent on the source, only the ratio in target steps has an interval."""
+    row = by_name(make_study(source_steps=10_240), "fine-tune")["auc_ratio"]
+    assert row.total == "0 (no interval)"
+    assert row.method.endswith("/ none")
+    assert row.note.startswith("In total steps: No interval")
+
+
+def test_arms_by_hand(lines: Study) -> None:
+    """Final is the mean of the last three evaluations: 800, 900 and 1000."""
+    rows = {row.kind: row for row in arm_rows(lines)}
+    assert list(rows) == ["source", "random", "scratch", "zero-shot", "fine-tune"]
+    scratch = rows["scratch"]
+    assert scratch.seeds == 2
+    assert scratch.per_seed == "891.0; 909.0"
+    assert scratch.final_return == "900 [786, 1,014]"
+    assert scratch.first_return == "0 [-114, 114]"
+    assert scratch.length == "100"
+    # The best run ends at 1350, so good is 1215 and more.
+    assert scratch.good == "0 of 2"
+    assert rows["fine-tune"].good == "2 of 2"
+    assert rows["source"].good == ""
+    assert scratch.terms == {}
+
+
+def test_the_source_ends_with_the_policy_that_is_moved(study: Study) -> None:
+    """That is its last evaluation, not a mean of several."""
+    row = next(row for row in arm_rows(study) if row.kind == "source")
+    assert [float(text) for text in row.per_seed.split("; ")] == pytest.approx(
+        study.source_return, abs=0.1
+    )
+
+
+def test_reward_terms_are_means_of_the_end(study: Study) -> None:
+    """Each synthetic term is half of the return."""
+    rows = {row.kind: row for row in arm_rows(study)}
+    assert set(rows["zero-shot"].terms) == {"reward_forward", "reward_survive"}
+    assert rows["zero-shot"].terms["reward_forward"] == pytest.approx(200.0)
+
+
+def test_nobody_is_good_where_nobody_beats_the_random_policy() -> None:
+    """There is no way from the random policy to the best, so no share of it."""
+    low = rising(-900.0, -900.0, 1e3)
+    study = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
+    assert {row.good for row in arm_rows(study)} == {""}
+
+
+def test_a_given_policy_has_no_source_row() -> None:
+    """Its runs are not part of the study."""
+    assert "source" not in [row.kind for row in arm_rows(make_study(given=True))]

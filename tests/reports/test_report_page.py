@@ -1,0 +1,269 @@
+"""The page: all that it must say, and nothing that it must not do."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import imageio.v3 as imageio
+import numpy as np
+import pytest
+
+from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.reports.page import png
+from shapechanger.reports.study import report_html, write_report
+from shapechanger.reports.verdict import measure_rows, verdict
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.study import Study
+from tests.reports.studies import make_study, rising, same_body
+
+EVIL = "<script>alert(1)</script>&\"'"
+VOID = {"meta", "img"}
+
+
+class Reader(HTMLParser):
+    """Reads a page as a browser would, and complains where a browser would guess.
+
+    Attributes:
+        words: The text of the page, its spaces squeezed.
+        attributes: Every attribute with its value.
+        headings: The text of the headings h1 and h2.
+        ids: The ids.
+        folded: How many elements are folded in.
+    """
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self._open: list[str] = []
+        self._pieces: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.headings: list[str] = []
+        self.tags: list[str] = []
+        self.feed(page)
+        self.close()
+        assert self._open == []
+        self.words = " ".join(" ".join(self._pieces).split())
+        self.ids = [value for name, value in self.attributes if name == "id"]
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Remember an element."""
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+        if tag not in VOID:
+            self._open.append(tag)
+        if tag in {"h1", "h2"}:
+            self.headings.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        """See that what ends is what began last."""
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Remember text."""
+        if self._open and self._open[-1] != "style":
+            self._pieces.append(data)
+        if self._open and self._open[-1] in {"h1", "h2"}:
+            self.headings[-1] += data
+
+
+def test_sections_come_in_order(page: str) -> None:
+    """From the verdict to the provenance."""
+    read = Reader(page)
+    assert read.headings == [
+        "Ant-v1 → BigAnt-v1",
+        "The two bodies",
+        "Learning curves on the target",
+        "Measures",
+        "Arms",
+        "What changes from source to target",
+        "Body map",
+        "Learner",
+        "Provenance",
+    ]
+    assert len(set(read.ids)) == len(read.ids) == 8
+
+
+def test_the_page_needs_nothing_else(page: str) -> None:
+    """No script, no other file, no server: what is drawn comes as data."""
+    read = Reader(page)
+    assert {"script", "link", "iframe", "object"}.isdisjoint(read.tags)
+    sources = [value for name, value in read.attributes if name in {"src", "href", "srcset"}]
+    assert len(sources) == 2
+    assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
+    assert "url(" not in page
+    assert "@import" not in page
+    assert "http://" not in page
+    assert "https://" not in page
+
+
+def test_the_numbers_are_those_of_the_table(study: Study, page: str) -> None:
+    """One formatting, two places: a terminal and a page never disagree."""
+    read = Reader(page)
+    assert verdict(study) in read.words
+    for row in measure_rows(study):
+        assert row.note in read.words
+        cells = (row.measure, row.target, row.total, row.unit, row.method)
+        assert (" ".join(cells) in read.words) == (row.target != "undefined")
+
+
+def test_the_page_says_how_it_was_made(page: str) -> None:
+    """Enough to judge the numbers, and to make them again."""
+    read = Reader(page)
+    for words in (
+        "over training seeds, never over episodes",
+        "Welch",
+        "Taylor & Stone, JMLR 10, 2009",
+        "Continual World, NeurIPS 2021",
+        "(return - random) / (final - random)",
+        "random = 10 is the mean return of the random policy",
+        "ppo-balance",
+        "learning_rate 0.001",
+        "shapechanger transfer Ant BigAnt --seeds 5",
+        "7, from which the seeds of all runs are drawn",
+        "shapechanger 0.1.0, numpy 2.4.0",
+        "Linux x86_64",
+        "5.2 min for all runs together",
+        "fine-tune-4 1004 10,240 11 12.5 s",
+        "pole: length 0.6 m -> 1.2 m (x2)",
+        "5 trained by the study, one for each seed",
+    ):
+        assert words in read.words
+
+
+def test_the_body_map_is_told(page: str) -> None:
+    """Partners are counted and folded in; what has none, on either side, is listed."""
+    read = Reader(page)
+    for words in (
+        "2 of 3 source observations and 1 of 2 target actions",
+        "observation: tail/angle zero default",
+        "action: leg_2/motor leg_1/motor rule 'leg_2/motor'",
+        "does not see: leg_2/angle.",
+        "move nothing in the target: tail/motor.",
+        "The 3 entries with a partner of the same name",
+    ):
+        assert words in read.words
+    assert read.tags.count("details") == 3
+
+
+def test_bodies_that_match_have_no_list_of_strangers() -> None:
+    """The page says that all is well instead of showing an empty table."""
+    read = Reader(report_html(make_study(the_map=same_body())))
+    assert "Every entry has such a partner." in read.words
+    assert "does not see" not in read.words
+
+
+def test_one_action_is_singular() -> None:
+    """A pendulum has one motor."""
+    pictures = (np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3), np.uint8))
+    read = Reader(report_html(make_study(the_map=same_body()), pictures))
+    assert "Target: BigAnt-v1, 1 observation, 1 action" in read.words
+
+
+def test_reward_terms_show_what_a_return_is_made_of(page: str) -> None:
+    """One column for each kind of run."""
+    assert "forward 469.4 5 440.3 200 502.3" in Reader(page).words
+    assert "Reward terms" not in Reader(report_html(make_study())).words
+
+
+def test_names_cannot_break_the_page() -> None:
+    """Whatever an env, a term, a command or a certificate is called, it is text."""
+    study = make_study(
+        source=EnvRef("evil/" + EVIL, {"body": EVIL * 9}),
+        command=EVIL,
+        shift=EVIL,
+        terms=("reward_" + EVIL,),
+    )
+    page = report_html(study, picture_note=EVIL)
+    read = Reader(page)
+    assert "<script" not in page
+    assert "script" not in read.tags
+    assert read.words.count("alert(1)") >= 13
+    assert "…) → BigAnt-v1" in read.headings[0]
+    assert len(read.headings[0]) < 100
+
+
+def test_pictures_are_in_the_page(study: Study) -> None:
+    """Without loss, with their size, and with words for who cannot see them."""
+    pictures = (
+        np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8),
+        np.zeros((6, 8, 3), np.uint8)[:, ::-1],
+    )
+    page = report_html(study, pictures, "To one scale.")
+    found = re.findall(r'src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page)
+    assert [alternative for _, alternative in found] == [
+        "The body of shapechanger/Ant-v1",
+        "The body of shapechanger/BigAnt-v1",
+    ]
+    for (encoded, _), picture in zip(found, pictures, strict=True):
+        decoded = imageio.imread(io.BytesIO(base64.b64decode(encoded)), extension=".png")
+        np.testing.assert_array_equal(decoded, picture)
+    read = Reader(page)
+    assert "Source: Ant-v1, 3 observations, 2 actions" in read.words
+    assert "To one scale." in read.words
+
+
+def test_a_png_is_the_same_every_time() -> None:
+    """So that two reports of one study are one file."""
+    picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    assert png(picture) == png(picture.copy())
+
+
+def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
+    """In the words given, or at least that there are none."""
+    assert "No picture can be drawn here." in Reader(page).words
+    assert "There are no pictures." in Reader(report_html(study)).words
+
+
+@pytest.mark.parametrize(
+    ("study", "words"),
+    [
+        (make_study(given=True), "given, SHA-256 abababab"),
+        (make_study(arms=("scratch", "zero-shot")), "Zero-shot against scratch"),
+        (make_study(scratch=rising(-50.0, -50.0, 1e3)), "There are no scores: scratch ended at"),
+        (make_study(scratch=rising(-9e6, -1e5, 3e3, seeds=2)), "With 2 seeds"),
+        (make_study(scratch=rising(0.0, 1e20, 3e3, seeds=10)), "e19 [8."),
+        (make_study(shift=""), "The envs publish no certificate"),
+        (make_study(command=""), "called from Python"),
+    ],
+    ids=["given policy", "zero-shot", "not learnt", "two seeds", "huge", "no shift", "no command"],
+)
+def test_whatever_is_missing_is_said(study: Study, words: str) -> None:
+    """The page is whole in each case, and nowhere shows a hole of the program."""
+    read = Reader(report_html(study))
+    assert words in read.words
+    assert re.search(r"\b(nan|inf|None|undefined \[)\b", read.words) is None
+
+
+def test_normalisation_is_told() -> None:
+    """A reader must know whether returns are what the env gave: they always are."""
+    assert "reach the learner as they are" in Reader(report_html(make_study())).words
+    normal = Reader(report_html(make_study(normalise=True))).words
+    assert "Returns in this report never are." in normal
+
+
+def test_the_file_is_written(study: Study, tmp_path: Path) -> None:
+    """The same bytes each time, as UTF-8."""
+    path = tmp_path / "report.html"
+    write_report(study, path)
+    assert path.read_text("utf-8") == report_html(study)
+    with pytest.raises(OutputError, match="missing"):
+        write_report(study, tmp_path / "missing" / "report.html")
+
+
+def test_without_matplotlib_the_extra_is_named(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows and verdict do without it; the page says what to install, and nothing is written."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.delitem(sys.modules, "shapechanger.reports.charts", raising=False)
+    assert measure_rows(study)
+    assert verdict(study)
+    with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):
+        write_report(study, tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,191 @@
+"""Camera thread of the daemon: only valid, new frames are passed on."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from tests.robot.daemon.fakes import FakeCamera
+from tests.robot.daemon.plans import SIZE, picture
+
+NOW_NS = 10_000_000_000
+
+
+class Watched:
+    """A reader of a fake camera, and everything that came of it."""
+
+    def __init__(self, camera: FakeCamera) -> None:
+        self.frames: list[Frame] = []
+        self.reports: list[str] = []
+        self._changed = threading.Condition()
+        checks = FrameChecks(SIZE, lambda: NOW_NS)
+        plan = CameraPlan("pattern", SIZE, fps=500.0)
+        self.reader = FrameReader(plan, checks, self._frame, self._report, camera.open)
+        self.reader.start()
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until something holds."""
+        with self._changed:
+            assert self._changed.wait_for(condition, 20.0), (self.frames, self.reports)
+
+    def _frame(self, frame: Frame) -> None:
+        with self._changed:
+            self.frames.append(frame)
+            self._changed.notify()
+
+    def _report(self, text: str) -> None:
+        with self._changed:
+            self.reports.append(text)
+            self._changed.notify()
+
+
+@pytest.fixture
+def camera() -> FakeCamera:
+    """A camera that gives what is put in."""
+    return FakeCamera()
+
+
+@pytest.fixture
+def watched(camera: FakeCamera) -> Iterator[Watched]:
+    """A reader of it."""
+    watched = Watched(camera)
+    yield watched
+    watched.reader.close()
+
+
+def test_good_and_new_pictures_pass() -> None:
+    """As they are."""
+    checks = FrameChecks(SIZE, lambda: NOW_NS)
+    assert checks.refusal(Frame(picture(1), 1)) == ""
+    assert checks.refusal(Frame(picture(2), 2)) == ""
+
+
+GOOD = picture(3)
+
+
+@pytest.mark.parametrize(
+    ("jpeg", "captured_ns", "words"),
+    [
+        (b"", 2, "no whole JPEG"),
+        (b"garbage" * 100, 2, "no whole JPEG"),
+        (GOOD[: len(GOOD) // 2], 2, "no whole JPEG"),
+        (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "Corrupt|Premature|JPEG"),
+        (picture(3, (80, 64)), 2, "80 by 64 pixels"),
+        (picture(1), 2, "same frame"),
+        (GOOD, 1, "older than the one before"),
+        (GOOD, NOW_NS + 60_000_000, "from the future"),
+    ],
+)
+def test_bad_pictures_do_not(jpeg: bytes, captured_ns: int, words: str) -> None:
+    """In words; and they do not move the time of what was seen last."""
+    checks = FrameChecks(SIZE, lambda: NOW_NS)
+    assert checks.refusal(Frame(picture(1), 1)) == ""
+    refusal = checks.refusal(Frame(jpeg, captured_ns))
+    assert any(word in refusal for word in words.split("|"))
+    assert checks.refusal(Frame(picture(4), 3)) == ""
+
+
+def test_a_camera_that_freezes_gives_nothing_and_says_so_once(
+    camera: FakeCamera, watched: Watched
+) -> None:
+    """New times on an old picture fool nobody; a new picture mends it."""
+    for at in range(1, 6):
+        camera.put(Frame(picture(1), at))
+    camera.put(Frame(picture(2), 6))
+    watched.until(lambda: len(watched.reports) == 2)
+    assert [frame.captured_ns for frame in watched.frames] == [1, 6]
+    assert "same frame" in watched.reports[0]
+    assert "again" in watched.reports[1]
+    assert watched.reader.errors == 4
+
+
+def test_a_camera_that_fails_is_opened_again(camera: FakeCamera, watched: Watched) -> None:
+    """After a pause, and in words."""
+    camera.put(Frame(picture(1), 1))
+    camera.fail("The camera was unplugged.")
+    camera.put(Frame(picture(2), 2))
+    watched.until(lambda: len(watched.frames) == 2 and len(watched.reports) == 2)
+    assert watched.reports == ["The camera was unplugged.", "The camera works again."]
+
+
+def test_a_camera_that_cannot_be_opened_is_tried_again(
+    camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot serves without a picture until there is one."""
+    opens: list[int] = []
+
+    def reluctant(plan: CameraPlan) -> FakeCamera:
+        opens.append(1)
+        if len(opens) == 1:
+            raise RobotError("No camera is connected.")
+        return camera
+
+    monkeypatch.setattr(camera, "open", reluctant)
+    watched = Watched(camera)
+    camera.put(Frame(picture(1), 1))
+    watched.until(lambda: len(watched.frames) == 1)
+    assert watched.reports[0] == "No camera is connected."
+    watched.reader.close()
+
+
+def test_garbage_without_end_opens_the_camera_again(camera: FakeCamera, watched: Watched) -> None:
+    """Ten bad pictures in a row, and it is worth a try."""
+    for at in range(10):
+        camera.put(Frame(b"garbage", at))
+    camera.put(Frame(picture(1), 100))
+    watched.until(lambda: len(watched.frames) == 1)
+    assert camera.opened == 2
+    assert len([text for text in watched.reports if "no whole JPEG" in text]) == 1
+
+
+def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
+    """A camera that hangs must not keep the daemon from ending."""
+    watched.reader.close()
+    assert not watched.reader._thread.is_alive()
+    assert watched.reports == []
+
+
+@given(moves=st.lists(st.booleans(), max_size=60))
+def test_the_mailbox_gives_only_the_newest_item_and_only_once(moves: list[bool]) -> None:
+    """In any order of puts and takes; the items that come out only rise."""
+    box: Latest[int] = Latest()
+    waiting: int | None = None
+    taken: list[int] = []
+    for number, put in enumerate(moves):
+        if put:
+            box.put(number)
+            waiting = number
+        else:
+            got = box.take()
+            assert got == waiting
+            waiting = None
+            if got is not None:
+                taken.append(got)
+    assert taken == sorted(set(taken))
+
+
+def test_two_threads_never_take_an_item_twice() -> None:
+    """One thread puts and one takes: numbers rise, and the last one is not lost."""
+    box: Latest[int] = Latest()
+    last = 20_000
+
+    def put() -> None:
+        for number in range(last + 1):
+            box.put(number)
+
+    writer = threading.Thread(target=put)
+    writer.start()
+    taken: list[int] = []
+    while not taken or taken[-1] != last:
+        got = box.take()
+        if got is not None:
+            taken.append(got)
+    writer.join()
+    assert taken == sorted(set(taken))

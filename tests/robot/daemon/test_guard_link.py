@@ -1,0 +1,102 @@
+"""The daemon's end of the socket to the guard."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from shapechanger.robot.daemon.guard_link import GuardLink
+from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from tests.robot.daemon.plans import guard_state
+from tests.robot.daemon.running import until
+
+pytestmark = pytest.mark.realtime
+
+
+class Ends:
+    """Both ends, and what was called."""
+
+    def __init__(self) -> None:
+        self.guard, daemon = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.guard.setblocking(False)
+        self.states: list[GuardState] = []
+        self.lost: list[bool] = []
+        self.port = GuardLink(daemon.detach(), self.states.append, lambda: self.lost.append(True))
+
+    def heard(self) -> list[Order]:
+        """All orders that the guard can read now."""
+        orders: list[Order] = []
+        while True:
+            try:
+                orders.append(decode_order(self.guard.recv(MAX_DATAGRAM)))
+            except BlockingIOError:
+                return orders
+
+
+@pytest.fixture
+def ends() -> Iterator[Ends]:
+    """Both ends."""
+    ends = Ends()
+    yield ends
+    ends.port.close()
+    ends.guard.close()
+
+
+def test_states_come_in_order_and_nonsense_is_left_out(ends: Ends) -> None:
+    """A datagram that is no state costs only itself."""
+    ends.guard.send(encode(guard_state(at_ns=1)))
+    ends.guard.send(b"nonsense")
+    ends.guard.send(b'{"at_ns": 3}')
+    ends.guard.send(encode(guard_state(at_ns=4)))
+    ends.port.drain()
+    assert [state.at_ns for state in ends.states] == [1, 4]
+
+
+def test_a_guard_that_is_gone_is_noticed_once(ends: Ends) -> None:
+    """By its end of the socket; orders then go nowhere."""
+    ends.guard.close()
+    ends.port.drain()
+    ends.port.drain()
+    ends.port.send(Order(kind="disarm"))
+    assert ends.lost == [True]
+
+
+def test_a_guard_that_is_gone_is_noticed_when_it_is_spoken_to(ends: Ends) -> None:
+    """Whichever comes first."""
+    ends.guard.close()
+    ends.port.send(Order(kind="command"))
+    assert ends.lost == [True]
+
+
+def test_to_a_guard_that_does_not_read_stops_are_kept_and_commands_are_not(ends: Ends) -> None:
+    """What it reads later is a stop, and no command that piled up behind it."""
+
+    async def play() -> list[Order]:
+        ends.port.attach(asyncio.get_running_loop())
+        for seq in range(5_000):
+            ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
+        before = [order.seq for order in ends.heard()]
+        assert before == list(range(len(before)))
+        assert len(before) < 5_000
+        for seq in range(5_000, 10_000):
+            ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
+        for _ in range(3):
+            ends.port.send(Order(kind="disarm", reason="gone"))
+            ends.port.send(Order(kind="emergency", reason="stop"))
+            ends.port.send(Order(kind="halt"))
+            ends.port.send(Order(kind="arm"))
+        heard: list[Order] = []
+
+        def stopped() -> bool:
+            heard.extend(ends.heard())
+            return [order.kind for order in heard[-3:]] == ["disarm", "emergency", "halt"]
+
+        await until(stopped, "all stops have arrived")
+        return heard
+
+    heard = asyncio.run(play())
+    assert {order.kind for order in heard[:-3]} == {"command"}
+    assert heard[-4].seq < 9_999

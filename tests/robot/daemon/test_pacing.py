@@ -1,0 +1,166 @@
+"""When a client gets its next observation."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from shapechanger.link.messages import Acknowledge, Command, Observation
+from shapechanger.robot.daemon.plan import DaemonPlan
+from tests.robot.daemon.fakes import SteppedClock
+from tests.robot.daemon.plans import car_plan, picture
+from tests.robot.daemon.running import Running, running, until
+
+pytestmark = pytest.mark.realtime
+
+
+def play(
+    script: Callable[[Running], Awaitable[None]],
+    monkeypatch: pytest.MonkeyPatch,
+    plan: DaemonPlan,
+    clock: SteppedClock | None = None,
+) -> None:
+    """Run a script with a daemon."""
+
+    async def whole() -> None:
+        async with running(plan, monkeypatch, clock) as robot:
+            if clock is not None:
+                clock.tick = robot.guard.tick
+            await script(robot)
+
+    asyncio.run(whole())
+
+
+STEPPED = car_plan(clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone", camera=None)
+
+
+def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time moves by exactly that, and an order that is no command takes one tick of the guard."""
+    clock = SteppedClock()
+
+    async def script(robot: Running) -> None:
+        async with robot.client(pace="lockstep") as client:
+            await client.take()
+            await robot.arm(client)
+            seen = await client.observe()
+            assert clock.steps == [0.05, 0.01, 0.05]
+            assert seen.armed
+            for seq in range(1, 50):
+                before_ns = clock.ns
+                await client.say(Command(seq=seq, answers=seen.seq, values=(0.0, 0.5)))
+                seen = await client.expect(Observation)
+                assert seen.state_ns == clock.ns == before_ns + 50_000_000
+                assert seen.applied_seq == seq
+                assert seen.command_ns == before_ns
+        await until(lambda: robot.guard.kinds()[-1] == "disarm", "it is disarmed")
+
+    play(script, monkeypatch, STEPPED, clock)
+
+
+def test_lockstep_waits_for_the_picture_of_that_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long the camera's driver takes with it."""
+    clock = SteppedClock()
+
+    async def script(robot: Running) -> None:
+        def tick() -> None:
+            robot.guard.tick()
+            clock.captured_ns = clock.ns
+            asyncio.get_running_loop().call_later(0.02, robot.show)
+
+        clock.tick = tick
+        async with robot.client(pace="lockstep") as client:
+            for _ in range(5):
+                seen = await client.observe()
+                assert seen.frame is not None
+                assert seen.captured_ns == clock.ns
+
+    play(script, monkeypatch, car_plan(clock="twin"), clock)
+
+
+def test_time_in_steps_belongs_to_who_commands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody who watches does not make it go faster."""
+    clock = SteppedClock()
+
+    async def script(robot: Running) -> None:
+        async with robot.client(pace="lockstep") as driver, robot.client() as watcher:
+            await driver.take()
+            seen = await driver.observe()
+            stood_ns = clock.ns
+            for _ in range(3):
+                assert (await watcher.observe()).sent_ns == stood_ns
+            await driver.say(Command(seq=1, answers=seen.seq, values=(0.0, 0.0)))
+            await driver.expect(Observation)
+            assert clock.ns == stood_ns + 50_000_000
+
+    play(script, monkeypatch, STEPPED, clock)
+
+
+def test_lockstep_faster_than_the_rate_of_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thousand steps are no flood, since the robot keeps the pace."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client(pace="lockstep") as client:
+            for _ in range(1_000):
+                await client.observe()
+
+    play(script, monkeypatch, STEPPED, SteppedClock())
+
+
+def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many acknowledgements are one credit, and pictures in between are left out."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            robot.show()
+            seen = await client.observe()
+            while seen.frame_seq != 1:
+                seen = await client.observe()
+            for _ in range(5):
+                robot.show()
+            async with robot.client() as other:
+                while (newest := await other.observe()).frame != picture(6):
+                    pass
+            for _ in range(3):
+                await client.say(Acknowledge())
+            assert (await client.expect(Observation)).frame_seq == newest.frame_seq
+            pending = [message for message in client.heard if isinstance(message, Observation)]
+            assert pending[-1].seq == seen.seq + 1
+
+    play(script, monkeypatch, car_plan())
+
+
+def test_without_pictures_observations_come_once_a_period(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However fast the client asks."""
+
+    async def script(robot: Running) -> None:
+        async with robot.client() as client:
+            first = await client.observe()
+            for _ in range(10):
+                last = await client.observe()
+            assert last.sent_ns - first.sent_ns >= 0.95 * 10 * 20_000_000
+
+    play(script, monkeypatch, car_plan(control_hz=50.0, camera=None))
+
+
+def test_a_camera_that_freezes_keeps_its_old_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The guard and the client learn how old the picture is; the robot goes blind."""
+
+    async def script(robot: Running) -> None:
+        robot.show()
+        async with robot.client(role="person") as client:
+            await robot.armed(client)
+            seen = await client.observe()
+            while seen.frame_seq != 1:
+                seen = await client.observe()
+            robot.pictures = 0
+            robot.show()  # The same picture with a new time.
+            for seq in range(1, 6):
+                after = await client.drive(seq, 0.0, 0.5)
+                assert (after.frame, after.captured_ns) == (None, seen.captured_ns)
+                assert robot.guard.orders[-1].frame_ns == seen.captured_ns
+
+    play(script, monkeypatch, car_plan(control_hz=100.0))

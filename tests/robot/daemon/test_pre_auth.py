@@ -1,0 +1,132 @@
+"""Limits before authentication: a new connection finds room, and a silent one is dropped."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.robot.daemon.pre_auth import PreAuthConnections
+
+pytestmark = pytest.mark.realtime
+
+
+@dataclass
+class Fake:
+    """A socket that counts how often it is dropped."""
+
+    address: str
+    is_gone: bool = False
+    dropped: int = 0
+
+    def drop(self) -> None:
+        """Count the call."""
+        self.dropped += 1
+
+
+def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
+    """Connections of other addresses stay."""
+
+    async def play() -> None:
+        connections = PreAuthConnections(max_total=10, max_per_address=2)
+        friend, crowd = Fake("a"), [Fake("b") for _ in range(5)]
+        for number, sock in enumerate([friend, *crowd]):
+            connections.add(number, sock)
+        assert [sock.dropped for sock in crowd] == [1, 1, 1, 0, 0]
+        assert friend.dropped == 0
+
+    asyncio.run(play())
+
+
+def test_a_crowd_of_one_address_costs_only_itself() -> None:
+    """A full set drops from the address with the most connections."""
+
+    async def play() -> None:
+        connections = PreAuthConnections(max_total=4, max_per_address=4)
+        crowd, friend = [Fake("b") for _ in range(4)], Fake("a")
+        for number, sock in enumerate([*crowd, friend]):
+            connections.add(number, sock)
+        assert [sock.dropped for sock in crowd] == [1, 0, 0, 0]
+        connections.drop_one()
+        assert [sock.dropped for sock in crowd] == [1, 1, 0, 0]
+        assert friend.dropped == 0
+
+    asyncio.run(play())
+
+
+def test_a_served_request_restarts_the_timeout() -> None:
+    """A browser loads the console in many requests over the same sockets."""
+
+    async def play() -> None:
+        connections = PreAuthConnections(max_total=2, max_per_address=2, timeout_s=0.05)
+        page, silent = Fake("a"), Fake("a")
+        for sock in (page, silent):
+            connections.add(id(sock), sock)
+        async with asyncio.timeout(20.0):
+            while not silent.dropped:
+                connections.renew(id(page))
+                await asyncio.sleep(0.002)
+        assert not page.dropped
+        connections.add("next", Fake("a"))
+        connections.renew(id(page))
+        connections.add("newest", Fake("a"))
+        assert not page.dropped
+        connections.renew("gone")
+        connections.close()
+        assert page.dropped == 1
+
+    asyncio.run(play())
+
+
+def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
+    """A connection that opened the link, authenticated or ended is not."""
+
+    async def play() -> None:
+        connections = PreAuthConnections(timeout_s=0.01)
+        silent, asks, known = Fake("a"), Fake("a"), Fake("a")
+        for sock in (silent, asks, known):
+            connections.add(id(sock), sock)
+        connections.stop_timer(id(asks))
+        connections.remove(id(known))
+        async with asyncio.timeout(20.0):
+            while not silent.dropped:
+                await asyncio.sleep(0.002)
+        assert len(connections) == 1
+        connections.close()
+        assert [sock.dropped for sock in (silent, asks, known)] == [1, 1, 0]
+
+    asyncio.run(play())
+
+
+@given(
+    arrivals=st.lists(st.tuples(st.sampled_from("abcd"), st.booleans()), max_size=40),
+    max_total=st.integers(1, 6),
+    max_per_address=st.integers(1, 4),
+)
+def test_a_new_connection_always_fits_and_the_limits_hold(
+    arrivals: list[tuple[str, bool]], max_total: int, max_per_address: int
+) -> None:
+    """A new connection stays until the next one; a closed one counts no more."""
+
+    async def play() -> None:
+        connections = PreAuthConnections(max_total, max_per_address)
+        sockets: list[Fake] = []
+        for number, (address, goes) in enumerate(arrivals):
+            here = [v for v in sockets if not v.dropped and not v.is_gone]
+            sock = Fake(address)
+            connections.add(number, sock)
+            sockets.append(sock)
+            left = [v for v in here if v.dropped]
+            same = [v for v in here if v.address == address]
+            assert not sock.dropped
+            assert len(left) == (len(here) >= max_total or len(same) >= max_per_address)
+            assert len(connections) <= max_total
+            assert all(v.dropped <= 1 for v in sockets)
+            sock.is_gone = goes
+        connections.close()
+        assert len(connections) == 0
+
+    asyncio.run(play())

@@ -1,0 +1,256 @@
+"""The thread that writes: what it takes, it writes; a disk that is too slow ends the episode."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.demos.episodes import EpisodeHeader, Step, episodes_of, read_episode, repair
+from shapechanger.link.messages import Observation
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.control import ClientIdentity
+from shapechanger.robot.daemon.observation import NumberedFrame
+from shapechanger.robot.daemon.recorder import (
+    DISK_TOO_SLOW,
+    EpisodeThread,
+    StepBuilder,
+    StepWithFrame,
+)
+from tests.robot.daemon.plans import ACTIONS, picture
+
+pytestmark = pytest.mark.realtime
+
+HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
+WITHIN_S = 20.0
+
+
+def step(number: int) -> StepWithFrame:
+    """A step that tells its number."""
+    return StepWithFrame(
+        Step(action=(0.0, number / 1e6), driver="person", captured_ns=number * 50_000_000),
+        picture(number % 5),
+    )
+
+
+def test_everything_is_written_in_the_order_in_which_it_was_told(tmp_path: Path) -> None:
+    """And the episode is closed with its outcome."""
+    reports: list[tuple[str, str]] = []
+    answers: list[str] = []
+    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
+    scribe.mark("too early", answers.append)
+    scribe.undo(5.0, answers.append)
+    assert all(scribe.add(step(number)) for number in range(40))
+    scribe.mark("here", answers.append)
+    scribe.undo(0.5, answers.append)
+    scribe.end("time")
+    assert scribe.add(step(41))  # Too late: it has ended well, and this is no trouble.
+    assert scribe.join(WITHIN_S)
+    assert reports == [("begun", ""), ("ended", "")]
+    assert answers == [
+        "There is no step to mark yet.",
+        "There is nothing to undo.",
+        "",
+        "",
+    ]
+    episode = read_episode(tmp_path / scribe.progress.episode)
+    assert (episode.closed, episode.outcome) == (True, "time")
+    assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
+    assert (len(episode.kept), scribe.progress.dropped) == (30, 10)
+    assert [mark.step for mark in episode.marks] == [39]
+
+
+@pytest.mark.parametrize("bytes_each", [0, 1 << 20])
+def test_a_disk_that_is_too_slow_ends_the_episode_and_keeps_what_it_took(
+    tmp_path: Path, bytes_each: int
+) -> None:
+    """Neither steps nor bytes of pictures pile up without end; here the disk is busy elsewhere."""
+    busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
+    reports: list[tuple[str, str]] = []
+    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
+    taken = 0
+    large = b"\xff\xd8" + bytes(bytes_each)
+    while scribe.add(StepWithFrame(step(taken).step, large)):
+        taken += 1
+        assert taken < 10_000
+    busy.end()
+    assert scribe.join(WITHIN_S)
+    assert reports == [("begun", ""), ("ended", "")]
+    episode = read_episode(tmp_path / scribe.progress.episode)
+    assert episode.outcome == DISK_TOO_SLOW
+    assert len(episode.steps) == taken == (15 if bytes_each else 256)
+
+
+def test_what_the_disk_says_is_reported(tmp_path: Path) -> None:
+    """Once, and it does not begin."""
+    (tmp_path / "kept").write_text("in the way")
+    reports: list[tuple[str, str]] = []
+    scribe = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
+    assert scribe.join(WITHIN_S)
+    ((what, trouble),) = reports
+    assert (what, scribe.progress.episode) == ("ended", "")
+    assert "Cannot write" in trouble
+
+
+_WRITES_FOR_EVER = """
+import sys
+from pathlib import Path
+from tests.robot.daemon.test_recorder import HEADER, step
+from shapechanger.robot.daemon.recorder import EpisodeThread
+
+scribe, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
+while True:
+    if scribe.progress.steps >= number - 100:
+        scribe.add(step(number))
+        number += 1
+    if number % 20 == 0:
+        print(scribe.progress.steps, flush=True)
+"""
+
+
+def test_what_a_killed_daemon_leaves_can_be_finished(tmp_path: Path) -> None:
+    """SIGKILL at random moments: every step that was complete is there after repair."""
+    rng = random.Random(5)
+    for number in range(2):
+        folder = tmp_path / str(number)
+        writing = subprocess.Popen(
+            [sys.executable, "-c", _WRITES_FOR_EVER, str(folder)], stdout=subprocess.PIPE, text=True
+        )
+        assert writing.stdout is not None
+        enough, told = rng.randrange(1, 400), 0
+        until_s = time.monotonic() + WITHIN_S
+        while told < enough and time.monotonic() < until_s:
+            told = int(writing.stdout.readline())
+        os.kill(writing.pid, signal.SIGKILL)
+        told = max([told, *(int(line) for line in writing.stdout.read().split("\n")[:-1])])
+        writing.wait()
+        writing.stdout.close()
+        (path,) = episodes_of(folder)
+        repair(path)
+        episode = read_episode(path)
+        assert told >= enough
+        assert len(episode.steps) >= told
+        assert [s.index for s in episode.steps] == list(range(len(episode.steps)))
+        assert all(episode.jpeg(s) == picture(s.index % 5) for s in episode.steps)
+
+
+ADA, NET = ClientIdentity(1, "Ada", "person"), ClientIdentity(2, "net", "program")
+
+
+def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
+    """What a client is sent."""
+    fields: dict[str, Any] = {
+        "seq": seq,
+        "captured_ns": at_ns,
+        "state_ns": at_ns,
+        "sent_ns": at_ns,
+        "frame": None,
+        "frame_seq": 0,
+        "state": (float(at_ns),),
+        "sources": {},
+        "action_applied": (0.25,),
+        "applied_seq": None,
+        "applied_ns": None,
+        "command_ns": None,
+        "stop_reason": "",
+        "armed": True,
+        "emergency": False,
+        "emergencies": 0,
+        "holder": "",
+        "mine": True,
+    }
+    return Observation(**(fields | changes))
+
+
+def frame(seq: int) -> NumberedFrame:
+    """A picture that tells its number."""
+    return NumberedFrame(seq, Frame(b"jpeg %d" % seq, seq))
+
+
+def test_what_the_outputs_did_comes_with_the_next_observation() -> None:
+    """And why they did not do what they were told."""
+    pairing = StepBuilder(lambda: 7)
+    assert pairing.observed(1, seen(1, 100, suggested=(0.9,)), frame(1)) is None
+    assert pairing.decided(ADA, 1, (0.5,), 110) is None
+    done = pairing.observed(1, seen(2, 120, stop_reason="A bump."), frame(2))
+    assert done is not None
+    assert done.jpeg == b"jpeg 1"
+    step = done.step
+    assert (step.action, step.applied, step.wanted) == ((0.5,), (0.25,), (0.9,))
+    assert (step.captured_ns, step.decided_ns, step.wall_ns) == (100, 110, 7)
+    assert (step.driver, step.state, step.stop_reason) == ("person", (100.0,), "A bump.")
+    assert pairing.complete() is None
+
+
+def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
+    """A key that is let go at once."""
+    pairing = StepBuilder()
+    pairing.observed(1, seen(1, 100), None)
+    pairing.decided(ADA, 1, (0.5,), 110)
+    assert pairing.decided(ADA, 1, (0.0,), 115) is None
+    done = pairing.complete()
+    assert done is not None
+    assert (done.step.action, done.step.decided_ns, done.step.applied) == ((0.0,), 115, None)
+
+
+def test_what_answers_nothing_that_was_seen_is_no_step() -> None:
+    """Such as something that was seen before recording began, or by somebody else."""
+    pairing = StepBuilder()
+    pairing.observed(1, seen(1, 100), None)
+    for who, answers in ((ADA, 2), (NET, 1)):
+        pairing.decided(who, answers, (0.5,), 110)
+    pairing.forget(1)
+    pairing.decided(ADA, 1, (0.5,), 110)
+    assert pairing.complete() is None
+
+
+def test_who_lost_the_command_does_not_tell_what_its_command_did() -> None:
+    """By then the outputs follow somebody else."""
+    pairing = StepBuilder()
+    pairing.observed(2, seen(1, 100), None)
+    pairing.decided(NET, 1, (0.5,), 110)
+    done = pairing.observed(2, seen(2, 120, mine=False), None)
+    assert done is not None
+    assert done.step.applied is None
+
+
+@given(
+    said=st.lists(
+        st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
+    )
+)
+def test_time_never_runs_backwards_and_no_picture_is_given_twice(
+    said: list[tuple[bool, ClientIdentity, int]],
+) -> None:
+    """Whatever is answered, by whom, and however late."""
+    pairing = StepBuilder()
+    steps: list[StepWithFrame | None] = []
+    newest = {ADA.session: 0, NET.session: 0}
+    for now_ns, (looks, who, back) in enumerate(said):
+        if looks:
+            newest[who.session] += 1
+            picture = frame(1 + now_ns // 3)  # Each picture is seen a few times.
+            sent = seen(newest[who.session], picture.seq)
+            steps.append(pairing.observed(who.session, sent, picture))
+        else:
+            steps.append(pairing.decided(who, newest[who.session] - back, (0.5,), now_ns))
+    steps.append(pairing.complete())
+    made = [step for step in steps if step is not None]
+    for times in ("captured_ns", "decided_ns"):
+        found = [getattr(one.step, times) for one in made]
+        assert found == sorted(found)
+    pictures = [one.jpeg for one in made if one.jpeg is not None]
+    assert len(pictures) == len(set(pictures))
+    shown = b""
+    for one in made:
+        shown = one.jpeg or shown
+        assert shown == b"jpeg %d" % one.step.captured_ns  # Its own, or the one before it.

@@ -1,0 +1,84 @@
+"""A simulated servo bus behind a pseudo-terminal, for drivers that open a serial device."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import threading
+import tty
+from types import TracebackType
+from typing import Final, Self
+
+from shapechanger.twin.servos.bus import SimulatedBus
+
+_CHUNK: Final = 4096
+
+
+class ServoPty:
+    """Answers at a pseudo-terminal from its own thread; the caller advances the time of the bus.
+
+    A packet without an answer, such as a sync write, is sure to have arrived once a later one was
+    answered. So read an answer before advancing the time.
+
+    Args:
+        bus: The bus; it must only be used through `advance`, or with `lock` held.
+
+    Attributes:
+        device: Path to open, such as "/dev/pts/3".
+        bus: The bus.
+        lock: Lock of the bus.
+    """
+
+    def __init__(self, bus: SimulatedBus) -> None:
+        self.bus = bus
+        self.lock = threading.Lock()
+        self._host, self._far = os.openpty()
+        tty.setraw(self._far)  # No echo, and no byte means anything.
+        os.set_blocking(self._host, False)
+        self.device = os.ttyname(self._far)
+        self._wake_in, self._wake_out = os.pipe()
+        self._thread = threading.Thread(target=self._run, name="servo line", daemon=True)
+        self._thread.start()
+
+    def advance(self, ns: int) -> None:
+        """Advance the time of the bus."""
+        with self.lock:
+            self.bus.advance(ns)
+            late = self.bus.send()
+        self._give(late)
+
+    def close(self) -> None:
+        """End the thread and the device."""
+        if self._thread.is_alive():
+            os.write(self._wake_out, b"x")
+            self._thread.join()
+            for fd in (self._host, self._far, self._wake_in, self._wake_out):
+                os.close(fd)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        while True:
+            ready, _, _ = select.select([self._host, self._wake_in], [], [])
+            if self._wake_in in ready:
+                return
+            data = os.read(self._host, _CHUNK)
+            with self.lock:
+                self.bus.receive(data)
+                answer = self.bus.send()
+            self._give(answer)
+
+    def _give(self, data: bytes) -> None:
+        """Send bytes; as on a serial line, those that nobody reads are lost."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._host, data)

@@ -1,0 +1,57 @@
+"""Names that contain the characters of a glob are names first."""
+
+from __future__ import annotations
+
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Zero, mirror
+
+
+def _layout(*names: str) -> Layout:
+    return Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in names))
+
+
+MOTOR = _layout("motor")
+
+
+def test_a_rule_under_the_exact_name_of_a_feature_is_no_glob() -> None:
+    """`leg[12]` names one feature, so `leg1` and `leg2` keep the default."""
+    source = _layout("leg[12]", "leg1", "leg2", "tail*", "tail_2", "same")
+    built = BodyMap.between(
+        source,
+        _layout("same"),
+        MOTOR,
+        MOTOR,
+        rules={"leg[12]": Hold(0.5), "tail*": Hold(0.25)},
+    )
+    assert [entry.rule for entry in built.observation] == [
+        Hold(0.5),
+        Zero(),
+        Zero(),
+        Hold(0.25),
+        Zero(),
+        Copy("same"),
+    ]
+
+
+def test_a_copied_name_with_a_star_is_no_template() -> None:
+    """The target has a feature `eye*`, which is copied literally."""
+    built = BodyMap.between(
+        _layout("left/eye", "same"),
+        _layout("eye*", "same"),
+        MOTOR,
+        MOTOR,
+        rules={"left/*": "copy eye*"},
+    )
+    assert built.observation[0].rule == Copy("eye*")
+
+
+def test_a_mirror_prefers_exact_names_to_globs() -> None:
+    """`leg?` and `arm*` are elements; `legs` and `arms` must stay in place."""
+    layout = _layout("leg?/angle", "legs/angle", "arm*/angle", "arms/angle")
+    found = mirror(layout, MOTOR, swap={"leg?": "arm*"}, flip=["leg?", "arm*"])
+    assert found.observation == (
+        Copy("arm*/angle", -1.0),
+        Copy("legs/angle"),
+        Copy("leg?/angle", -1.0),
+        Copy("arms/angle"),
+    )

@@ -1,0 +1,157 @@
+"""Studies with a given source policy: a clone, or a policy of PPO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import torch
+
+from shapechanger.demos.cloning.pictures import Framing, PolicyError
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone, train_clones
+from shapechanger.transfer.learners.policy_file import save_policy
+from shapechanger.transfer.learners.ppo import train
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.study import make_plan, run_study
+from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
+from tests.transfer.studies import SMALL, TINY, tiny_plan
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Networks this small gain nothing from more."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clone of the driver on the dry lane, as `train` writes it."""
+    folder = tmp_path_factory.mktemp("clone")
+    policy = train_clones(
+        DRY,
+        QUICK_CLONING,
+        40,
+        3,
+        demonstrations=DemonstrationFile(folder / "shown.npz", 3),
+        on_evaluation=lambda evaluation: None,
+    )
+    policy.save(folder / "dry.zip")
+    return folder / "dry.zip"
+
+
+@pytest.fixture(scope="module")
+def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A policy of a pendulum trained with PPO."""
+    path = tmp_path_factory.mktemp("ppo") / "pole.zip"
+    policy = train(
+        SMALL,
+        "tiny",
+        TINY,
+        32,
+        3,
+        on_evaluation=lambda evaluation: None,
+        on_steps=lambda steps: None,
+    )
+    save_policy(policy, path)
+    return path
+
+
+def _plan(source_policy: Path, **more: Any) -> Plan:
+    task = more.pop("task", TransferTask(DRY, ICY))
+    settings = more.pop("settings", QUICK_CLONING)
+    return make_plan(task, "cloning", settings, seeds=2, source_policy=source_policy, **more)
+
+
+def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> None:
+    """No source is trained, zero-shot is this clone, and every seed goes on from it."""
+    plan = _plan(clone_file)
+    assert plan.source_steps == 40
+    study = run_study(plan, tmp_path / "study", source_policy=clone_file, executor=Serial())
+    assert not study.of("source")
+    assert study.source_return == ()
+    (unchanged,) = study.of("zero-shot")
+    worth = evaluate_clone(ICY, CameraPolicy.load(clone_file), QUICK_CLONING).mean_return
+    assert unchanged.curve[0].mean_return == worth
+    for tuned in study.of("fine-tune"):
+        assert tuned.curve[0].mean_return == worth
+        assert [evaluation.steps for evaluation in tuned.curve] == [0, 20, 40]
+
+
+def test_a_study_goes_on_with_the_clone_it_was_planned_with(
+    clone_file: Path, tmp_path: Path
+) -> None:
+    """Another file is another study."""
+    other = tmp_path / "other.zip"
+    CameraPolicy.load(clone_file).described(command="again").save(other)
+    with pytest.raises(StudyError, match="not the one that this study was planned with"):
+        run_study(_plan(clone_file), tmp_path / "study", source_policy=other, executor=Serial())
+
+
+def test_a_clone_of_another_body_is_refused(clone_file: Path) -> None:
+    """The message says where it learned."""
+    with pytest.raises(SpaceMismatch, match=r"was trained in .*Dry-v1, and the source is .*Wet-v1"):
+        _plan(clone_file, task=TransferTask(WET, ICY))
+
+
+def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Path) -> None:
+    """A vehicle with something wrong with its camera is another source."""
+    slippery = msgspec.structs.replace(DRY, kwargs={"grip": 0.1})
+    with pytest.raises(SpaceMismatch, match=r"the source is .*Dry-v1 \(grip=0\.1\)"):
+        _plan(clone_file, task=TransferTask(slippery, ICY))
+
+
+def test_ppo_refuses_a_clone(clone_file: Path) -> None:
+    """One sentence says which learners take it."""
+    with pytest.raises(StudyError, match=r"dry\.zip is a clone, and tiny does not learn from pict"):
+        tiny_plan(source_policy=clone_file)
+
+
+def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
+    """And the other way round."""
+    with pytest.raises(StudyError, match=r"pole\.zip was trained with tiny, and cloning starts"):
+        _plan(ppo_file)
+
+
+def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
+    """Its demonstrations would be of another size; better said before the work."""
+    framing = Framing(height=10, width=20, top=0.0)
+    settings = msgspec.structs.replace(
+        QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
+    )
+    with pytest.raises(StudyError, match=r"takes pictures of 12 x 20 .* and cloning 10 x 20"):
+        _plan(clone_file, settings=settings)
+
+
+@pytest.mark.parametrize("data", [{}, {"env": DRY.id, "arguments": {}}, {"env": 5}])
+def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
+    """Such as one that was made from recorded pictures alone."""
+    path = tmp_path / "found.zip"
+    CameraPolicy.fresh(QUICK_CLONING.clone, 0).described(**data).save(path)
+    with pytest.raises(StudyError, match=r"card of .*found\.zip lacks the demonstrations"):
+        _plan(path)
+
+
+def test_what_is_no_policy_is_refused(clone_file: Path, tmp_path: Path) -> None:
+    """A file that is not there, that is something else, and half of one."""
+    with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.zip"):
+        _plan(tmp_path / "none.zip")
+    (tmp_path / "text.zip").write_text("not at all")
+    with pytest.raises(CorruptStudy, match=r"text\.zip is not a policy"):
+        _plan(tmp_path / "text.zip")
+    (tmp_path / "half.zip").write_bytes(clone_file.read_bytes()[:5000])
+    with pytest.raises(CorruptStudy, match=r"half\.zip is not a policy"):
+        _plan(tmp_path / "half.zip")
+    damaged = bytearray(clone_file.read_bytes())
+    damaged[2000] ^= 0xFF
+    (tmp_path / "damaged.zip").write_bytes(damaged)
+    with pytest.raises((PolicyError, CorruptStudy), match=r"damaged\.zip"):
+        _plan(tmp_path / "damaged.zip")

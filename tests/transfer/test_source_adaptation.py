@@ -1,0 +1,129 @@
+"""Sources that are made more like the target."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import pytest
+
+from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.envs.finger import env as finger_env
+from shapechanger.envs.finger.reach import FingerReachEnv
+from shapechanger.errors import StudyError
+from shapechanger.reports.verdict import arm_rows, caveats, verdict
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.methods import policy_path
+from shapechanger.transfer.plan import ARMS, EVERY_ARM, Run, TransferTask
+from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
+from tests.transfer.studies import BIG, SMALL, tiny_plan
+
+FINGER = EnvRef("shapechanger/Finger-v1")
+REAL_LIKE = FINGER.having({"gap": "real-like"})
+FOLLOWS = EnvRef("shapechanger/FingerTrack-v1")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[Any]]:
+    """A tiny study of the gap, its folder, and the fingers that were identified."""
+    moved: list[Any] = []
+
+    def identified(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
+        # What it finds has tests of its own; here only who is asked counts.
+        moved.append((env.get_wrapper_attr("parameters"), actions, seed))
+        return NOMINAL.replace(tendon_friction=0.25)
+
+    out = tmp_path_factory.mktemp("gap") / "study"
+    task = TransferTask(FINGER, REAL_LIKE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(finger_env, "identified", identified)
+        plan = tiny_plan(task=task, arms=EVERY_ARM, source_steps=64)
+        return run_study(plan, out, executor=Serial()), out, moved
+
+
+def test_every_arm_is_there_and_measured(study: tuple[Study, Path, list[Any]]) -> None:
+    """What was learned in a source made more like the target is judged on the target, unchanged."""
+    made, _, _ = study
+    assert set(made.summaries) == {"zero-shot", "fine-tune", "randomised", "identified"}
+    for kind in ("randomised", "identified"):
+        assert [[e.steps for e in result.curve] for result in made.of(kind)] == [[0], [0]]
+        assert made.summaries[kind].in_target_steps.jumpstart.value is not None
+
+
+def test_each_seed_meets_another_individual(study: tuple[Study, Path, list[Any]]) -> None:
+    """Of the fingers of a gap; so intervals are over fingers, too."""
+    made, _, moved = study
+    assert made.plan.individual == "finger_seed"
+    fingers = [made.plan.target_of(Run("zero-shot", i)).kwargs["finger_seed"] for i in range(2)]
+    assert fingers == [0, 1]
+    assert moved[0][0] != moved[1][0]
+    for index, (parameters, _, seed) in enumerate(moved):
+        one = gym.make(FINGER.id, gap="real-like", finger_seed=index)
+        assert parameters == one.get_wrapper_attr("parameters")
+        assert seed == made.plan.seed_of(Run("identified", index))
+        one.close()
+
+
+def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> None:
+    """With the policies that were learned in them."""
+    made, out, _ = study
+    sources = {
+        kind: json.loads((Run(kind, 0).folder(out) / "source.json").read_text())
+        for kind in ("randomised", "identified")
+    }
+    assert sources["randomised"] == {"id": FINGER.id, "kwargs": {"gap": "wide"}}
+    assert sources["identified"]["kwargs"]["parameters"]["tendon_friction"] == 0.25
+    assert all(policy_path(out, Run(kind, 1)).exists() for kind in sources)
+    assert made.plan.task.source == FINGER
+
+
+def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
+    """Where an env says what it is: for each arm, and of the source policy in the source."""
+    made, _, _ = study
+    said = {row.kind: row.success for row in arm_rows(made)}
+    assert set(said) == {"source", "random", *EVERY_ARM}
+    assert said["randomised"].startswith("0 % [0 %, 0 %]")
+    assert "Success at the end: the source policy in the source 0 %" in verdict(made)
+    assert "identified 0 %" in verdict(made)
+    assert any("whose finger_seed is the index of the seed" in words for words in caveats(made))
+
+
+def test_a_study_that_cannot_go_on_begins_no_run_twice(
+    study: tuple[Study, Path, list[Any]],
+) -> None:
+    """What has ended is kept: the same study again moves no finger."""
+    made, out, moved = study
+    before = len(moved)
+    again = run_study(made.plan, out, executor=Serial())
+    assert len(moved) == before
+    assert again.summaries == made.summaries
+
+
+def test_default_arms() -> None:
+    """The same task in another finger gets all arms, any other pair the three of always."""
+    assert default_arms(inspect_task(TransferTask(FINGER, REAL_LIKE))) == EVERY_ARM
+    assert default_arms(inspect_task(TransferTask(FINGER, FOLLOWS))) == ARMS
+    assert default_arms(inspect_task(TransferTask(SMALL, BIG))) == ARMS
+
+
+def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
+    """Before anything is trained."""
+    with pytest.raises(StudyError, match=r"BigInvertedPendulum-v1 cannot adapt .*SmallInv"):
+        tiny_plan(arms=("scratch", "identified"))
+
+
+def test_only_what_is_needed_is_trained() -> None:
+    """Without an arm that moves a source policy there is none."""
+    plan = tiny_plan(task=TransferTask(FINGER, REAL_LIKE), arms=("scratch", "randomised"))
+    assert {run.kind for run in plan.runs()} == {"random", "scratch", "randomised"}
+
+
+def test_a_robot_is_had_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plan says so, and whoever runs it takes one worker."""
+    task = TransferTask(FINGER, REAL_LIKE)
+    assert not tiny_plan(task=task).exclusive
+    monkeypatch.setattr(FingerReachEnv, "exclusive", True, raising=False)
+    assert tiny_plan(task=task).exclusive

@@ -1,0 +1,72 @@
+"""Lines that know where on them a point is, and progress that is counted along them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.worlds.expert import CourseProgress
+from shapechanger.worlds.expert.line import ClosedLine
+from tests.worlds.expert.courses import ring
+
+_SQUARE = ClosedLine(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]))
+_RING = ClosedLine(ring(0).route)
+
+
+def test_a_square_knows_its_sides() -> None:
+    """Left of a line that goes round counter-clockwise is inside."""
+    assert _SQUARE.length == 16.0
+    assert _SQUARE.nearest(1.0, 0.5) == pytest.approx((1.0, 0.5))
+    assert _SQUARE.nearest(1.0, -0.5) == pytest.approx((1.0, -0.5))
+    assert _SQUARE.nearest(-0.5, 1.0) == pytest.approx((15.0, -0.5))
+
+
+@given(station=st.floats(-200.0, 200.0))
+def test_the_point_at_a_station_is_at_that_station(station: float) -> None:
+    """Stations go on round and round."""
+    x, y = _RING.at(station)
+    spot = _RING.nearest(x, y)
+    assert abs(_RING.ahead_by(station, spot.station)) < 1e-6
+    assert abs(spot.lateral) < 1e-6
+
+
+@given(start=st.floats(0.0, 50.0), moved=st.floats(-20.0, 20.0))
+def test_the_shorter_way_undoes_a_move(start: float, moved: float) -> None:
+    """It is signed, and it knows where the line closes."""
+    assert _RING.ahead_by(start, start + moved) == pytest.approx(moved, abs=1e-9)
+
+
+def test_a_hint_keeps_to_its_leg() -> None:
+    """Of two legs 1 m apart, the one that is driven counts, however near the other is."""
+    there = [(x, 0.0) for x in np.arange(0.0, 20.0, 0.1)]
+    back = [(x, 1.0) for x in np.arange(20.0, 0.0, -0.1)]
+    line = ClosedLine(np.array(there + back))
+    assert line.nearest(10.0, 0.9).station > 20
+    assert line.nearest(10.0, 0.9, hint=9.8).station == pytest.approx(10.0)
+
+
+def test_progress_counts_laps_and_counts_down() -> None:
+    """Three laps are three lengths, and the same way backward leaves nothing."""
+    course = ring(0)
+    line = ClosedLine(course.route)
+    progress = CourseProgress(course)
+    progress.reset(*line.at(5.0))
+    for station in np.arange(5.0, 5.0 + 3 * line.length, 0.1):
+        progress.update(*line.at(float(station)))
+    assert progress.metres == pytest.approx(3 * line.length, abs=0.2)
+    for station in np.arange(5.0 + 3 * line.length, 4.0, -0.1):
+        progress.update(*line.at(float(station)))
+    assert progress.metres == pytest.approx(-1.0, abs=0.2)
+
+
+def test_standing_still_is_no_progress() -> None:
+    """Nor is swaying across the lane."""
+    course = ring(1)
+    progress = CourseProgress(course)
+    x, y = course.route[7]
+    progress.reset(x, y)
+    for _ in range(50):
+        progress.update(x, y)
+    assert progress.metres == 0.0

@@ -1,0 +1,100 @@
+"""What counts as a collision, and what the bumper feels of it."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import pytest
+
+from shapechanger.bodies.vehicles import PlanarPose
+from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
+
+_DT = 0.01
+# A ball of 0.1 m that can be put anywhere, a wall whose face is at x = 1 m, and the ground.
+_MODEL = """
+<mujoco><option gravity="0 0 0"/><worldbody>
+<geom name="world/ground" type="plane" size="5 5 1"/>
+<geom name="world/wall/0" type="box" pos="1.5 0 0.5" size="0.5 3 0.5"/>
+<body name="vehicle/chassis" pos="0 0 0.1"><freejoint/>
+<geom name="vehicle/hull" type="sphere" size="0.1"/></body>
+</worldbody></mujoco>
+"""
+
+
+class _Bench:
+    def __init__(self) -> None:
+        self.model = mujoco.MjModel.from_xml_string(_MODEL)
+        self.data = mujoco.MjData(self.model)
+        self.touch = ContactTracker(self.model)
+
+    def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
+        """Stand somewhere for some time."""
+        self.data.qpos[:3] = x, 0.0, 0.1
+        mujoco.mj_forward(self.model, self.data)
+        for _ in range(round(seconds / _DT)):
+            self.touch.follow(self.data, PlanarPose(x, 0.0, heading), _DT)
+
+
+def test_the_ground_is_nothing_to_run_into() -> None:
+    """A vehicle stands on it all the time."""
+    bench = _Bench()
+    bench.stand(0.0)
+    assert bench.data.ncon > 0
+    assert not bench.touch.touches
+    assert bench.touch.collisions == 0
+
+
+def test_a_wall_is() -> None:
+    """A touch counts once, however long it lasts."""
+    bench = _Bench()
+    bench.stand(0.91, seconds=3.0)
+    assert bench.touch.touches
+    assert bench.touch.collisions == 1
+    bench.stand(0.5)
+    assert not bench.touch.touches
+
+
+def test_a_vehicle_that_bounces_ran_into_it_once() -> None:
+    """What comes within half a second belongs to the same collision; what comes later does not."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.stand(0.5, seconds=0.9 * APART_S)
+    bench.stand(0.91)
+    assert bench.touch.collisions == 1
+    bench.stand(0.5, seconds=1.1 * APART_S)
+    bench.stand(0.91)
+    assert bench.touch.collisions == 2
+
+
+def test_after_it_was_lifted_off_the_next_one_counts() -> None:
+    """Whoever was put back and runs into a wall again at once has run into it twice."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.touch.release()
+    assert not bench.touch.touches
+    bench.stand(0.91)
+    assert bench.touch.collisions == 2
+
+
+def test_a_reset_forgets() -> None:
+    """An episode counts its own."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.touch.reset()
+    assert bench.touch.collisions == 0
+    assert not bench.touch.bumped
+
+
+@pytest.mark.parametrize(
+    ("off", "felt"), [(0.0, True), (0.9, True), (-0.9, True), (1.1, False), (math.pi, False)]
+)
+def test_the_bumper_is_at_the_front(off: float, felt: bool) -> None:
+    """A knock on the side or at the back is a collision that no bumper tells.
+
+    `off` is how far the wall is off the heading, as a share of how far the bumper reaches.
+    """
+    bench = _Bench()
+    bench.stand(0.91, heading=off if off == math.pi else off * BUMPER_SPREAD)
+    assert bench.touch.collisions == 1
+    assert bench.touch.bumped is felt
