@@ -98,8 +98,8 @@ def test_frame_that_is_missing_a_part_is_not_turned() -> None:
 
 
 @pytest.mark.parametrize("flip", [False, True])
-def test_only_a_frame_that_is_rotated_is_decoded(flip: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In order to rotate it; the header of any other frame is enough."""
+def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the camera's data to the daemon, upside down or not."""
     decoded: list[bytes] = []
     decode = simplejpeg.decode_jpeg
 
@@ -110,7 +110,8 @@ def test_only_a_frame_that_is_rotated_is_decoded(flip: bool, monkeypatch: pytest
     monkeypatch.setattr(simplejpeg, "decode_jpeg", counting)
     jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
     frame = checked_frame(jpeg, 0, CameraPlan("file", flip=flip))
-    assert decoded == ([jpeg] if flip else [])
+    assert FrameChecks((160, 120)).refusal(frame) == ""
+    assert decoded == [jpeg]
     assert frame.encoded_here is flip
 
 
