@@ -54,7 +54,7 @@ CAR = GuardPlan("car", ACTIONS, (DRIVE, STEER), (ENCODER, BUMPER), enable_pin=25
 
 @contextmanager
 def process(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A Python process, once it has written a line; it is killed in the end."""
+    """Run a Python process that has written a line; it is killed in the end."""
     command = [sys.executable, "-c", code, *arguments]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         try:
@@ -66,7 +66,7 @@ def process(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 
 def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait until something is so."""
+    """Wait until a condition holds."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
@@ -74,7 +74,7 @@ def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
 
 
 def run_until(clock: Clock, condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait on a guard's clock, in real time, until something is so."""
+    """Wait on a guard's clock, in real time, until a condition holds."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"

@@ -35,7 +35,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
 
 @pytest.fixture
 def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
-    """What a guard has of it."""
+    """Hardware of a guard at that board."""
     made = connect(board.socket_path)
     yield made
     made.close()
@@ -74,7 +74,7 @@ def test_outputs_pull_and_the_sensor_hears(board: RunningBoard, hardware: TwinHa
 def test_what_makes_pins_safe_leaves_servos_alone(
     board: RunningBoard, hardware: TwinHardware
 ) -> None:
-    """A word to them would keep their watchdogs from letting go."""
+    """A packet to them would keep their watchdogs from letting go."""
     outputs = OutputBank(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(10):
@@ -88,7 +88,7 @@ def test_what_makes_pins_safe_leaves_servos_alone(
 
 
 def test_a_bus_at_another_device_is_not_there(hardware: TwinHardware) -> None:
-    """Whoever mistypes it hears of it, as on the bench."""
+    """A mistyped device is refused, as on the bench."""
     outputs = tuple(
         replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
     )

@@ -1,4 +1,4 @@
-"""The front camera: pictures with their time, into a pipe that nobody may have opened."""
+"""The front camera: pictures with their time, into a pipe that may have no reader."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_pictures_say_when_they_were_taken(tmp_path: Path) -> None:
 
 
 def test_nobody_needs_to_read(tmp_path: Path) -> None:
-    """Without a reader pictures are dropped, and whoever comes later gets new ones only."""
+    """Without a reader pictures are dropped, and a later reader gets only new ones."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -86,7 +86,7 @@ def test_in_real_time_only_the_latest_waits(tmp_path: Path) -> None:
 
 
 def select_on(pipe: BinaryIO) -> select.epoll:
-    """What tells whether a pipe can be read."""
+    """Return a poll for a pipe to become readable."""
     poll = select.epoll()
     poll.register(pipe, select.EPOLLIN)
     return poll
@@ -114,7 +114,7 @@ def test_the_camera_fails(tmp_path: Path, how: CameraFault) -> None:
 
 
 def test_a_picture_without_a_barcode_is_the_whole_picture(tmp_path: Path) -> None:
-    """Whoever learns from pictures must not learn to read the time; the comment still has it."""
+    """A policy must not learn to read the time from pictures; the comment still has it."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     plain, striped = (
         FrontCameraPipe(
@@ -139,7 +139,7 @@ def test_pictures_are_small(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_cannot_fail(tmp_path: Path) -> None:
-    """A twin without a camera says so."""
+    """A twin without a camera refuses requests about it."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="no camera"):
             operator.break_camera("off")

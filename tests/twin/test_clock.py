@@ -1,4 +1,4 @@
-"""Time on the twin moves only when it is asked to, and waits for all who take part."""
+"""Twin time advances only on request, and waits for all participants."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_participant_is_granted_when_it_wants_to_be(tmp_path: Path) -> None:
 
 
 def test_time_does_not_wait_for_the_dead(tmp_path: Path) -> None:
-    """Who takes part and dies does not stop time."""
+    """A participant that dies does not stop time."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_GUARD, board.socket_path):
             operator.advance(0.1)
@@ -146,7 +146,7 @@ def test_in_real_time_nobody_is_granted_any(tmp_path: Path) -> None:
 
 
 def test_a_board_that_ends_is_noticed(tmp_path: Path) -> None:
-    """Whoever waits for it, or talks to it, is told in words."""
+    """Waiting for it, or sending to it, raises an error."""
     board = start_board(CAR, "twin", tmp_path)
     hardware = connect(board.socket_path)
     clock = granted(hardware)

@@ -1,4 +1,4 @@
-"""A whole robot in this process: it is armed, driven, stopped and started afresh."""
+"""A whole robot in this process: it is armed, driven, stopped and restarted."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_it_drives_as_its_profile_lets_it() -> None:
 
 
 def test_it_is_armed_from_the_start_and_says_what_it_is() -> None:
-    """Whoever steps it has nothing to do before."""
+    """It needs no preparation before the first step."""
     robot = _robot()
     seen = robot.start()
     assert seen.armed
@@ -114,7 +114,7 @@ def test_a_command_that_is_refused_says_why() -> None:
 
 
 def test_a_bump_is_told_though_it_is_over() -> None:
-    """What happens between two observations is not lost."""
+    """A bump between two observations is not lost."""
     world = _room()
     robot = _robot(world)
     robot.start(lambda: world.place(2))
@@ -155,7 +155,7 @@ def test_a_closed_robot_is_at_rest_and_moves_no_more() -> None:
 
 
 def test_a_sensor_that_is_not_wired_is_told_of(tmp_path: Path) -> None:
-    """As the guard on the bench tells it, before anything moves."""
+    """The error is that of the guard on the bench, before anything moves."""
     unwired = changed('[sensor.pack]\ndriver = "ina219"\n', "")
     attached = write_profile(tmp_path, unwired.replace("low_battery_v = 6.6\n", "")).guard_plan()
     profile = write_profile(tmp_path, CAR)

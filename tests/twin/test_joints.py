@@ -80,7 +80,7 @@ def test_only_open_channels_are_heard() -> None:
 
 
 def test_the_two_bytes_of_an_angle_come_again_and_again() -> None:
-    """So that whoever stays on them reads newer ones; from the status on it counts on."""
+    """Reading on from an angle repeats newer values; from the status on, the address advances."""
     chip = SimulatedAs5600("knee", lambda: 0.0, 0x0ABC, 1)
     assert chip.read(0x0C, 4) == chip.read(0x0E, 4) == [0x0A, 0xBC, 0x0A, 0xBC]
     assert chip.read(0x0B, 5) == [0x20, 0x0A, 0xBC, 0x0A, 0xBC]
@@ -106,7 +106,7 @@ def test_magnets_may_be_gone_too_far_or_too_near(how: str, seen: tuple[bool, ...
 
 
 def test_joints_that_are_not_there_are_told() -> None:
-    """By the world, by whoever breaks them, and where a world has none they stand at their zero."""
+    """They follow the world and the faults, and stand at their zero in a world without joints."""
     with pytest.raises(RobotError, match="and no knee"):
         _board(FingerWorld(NOMINAL, seed=0), _sensor(("knee",)))
     board = _board(DrivingWorld(frozenset(), (160, 120), 0), _sensor(("knee", "ankle")))

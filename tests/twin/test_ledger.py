@@ -38,7 +38,7 @@ def test_a_broken_last_line_is_left_out(tmp_path: Path, cut: int) -> None:
 
 
 def test_a_broken_line_in_between_is_refused(tmp_path: Path) -> None:
-    """The file was changed, so it proves nothing: the message says where."""
+    """The file was changed and proves nothing; the error names the line."""
     path = tmp_path / "ledger.jsonl"
     path.write_text('{"t": 1, "kind": "gone"}\n{"t": 2, "ki\n{"t": 3, "kind": "gone"}\n')
     with pytest.raises(RobotError, match=r"Line 2 of .*ledger\.jsonl is malformed"):
@@ -46,7 +46,7 @@ def test_a_broken_line_in_between_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_ledger_is_never_written_over(tmp_path: Path) -> None:
-    """What an earlier run proved stays."""
+    """The ledger of an earlier run is never overwritten."""
     LedgerWriter(tmp_path / "ledger.jsonl").close()
     with pytest.raises(FileExistsError):
         LedgerWriter(tmp_path / "ledger.jsonl")

@@ -1,4 +1,4 @@
-"""What the guard loads of the twin."""
+"""Modules that the guard loads on a twin."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 def test_the_guard_loads_only_light_modules(tmp_path: Path) -> None:
     """On a twin, the guard loads gpiozero, msgspec and what these need, and nothing heavier."""
     source = str(Path(shapechanger.__file__).parent)
-    with start_board(CAR, "real", tmp_path) as board:
+    with start_board(CAR, "twin", tmp_path) as board:
         command = [sys.executable, "-I", "-c", _BARE, source, board.socket_path]
         run = subprocess.run(command, check=True, capture_output=True, text=True)
     theirs = set(run.stdout.split()) - set(sys.stdlib_module_names)

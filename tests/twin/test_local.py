@@ -25,7 +25,7 @@ def _board() -> tuple[LocalBoard, DrivingWorld]:
 
 
 def test_time_moves_only_by_advance() -> None:
-    """It begins where the twin's clock begins, and nobody can wait for it."""
+    """It starts at the start of the twin's clock and advances only with the board."""
     board, _ = _board()
     assert board.now_ns == board.hardware.clock.now_ns() == START_NS
     board.advance(START_NS + 10 * _MS)
@@ -41,14 +41,14 @@ def test_time_moves_only_by_advance() -> None:
     ids=["wait", "sleep"],
 )
 def test_who_waits_would_wait_for_ever(wait: Callable[[Any], object]) -> None:
-    """There is no other process that could let time go by."""
+    """No other process could advance the time."""
     board, _ = _board()
     with pytest.raises(RobotError, match="advances only by `advance`"):
         wait(board.hardware.clock)
 
 
 def test_a_pin_drives_the_world() -> None:
-    """What gpiozero's devices do with a pin arrives at the motor."""
+    """Devices of gpiozero move the motor."""
     board, world = _board()
     factory = board.hardware.pin_factory()
     assert board.hardware.pin_factory() is factory
@@ -65,7 +65,7 @@ def test_a_pin_drives_the_world() -> None:
 
 
 def test_an_input_that_nobody_claimed_disturbs_nobody() -> None:
-    """Edges go to whoever holds the pin, with the level that it has then."""
+    """Edges go to the owner of the pin, with the level of that time."""
     board, world = _board()
     factory = board.hardware.pin_factory()
     motor, enable = Motor(22, 27, pin_factory=factory), DigitalOutputDevice(25, pin_factory=factory)

@@ -1,4 +1,4 @@
-"""The bad network is bad in the ways that it is told to, and in no other."""
+"""The bad network has exactly the defects that were set."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Line:
         self.far.settimeout(PATIENCE_S)
 
     def carries(self, data: bytes, *, back: bool = False) -> bytes:
-        """What arrives of some bytes."""
+        """Send bytes and return those that arrive."""
         source, sink = (self.far, self.near) if back else (self.near, self.far)
         source.sendall(data)
         return self.takes(sink, len(data))
@@ -54,7 +54,7 @@ class Line:
 
 @pytest.fixture(scope="module")
 def far() -> Iterator[socket.socket]:
-    """Somebody who listens."""
+    """A listening socket."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.settimeout(PATIENCE_S)
         yield listener
@@ -87,7 +87,7 @@ def test_slices_change_nothing(sliced: Line, data: bytes, back: bool) -> None:
 
 
 def test_much_at_once(line: Line) -> None:
-    """More than the network holds back, while nobody reads yet."""
+    """More data than the network queues, before anything is read."""
     data = random.Random(0).randbytes(300_000)
     line.near.sendall(data[:100_000])
     assert line.carries(data[100_000:])[:100_000] == data[:100_000]
@@ -114,7 +114,7 @@ def test_latency(far: socket.socket) -> None:
 
 
 def test_silence_holds_back_and_keeps_the_connection(line: Line) -> None:
-    """Nothing passes and nobody is told; afterwards all of it comes."""
+    """Nothing passes, without an error; afterwards everything arrives."""
     assert line.carries(b"before") == b"before"
     line.network.silent = True
     line.near.sendall(b"held")
@@ -142,7 +142,7 @@ def test_reset_tears(line: Line) -> None:
 
 
 def test_half_an_end(line: Line) -> None:
-    """The far end hears the end, and is still heard."""
+    """The far end sees the end and can still send."""
     assert line.carries(b"before") == b"before"
     line.network.half_close()
     assert line.far.recv(1) == b""

@@ -1,4 +1,4 @@
-"""The oracle on ledgers made by hand, so that it is known to be able to say no."""
+"""The oracle on handmade ledgers, to show that it can find violations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_fresh_command_allows_what_it_started() -> None:
 
 
 def test_driving_without_a_command_is_found() -> None:
-    """What nobody asked for is not allowed, however short, forward or backward."""
+    """Motion without a command is a violation, however short, forward or backward."""
     for pin, sign in ((22, 1), (27, -1)):
         found = unauthorised([_pin(10, pin, 0.5), _pin(11, pin, 0.0)], _NO_ONE_SHOT, [], 250)
         assert found == [("drive", 10 * _MS, 11 * _MS, sign * 0.5)]
@@ -42,7 +42,7 @@ def test_even_one_percent_is_driving() -> None:
 
 
 def test_steering_is_no_driving() -> None:
-    """Turning the wheels of a standing car harms nobody."""
+    """Steering a standing car is no violation."""
     assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, [], 250) == []
 
 
@@ -94,7 +94,7 @@ def test_without_toggling_the_motors_have_no_power() -> None:
 
 
 def test_brakes_and_released_pins_are_rest() -> None:
-    """Both inputs of a bridge high brake; a pin that nobody drives falls to its pull-down."""
+    """Both inputs of a bridge high brake; an undriven pin falls to its pull-down."""
     ledger = [_pin(10, 22, 1.0), _pin(10, 27, 1.0)]
     assert propelled(ledger, _NO_ONE_SHOT) == []
     released = Transition(t=20 * _MS, kind="pin", pin=22, duty=0.0, hz=0, released=True)

@@ -56,7 +56,7 @@ def test_pulses_are_decoded_from_the_registers() -> None:
 
 
 def test_bits_for_full_off_and_full_on() -> None:
-    """Bit 4 of the last register is off, whatever the others say; so for all channels at once."""
+    """Bit 4 of the last register is off, whatever the others are; the same for all channels."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFA, [0, 0x10, 0, 0])
@@ -74,7 +74,7 @@ def test_the_frequency_is_set_while_it_sleeps() -> None:
 
 
 def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
-    """After a sleep the channels wait for RESTART, as the data sheet says."""
+    """After a sleep the channels wait for RESTART, as in the data sheet."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])
@@ -110,7 +110,7 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
             servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),
         ),
     )
-    with start_board(plan, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         drive, steer = (open_output(output, hardware) for output in plan.outputs)
         wiring = TwinWiring(plan)
@@ -130,7 +130,7 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
 def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:
     """A PCA9685 keeps pulsing for ever; its output enable, with a pull-up, ends that."""
     with (
-        start_board(_SERVO_CAR, "real", tmp_path) as board,
+        start_board(_SERVO_CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,
     ):
         with process(_AWAKE_50_HZ, board.socket_path) as robot:

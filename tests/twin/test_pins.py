@@ -36,7 +36,7 @@ hardware.close()
 
 def test_a_motor_of_another_process_turns(tmp_path: Path) -> None:
     """The board sees what gpiozero does in another process, with its time and its process."""
-    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "-0.4") as robot:
             assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.4}
         last = [line for line in read_ledger(board.ledger_path) if line.pin == 27 and line.duty]
@@ -46,7 +46,7 @@ def test_a_motor_of_another_process_turns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("value", "possible"), [("0.4", {0.0, 1.0}), ("1", {1.0}), ("0", {0.0})])
 def test_killed_pins_keep_their_level(tmp_path: Path, value: str, possible: set[float]) -> None:
     """The kernel keeps the level of a pin whose process dies, and software PWM stops anywhere."""
-    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, value) as robot:
             robot.send_signal(signal.SIGKILL)
             robot.wait()
@@ -76,8 +76,8 @@ def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
 
 
 def test_a_polite_end_leaves_motors_low_and_plain_outputs_alone(tmp_path: Path) -> None:
-    """As the pins of a Pi; and nobody is reported dead."""
-    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    """As the pins of a Pi; and no process is recorded as dead."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")
         assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.0}
@@ -112,7 +112,7 @@ def test_pwm_has_whole_percent(tmp_path: Path, asked: float, done: float) -> Non
 
 def test_a_pin_has_one_owner(tmp_path: Path) -> None:
     """A pin that a living process holds is busy, and free when that has died."""
-    with start_board(CAR, "real", tmp_path) as board:
+    with start_board(CAR, "twin", tmp_path) as board:
         second = connect(board.socket_path)
         with (
             process(_MOTOR, board.socket_path, "0.5"),
@@ -126,7 +126,7 @@ def test_a_pin_has_one_owner(tmp_path: Path) -> None:
 
 def test_opening_a_pin_lets_it_go(tmp_path: Path) -> None:
     """A new process first makes a pin an input, so that a stuck one falls to its pull-down."""
-    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "1"):
             pass
         assert operator.levels().duties[22] == 1.0
@@ -151,6 +151,6 @@ def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
 
 
 def test_no_board_is_said_in_words(tmp_path: Path) -> None:
-    """Whoever names the wrong socket is told so."""
+    """A wrong socket is an error with its path."""
     with pytest.raises(RobotError, match="No twin's board answers"):
         connect(str(tmp_path / "nothing"))

@@ -33,7 +33,7 @@ def test_a_place_that_says_nothing_is_the_room() -> None:
 
 
 def test_the_room_does_without_mujoco() -> None:
-    """And a place that needs it says what to install."""
+    """A place that needs it names the extra to install."""
     script = (
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
@@ -74,7 +74,7 @@ def test_what_cannot_be_there_is_refused_in_words() -> None:
 
 
 def test_a_board_takes_its_vehicle_to_a_place(tmp_path: Path) -> None:
-    """An operator lays out another course, which the ledger knows, and hears the truth."""
+    """An operator lays out another course, which the ledger records, and reads the truth."""
     with (
         start_board(CAR, "twin", tmp_path, seed=4, place=_CORRIDOR) as board,
         Operator(board.socket_path) as operator,

@@ -1,4 +1,4 @@
-"""Whoever stands beside a twin can put a vehicle back that ran into something."""
+"""An operator can put back a vehicle that has collided."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_in_a_room_it_goes_back_to_its_start() -> None:
 
 
 def test_an_operator_puts_it_back_in_a_room(tmp_path: Path) -> None:
-    """And the ledger tells of it."""
+    """And the ledger records it."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         operator.place(3)
         start = operator.where()

@@ -59,7 +59,7 @@ def bench() -> Iterator[_Bench]:
 
 
 def test_nothing_pulls_before_the_first_command(bench: _Bench) -> None:
-    """Armed or not: no servo has torque while nobody commands."""
+    """Armed or not, no servo has torque without a command."""
     assert bench.seen.armed
     assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
     assert max(bench.rig.tensions().values()) < 1.5  # Gears hold what hangs on them.
@@ -132,7 +132,7 @@ def test_a_servo_that_fails_takes_all_tendons_down(
 
 
 def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
-    """As a servo that fails: to the pretension, to nothing, and disarmed until somebody looks."""
+    """As after a failed servo: to the pretension, to nothing, and disarmed until a person arms."""
     bench.drive(_FLEX, 25)
     magnet = bench.robot.pins.encoder("PIP_flexion")
     magnet.set_magnet("gone")
@@ -153,7 +153,7 @@ def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
 
 
 def test_it_moves_again_when_it_is_armed_again(bench: _Bench) -> None:
-    """A servo that speaks again is no leave to move: somebody must look first."""
+    """A servo that answers again does not rearm the robot: a person must."""
     bench.drive(_FLEX, 10)
     bench.rig.break_servo("FDS", "mute")
     bench.drive(_FLEX, 40)
@@ -167,7 +167,7 @@ def test_it_moves_again_when_it_is_armed_again(bench: _Bench) -> None:
 
 
 def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
-    """Whoever arms it hears which one."""
+    """The refusal to arm names the servo."""
     bench.drive(_FLEX, 10)
     bench.rig.break_servo("LUM", "mute")
     bench.drive(_FLEX, 40)
@@ -176,7 +176,7 @@ def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
 
 
 def test_a_silent_guard_lets_the_servos_let_go(bench: _Bench) -> None:
-    """Without any word for 100 ms each servo stops by itself."""
+    """Without any packet for 100 ms each servo stops by itself."""
     bench.drive(_FLEX, 25)
     bench.rig.bus.advance(90_000_000)
     assert bench.rig.tensions()["FDP"] > 5.0

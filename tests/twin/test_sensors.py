@@ -110,7 +110,7 @@ def test_the_bumper_is_pressed(tmp_path: Path) -> None:
 
 
 def test_the_distance_is_measured(tmp_path: Path) -> None:
-    """By the echo's length; a hand can be held in front, and a dead sensor says so."""
+    """By the echo's length; an operator can override it, and a dead sensor is an error."""
     with _rig(tmp_path, _DISTANCE) as rig:
         truth = rig.operator.where().distance_m
         assert rig.advance(0.2)["distance"] == pytest.approx(min(truth, 3.0), abs=0.01)
@@ -124,7 +124,7 @@ def test_the_distance_is_measured(tmp_path: Path) -> None:
 
 
 def test_the_motion_sensor_feels_the_car(tmp_path: Path) -> None:
-    """It is pushed back when the car starts, and says when its chip is dead."""
+    """It is pushed back when the car starts, and a dead chip is an error."""
     with _rig(tmp_path, _IMU) as rig:
         assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
         rig.motor.value = 1.0
@@ -135,7 +135,7 @@ def test_the_motion_sensor_feels_the_car(tmp_path: Path) -> None:
 
 
 def test_the_battery_sags_and_runs_down(tmp_path: Path) -> None:
-    """Under load, and when somebody says so."""
+    """Under load, and when an operator sets it."""
     with _rig(tmp_path, _BATTERY) as rig:
         idle = rig.advance(0.2)["battery"]
         rig.motor.value = 1.0

@@ -1,4 +1,4 @@
-"""From the levels of pins back to what the drivers were told, for each driver."""
+"""From the levels of pins back to the values of the drivers, for each driver."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
 
 
 def test_only_what_throttles_propels() -> None:
-    """The mix says so, not the name."""
+    """The mix decides, not the name."""
     assert TwinWiring(CAR).propelling == ("drive",)
     swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
     assert TwinWiring(replace(CAR, outputs=swapped)).propelling == ("steer",)

@@ -149,13 +149,13 @@ def test_small_values_and_lag() -> None:
 
 
 def test_a_vehicle_is_of_one_kind() -> None:
-    """Nobody knows how a car with a rudder drives."""
+    """A car with a rudder is refused."""
     with pytest.raises(RobotError, match="No vehicle has all of these parts: rudder, wheels"):
         DrivingWorld({"wheels", "rudder"}, _SIZE, seed=1)
 
 
 def test_the_picture_turns_with_the_car() -> None:
-    """What is in the middle moves to the right in the picture when the car turns left."""
+    """The picture moves to the right when the car turns left."""
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed=1)
     before = world.picture()
     assert before.shape == (120, 160, 3)

@@ -7,7 +7,7 @@ served plan: with two pins swapped only in the served profile, the wrong motor t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -44,9 +44,19 @@ class WiredOutput(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Output:
+    """An output, with its settings read once.
+
+    Attributes:
+        plan: The output.
+        propels: Whether it propels the robot.
+        state: Reads its state, apart from the motors' power.
+        pulse_us: Reads the width of its pulses, us; 0 for none.
+    """
+
     plan: OutputPlan
-    rest: float
     propels: bool
+    state: Callable[[Levels], WiredOutput]
+    pulse_us: Callable[[Levels], float]
 
 
 class TwinWiring:
@@ -70,23 +80,11 @@ class TwinWiring:
         self.plan = plan
         has_one_shot = plan.enable_pin is not None and one_shot_ms is not None
         self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
-        actions = {action.name: action for action in plan.actions}
-        self._outputs: dict[str, _Output] = {}
-        self._high: set[int] = set()
-        for output in plan.outputs:
-            weights = {name: weight for name, weight in output.mix.items() if name in actions}
-            rest = output.offset + sum(
-                weight * actions[name].rest for name, weight in weights.items()
-            )
-            propels = any(weight and actions[name].propels for name, weight in weights.items())
-            self._outputs[output.name] = _Output(output, max(-1.0, min(1.0, rest)), propels)
-            if (pin := _output_enable(output)) >= 0:
-                self._high.add(pin)
-        self.outputs: Mapping[str, OutputPlan] = {
-            name: output.plan for name, output in self._outputs.items()
-        }
+        enables = (_output_enable(output) for output in plan.outputs)
+        self._high = {pin for pin in enables if pin >= 0}
+        self._outputs = {output.name: self._build(output) for output in plan.outputs}
+        self.outputs: Mapping[str, OutputPlan] = {output.name: output for output in plan.outputs}
         self.propelling = tuple(name for name, output in self._outputs.items() if output.propels)
-        self.read(Levels(), 0)  # Raises for outputs that the twin does not support.
 
     def idle_level(self, pin: int) -> int:
         """Return the level of an undriven pin.
@@ -105,89 +103,138 @@ class TwinWiring:
 
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
         """Return the state of each output at a time."""
-        ends_ns = self.power_ends_ns(levels)
-        powered = ends_ns is None or now_ns < ends_ns
-        read: dict[str, WiredOutput] = {}
-        for name, output in self._outputs.items():
-            if not powered and output.plan.driver in _POWERED:
-                read[name] = WiredOutput(0.0, True)
-            else:
-                read[name] = self._read(output, levels)
-        return read
+        powered = self._is_powered(levels, now_ns)
+        return {
+            name: output.state(levels)
+            if powered or output.plan.driver not in _POWERED
+            else WiredOutput(0.0, True)
+            for name, output in self._outputs.items()
+        }
 
     def has_pulses(self, name: str, levels: Levels, now_ns: int) -> bool:
         """Return whether a servo or speed controller has pulses and power."""
-        ends_ns = self.power_ends_ns(levels)
-        return (ends_ns is None or now_ns < ends_ns) and self._pulse(
-            self._outputs[name], levels
-        ) > 0.0
+        return self._is_powered(levels, now_ns) and self._outputs[name].pulse_us(levels) > 0.0
 
-    def _read(self, output: _Output, levels: Levels) -> WiredOutput:
-        settings = output.plan.settings
-        match output.plan.driver:
+    def _is_powered(self, levels: Levels, now_ns: int) -> bool:
+        ends_ns = self.power_ends_ns(levels)
+        return ends_ns is None or now_ns < ends_ns
+
+    def _build(self, plan: OutputPlan) -> _Output:
+        actions = {action.name: action for action in self.plan.actions}
+        weights = {name: weight for name, weight in plan.mix.items() if name in actions}
+        rest = plan.offset + sum(weight * actions[name].rest for name, weight in weights.items())
+        rest = max(-1.0, min(1.0, rest))
+        propels = any(weight and actions[name].propels for name, weight in weights.items())
+        pulse_us: Callable[[Levels], float] = _no_pulses
+        match plan.driver:
             case "hbridge":
-                enable = whole(settings, "enable")
-                drive = self._duty(levels, whole(settings, "forward"))
-                drive -= self._duty(levels, whole(settings, "backward"))
-                return self._motor(
-                    output, drive * (self._duty(levels, enable) if enable >= 0 else 1)
-                )
+                state = self._hbridge(plan, rest)
             case "phase_enable":
-                drive = self._duty(levels, whole(settings, "enable"))
-                # A phase that is high part of the time turns the motor back and forth.
-                direction = 1.0 - 2.0 * self._duty(levels, whole(settings, "phase"))
-                return self._motor(output, drive * direction)
+                state = self._phase_enable(plan, rest)
             case "servo":
-                return self._servo(output, self._pulse(output, levels))
+                pulse_us = self._pulse(plan)
+                state = _servo(plan, rest, pulse_us)
             case "esc":
-                return self._esc(output, self._pulse(output, levels))
+                pulse_us = self._pulse(plan)
+                state = _esc(plan, pulse_us)
             case "dynamixel":  # On a bus: no level of a pin determines its state.
-                return WiredOutput(None, True)
+                state = _without_torque
             case driver:
                 raise RobotError(f"The twin does not support the output driver {driver!r}.")
+        return _Output(plan, propels, state, pulse_us)
 
-    def _motor(self, output: _Output, drive: float) -> WiredOutput:
-        duty = Duty(number(output.plan.settings, "start"), number(output.plan.settings, "full"))
-        value = math.copysign(duty.size_at(abs(drive)), drive)
-        return WiredOutput(value, _near(value, output.rest, 0.01 if output.rest else 0.0))
+    def _hbridge(self, plan: OutputPlan, rest: float) -> Callable[[Levels], WiredOutput]:
+        keys = ("forward", "backward", "enable")
+        forward, backward, enable = (whole(plan.settings, key) for key in keys)
+        duty = _duty_of(plan)
 
-    def _servo(self, output: _Output, us: float) -> WiredOutput:
-        if not us:
-            return WiredOutput(None, True)
-        low, middle, high = _points(output.plan, "left_us", "centre_us", "right_us")
-        value = _between(us, low, middle, high)
-        return WiredOutput(value, _near(value, output.rest, ESC_DEAD_BAND_US / abs(high - middle)))
+        def state(levels: Levels) -> WiredOutput:
+            drive = self._duty(levels, forward) - self._duty(levels, backward)
+            return _motor(duty, drive * (self._duty(levels, enable) if enable >= 0 else 1), rest)
 
-    def _esc(self, output: _Output, us: float) -> WiredOutput:
-        if not us:
-            return WiredOutput(0.0, True)
-        low, middle, high = _points(output.plan, "backward_us", "neutral_us", "forward_us")
-        if abs(us - middle) <= ESC_DEAD_BAND_US:
-            return WiredOutput(0.0, True)
-        return WiredOutput(_between(us, low, middle, high), False)
+        return state
+
+    def _phase_enable(self, plan: OutputPlan, rest: float) -> Callable[[Levels], WiredOutput]:
+        enable, phase = (whole(plan.settings, key) for key in ("enable", "phase"))
+        duty = _duty_of(plan)
+
+        def state(levels: Levels) -> WiredOutput:
+            # A phase that is high part of the time turns the motor back and forth.
+            direction = 1.0 - 2.0 * self._duty(levels, phase)
+            return _motor(duty, self._duty(levels, enable) * direction, rest)
+
+        return state
+
+    def _pulse(self, plan: OutputPlan) -> Callable[[Levels], float]:
+        settings = plan.settings
+        match text(settings, "over"):
+            case "lgpio":
+                pin = whole(settings, "pin")
+                return lambda levels: levels.pulses.get(pin, Pulse(0.0, 0.0)).us
+            case "pca9685":
+                enable = _output_enable(plan)
+                channel = PwmChannel(
+                    *(whole(settings, key) for key in ("bus", "address", "channel"))
+                )
+
+                def pulse_us(levels: Levels) -> float:
+                    if enable >= 0 and self._duty(levels, enable) > 0.0:
+                        return 0.0
+                    return levels.channels.get(channel, Pulse(0.0, 0.0)).us
+
+                return pulse_us
+            case over:
+                raise RobotError(
+                    f"Output {plan.name!r}: the twin has no servos over {over!r}; "
+                    "it has them over 'pca9685' and 'lgpio'."
+                )
 
     def _duty(self, levels: Levels, pin: int) -> float:
         duty = levels.duties.get(pin)
         return float(self.idle_level(pin)) if duty is None else duty
 
-    def _pulse(self, output: _Output, levels: Levels) -> float:
-        settings = output.plan.settings
-        match text(settings, "over"):
-            case "lgpio":
-                return levels.pulses.get(whole(settings, "pin"), Pulse(0.0, 0.0)).us
-            case "pca9685":
-                enable = _output_enable(output.plan)
-                if enable >= 0 and self._duty(levels, enable) > 0.0:
-                    return 0.0
-                channel = PwmChannel(
-                    *(whole(settings, key) for key in ("bus", "address", "channel"))
-                )
-                return levels.channels.get(channel, Pulse(0.0, 0.0)).us
-            case over:
-                raise RobotError(
-                    f"Output {output.plan.name!r}: the twin has no servos over {over!r}; "
-                    "it has them over 'pca9685' and 'lgpio'."
-                )
+
+def _no_pulses(levels: Levels) -> float:
+    return 0.0
+
+
+def _without_torque(levels: Levels) -> WiredOutput:
+    return WiredOutput(None, True)
+
+
+def _duty_of(plan: OutputPlan) -> Duty:
+    return Duty(number(plan.settings, "start"), number(plan.settings, "full"))
+
+
+def _motor(duty: Duty, drive: float, rest: float) -> WiredOutput:
+    value = math.copysign(duty.size_at(abs(drive)), drive)
+    return WiredOutput(value, _near(value, rest, 0.01 if rest else 0.0))
+
+
+def _servo(
+    plan: OutputPlan, rest: float, pulse_us: Callable[[Levels], float]
+) -> Callable[[Levels], WiredOutput]:
+    low, middle, high = _points(plan, "left_us", "centre_us", "right_us")
+
+    def state(levels: Levels) -> WiredOutput:
+        if not (us := pulse_us(levels)):
+            return WiredOutput(None, True)
+        value = _between(us, low, middle, high)
+        return WiredOutput(value, _near(value, rest, ESC_DEAD_BAND_US / abs(high - middle)))
+
+    return state
+
+
+def _esc(plan: OutputPlan, pulse_us: Callable[[Levels], float]) -> Callable[[Levels], WiredOutput]:
+    low, middle, high = _points(plan, "backward_us", "neutral_us", "forward_us")
+
+    def state(levels: Levels) -> WiredOutput:
+        us = pulse_us(levels)
+        if not us or abs(us - middle) <= ESC_DEAD_BAND_US:
+            return WiredOutput(0.0, True)
+        return WiredOutput(_between(us, low, middle, high), False)
+
+    return state
 
 
 def _output_enable(plan: OutputPlan) -> int:

@@ -85,7 +85,7 @@ def test_a_goal_beyond_the_current_limit_is_refused() -> None:
 
 
 def test_a_change_of_the_mode_sets_the_goal_to_the_limit() -> None:
-    """The trap of the manual: who switches torque on next gets all of it."""
+    """The trap of the manual: enabling the torque then pulls with all of it."""
     line = _line()
     assert _write(line, 102, 0, 2) == 0
     assert _write(line, 11, 0) == 0

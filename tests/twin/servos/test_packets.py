@@ -48,7 +48,7 @@ def test_packets_are_those_of_the_manual(name: str) -> None:
 
 @pytest.mark.parametrize("name", _EXAMPLES)
 def test_packets_of_the_manual_are_understood(name: str) -> None:
-    """What they were made of comes back, however the bytes arrive."""
+    """Packets are parsed, however the bytes arrive."""
     data = bytes.fromhex(_EXAMPLES[name][0])
     parser = Parser()
     found = [packet for byte in data for packet in parser.feed(bytes([byte]))]
@@ -76,7 +76,7 @@ def test_any_body_survives_stuffing(noise: bytes, body: bytes) -> None:
 
 
 def test_a_damaged_packet_does_not_hide_the_next() -> None:
-    """It is told of, and the next one is found."""
+    """It is reported, and the next one is found."""
     good, bad = pack(1, 1, b""), bytearray(pack(2, 1, b""))
     bad[-1] ^= 1
     found = Parser().feed(bytes(bad) + good)
@@ -84,6 +84,6 @@ def test_a_damaged_packet_does_not_hide_the_next() -> None:
 
 
 def test_a_length_that_lies_does_not_stop_the_parser() -> None:
-    """A header with a length of 0 or 60000 is no packet."""
+    """A header with a length of 0 or 60000 does not start a packet."""
     lies = b"\xff\xff\xfd\x00\x01\x00\x00" + b"\xff\xff\xfd\x00\x01\x60\xea"
     assert Parser().feed(lies + pack(1, 1, b"")) == [Packet(1, 1, b"", True)]

@@ -79,6 +79,6 @@ class ServoPty:
             self._give(answer)
 
     def _give(self, data: bytes) -> None:
-        """Send bytes; as on a serial line, those that nobody reads are lost."""
+        """Send bytes; as on a serial line, unread ones are lost."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._host, data)

@@ -106,7 +106,7 @@ class Rig:
         return self.line.servos[NAMES.index(name) + 1]
 
     def run(self, tension: float | None, cycles: int = 1, **others: float) -> BusState:
-        """Pull all tendons alike, but for some, for so many cycles; the last state."""
+        """Pull all tendons with one tension, except `others`, and return the last state."""
         assert cycles > 0
         for _ in range(cycles):
             tensions = None if tension is None else dict.fromkeys(NAMES, tension) | others
@@ -115,5 +115,5 @@ class Rig:
         return state
 
     def pulls(self) -> list[float]:
-        """The current that each simulated servo is told to let flow, A."""
+        """Return the goal current in effect of each simulated servo, A."""
         return [one.pulls_a for one in self.line.servos.values()]

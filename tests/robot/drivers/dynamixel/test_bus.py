@@ -10,7 +10,7 @@ from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, serv
 
 
 def test_all_that_are_missing_are_named() -> None:
-    """Who wires a rig wants to know of each at once."""
+    """The error lists all missing servos at once."""
     rig = Rig()
     rig.twin("FDS").faults.mute = rig.twin("PI").faults.deaf = True
     words = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
@@ -46,7 +46,7 @@ def test_servos_are_ready_and_slack_before_they_have_torque() -> None:
 
 
 def test_the_torque_comes_last() -> None:
-    """Each servo hears its goal and its watchdog before its torque, whatever it had before."""
+    """Each servo gets its goal and its watchdog before its torque, whatever it had before."""
     rig = Rig()
     rig.bus.set_up()
     rig.port.sent.clear()
@@ -102,7 +102,7 @@ def test_a_spool_that_is_wound_the_other_way_pulls_too() -> None:
 
 
 def test_tensions_are_kept_between_pretension_and_cap() -> None:
-    """More is capped and said to be; less is the pretension."""
+    """More is capped and reported; less is the pretension."""
     rig = Rig().start()
     state = rig.run(500.0, LUM=-3.0)
     assert state.servos["FDP"].is_capped
@@ -125,7 +125,7 @@ def test_what_is_no_number_moves_nothing(wrong: float) -> None:
 
 
 def test_a_tension_too_few_or_too_many_is_refused() -> None:
-    """A tendon that nobody spoke of, and one that does not exist."""
+    """A missing tendon, and one that does not exist."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="no tension for EIP, EDC"):
         rig.bus.cycle(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0), 0)
@@ -152,7 +152,7 @@ def test_a_stop_goes_down_to_the_pretension_and_lets_go() -> None:
 
 
 def test_a_command_does_not_end_a_stop() -> None:
-    """Who stops, stops."""
+    """Tensions that are requested after a stop have no effect."""
     rig = Rig().start()
     rig.run(12.0, 5)
     rig.bus.stop(rig.line.now_ns)

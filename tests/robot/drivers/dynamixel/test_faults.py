@@ -1,4 +1,4 @@
-"""Each thing that can go wrong: what is said, and what happens to the tendons."""
+"""Faults of a rig: their messages, and their effect on the tendons."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -63,7 +63,7 @@ def _snapped(rig: Rig) -> None:
     ],
 )
 def test_a_fault_of_one_stops_all(fault: Callable[[Rig], None], words: str) -> None:
-    """It has its sentence, the others go down in their time, and in the end nobody pulls."""
+    """It is reported, the others ramp down, and in the end no servo pulls."""
     rig = Rig(settings(most_missed=5)).start()
     rig.run(10.0, 20)
     fault(rig)
@@ -89,7 +89,7 @@ def _until(rig: Rig, holds: Callable[[BusState], bool], cycles: int = 120) -> Bu
 
 
 def test_the_others_are_heard_while_one_is_silent() -> None:
-    """Servos behind a silent one are asked again without it; nothing old is said again."""
+    """Servos behind a silent one are read again without it; old readings are never repeated."""
     rig = Rig().start()
     rig.run(4.0, 3)
     rig.twin("FDS").faults.mute = True
@@ -131,7 +131,7 @@ def test_three_silent_servos_are_each_found() -> None:
 
 
 def test_a_mute_servo_is_left_to_its_watchdog() -> None:
-    """It may still hear, but does not confirm: so nobody is spoken to any more."""
+    """It may still receive but does not confirm: so nothing is sent any more."""
     rig = Rig().start()
     rig.run(10.0, 5)
     rig.twin("EIP").faults.deaf = True
@@ -150,7 +150,7 @@ def test_a_mute_servo_is_left_to_its_watchdog() -> None:
     ],
 )
 def test_a_dip_of_the_power_takes_the_zero(most_missed: int, words: str) -> None:
-    """Turns are forgotten with the power: no length from before is told, not even once."""
+    """Turns are lost with the power: no length from before is reported, not even once."""
     rig = Rig(settings(most_missed=most_missed)).start()
     rig.run(4.0, 5)
     rig.twin("EIP").lose_power()
@@ -175,7 +175,7 @@ def test_after_a_fault_nothing_is_held_until_it_is_set_up_again() -> None:
 
 
 def test_who_switched_itself_off_needs_a_reboot() -> None:
-    """Setting up says so, and a reboot does it."""
+    """Setting up reports it, and a reboot repairs it."""
     rig = Rig().start()
     rig.twin("EIP").overload()
     _until(rig, lambda s: s.mode == "off")
@@ -198,7 +198,7 @@ def test_nothing_is_rebooted_while_it_is_held() -> None:
 
 @pytest.mark.parametrize("on_trip", ["coast", "release"])
 def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "release"]) -> None:
-    """After 100 ms without a word no servo pulls, and the next cycle says why."""
+    """After 100 ms without a packet no servo pulls, and the next cycle reports the reason."""
     plans = [ServoPlan(i, MODEL, on_trip=on_trip) for i in range(1, 8)]
     rig = Rig(plans=plans).start()
     rig.run(10.0, 20)
@@ -215,7 +215,7 @@ def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "r
 
 
 def test_a_cut_cable_ends_in_the_watchdogs() -> None:
-    """Nobody can be told anything, and nobody has to be."""
+    """No packet can arrive, and none has to."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.port.is_cut = True

@@ -25,7 +25,7 @@ _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @_slow
 @given(noise=st.lists(_noise, max_size=5), tension=st.floats(-50, 50))
 def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: float) -> None:
-    """The driver gets on, and no servo is ever told more than its cap."""
+    """The driver continues, and no servo ever gets more than its cap."""
     rig = Rig().start()
     cap = 683e-3
     for data in noise:
@@ -40,7 +40,7 @@ def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: 
 @_slow
 @given(noise=st.lists(_noise, max_size=2))
 def test_noise_never_breaks_the_start(noise: list[bytes]) -> None:
-    """It starts, or says in a sentence why not."""
+    """It starts, or raises an error with a reason."""
     rig = Rig()
     said: list[str] = []
     for data in noise:

@@ -46,7 +46,7 @@ def test_a_tendon_that_meets_nothing_is_named() -> None:
 
 
 def test_there_is_a_limit_to_the_time() -> None:
-    """What moves for ever is named."""
+    """The error names the tendon that keeps moving."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()
@@ -56,7 +56,7 @@ def test_there_is_a_limit_to_the_time() -> None:
 
 
 def test_a_fault_ends_it() -> None:
-    """And says which."""
+    """And it is named."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()

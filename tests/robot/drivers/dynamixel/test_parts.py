@@ -33,7 +33,7 @@ def test_a_stop_never_pulls_harder_than_its_end() -> None:
 
 
 def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
-    """A quick flick of the finger is no snapped tendon; a pause begins afresh."""
+    """A quick flick of the finger is no snapped tendon; a pause restarts the time."""
     slack = SlackDetector(-0.06, 0.1, 100)
     assert slack.see(None, -0.2, 0) == ""
     assert slack.see(None, -0.2, 99 * MS) == ""
@@ -43,7 +43,7 @@ def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
 
 
 def test_a_tendon_that_is_let_out_fast_is_not_slack() -> None:
-    """Only who winds in without a load runs away."""
+    """Only winding in without a load counts."""
     slack = SlackDetector(-0.06, 0.1, 100)
     assert [slack.see(0.01, 0.5, t * MS) for t in (0, 500)] == ["", ""]
 

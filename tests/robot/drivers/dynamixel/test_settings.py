@@ -52,11 +52,11 @@ def test_an_unknown_model_names_the_nearest() -> None:
     ],
 )
 def test_a_bus_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
-    """A bus without a watchdog is no bus to hold a finger with."""
+    """A bus without a watchdog must not hold a finger."""
     with pytest.raises(RobotError, match=words):
         settings(**changes)
 
 
 def test_the_watchdog_cannot_be_forgotten() -> None:
-    """Who says nothing about it has one."""
+    """By default there is one."""
     assert BusSettings("x", (servo("FDP"),)).watchdog_ms == 100
