@@ -1,5 +1,7 @@
 """Barcodes, checks and streams of pictures, without a camera."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import simplejpeg
@@ -7,14 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import (
     FreezeDetector,
     JpegSplitter,
     captured_ns_of,
     check_jpeg,
-    turned,
+    checked_frame,
 )
 from shapechanger.robot.cameras.pattern import barcode_rows, draw_barcode, read_barcode
+from shapechanger.robot.daemon.camera import FrameChecks
 
 _RNG = np.random.default_rng(20171121)
 
@@ -84,10 +88,43 @@ def test_garbage_is_no_picture(data: bytes) -> None:
         check_jpeg(data, (32, 24))
 
 
+def test_frame_that_is_missing_a_part_is_not_turned() -> None:
+    """Its missing blocks would become grey, and the new JPEG would look complete."""
+    jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
+    broken = jpeg[: len(jpeg) // 2] + b"\xff\xd9"
+    with pytest.raises(RobotError, match="cannot be decoded"):
+        checked_frame(broken, 0, CameraPlan("file", flip=True))
+    assert FrameChecks((160, 120)).refusal(Frame(broken, 0)) != ""
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the camera's data to the daemon, upside down or not."""
+    decoded: list[bytes] = []
+    decode = simplejpeg.decode_jpeg
+
+    def counting(data: bytes, **options: Any) -> Any:
+        decoded.append(data)
+        return decode(data, **options)
+
+    monkeypatch.setattr(simplejpeg, "decode_jpeg", counting)
+    jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
+    frame = checked_frame(jpeg, 0, CameraPlan("file", flip=flip))
+    assert FrameChecks((160, 120)).refusal(frame) == ""
+    assert decoded == [jpeg]
+    assert frame.encoded_here is flip
+
+
 def test_same_bytes_are_not_a_new_picture() -> None:
     """A camera that has frozen goes on sending."""
     detector = FreezeDetector()
     assert [detector.is_new(_jpeg(v)) for v in (1, 1, 2, 2, 1)] == [True, False, True, False, True]
+
+
+def _turned(jpeg: bytes, quality: int) -> bytes:
+    height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
+    plan = CameraPlan("file", (int(width), int(height)), jpeg_quality=quality, flip=True)
+    return checked_frame(jpeg, 0, plan).jpeg
 
 
 def test_turned_twice_is_as_before() -> None:
@@ -95,10 +132,10 @@ def test_turned_twice_is_as_before() -> None:
     image = np.zeros((24, 32, 3), np.uint8)
     image[:8, :8] = 255
     jpeg = simplejpeg.encode_jpeg(image, 95)
-    once = simplejpeg.decode_jpeg(turned(jpeg, 95))
+    once = simplejpeg.decode_jpeg(_turned(jpeg, 95))
     assert once[-4, -4].min() > 200
     assert once[4, 4].max() < 50
-    twice = simplejpeg.decode_jpeg(turned(turned(jpeg, 95), 95))
+    twice = simplejpeg.decode_jpeg(_turned(_turned(jpeg, 95), 95))
     np.testing.assert_allclose(twice, image, atol=30)
 
 

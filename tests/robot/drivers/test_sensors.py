@@ -2,6 +2,7 @@
 
 import math
 import struct
+import time
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers import hcsr04
 from tests.robot.drivers.fakes import MS, FakeHardware
 
 _ENCODER = {"a": 5, "b": -1, "counts_per_turn": 20, "wheel_m": 0.2}
@@ -128,6 +130,44 @@ def test_pings_keep_their_distance() -> None:
     assert hardware.factory.log[:2] == [("GPIO23", 1.0), ("GPIO23", 0.0)]
 
 
+class _SimulatedClock:
+    """Clock of simulated hardware."""
+
+
+def _forbid(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(*_: object) -> int:
+        raise AssertionError(f"time.{name} was called.")
+
+    monkeypatch.setattr(hcsr04.time, name, forbidden)
+
+
+def test_a_ping_never_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a robot the trigger stays high for 10 us without giving the processor away."""
+    _forbid("sleep", monkeypatch)
+    hardware = FakeHardware()
+    sonar = hardware.sensor("hcsr04", **_SONAR)
+    times: list[int] = []
+    real_ns = time.perf_counter_ns
+    monkeypatch.setattr(
+        hcsr04.time, "perf_counter_ns", lambda: times.append(real_ns()) or times[-1]
+    )
+    sonar.read(0, 1.0)
+    assert times[-1] - times[0] >= 10_000
+    assert hardware.factory.log == [("GPIO23", 1.0), ("GPIO23", 0.0)]
+
+
+def test_a_ping_of_simulated_pins_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It neither sleeps nor reads the clock of the machine."""
+    hardware = FakeHardware()
+    monkeypatch.setattr(hardware, "clock", _SimulatedClock())
+    sonar = hardware.sensor("hcsr04", **_SONAR)
+    _forbid("sleep", monkeypatch)
+    with monkeypatch.context() as patch:
+        _forbid("perf_counter_ns", patch)
+        assert sonar.read(0, 1.0) == {}
+    assert hardware.factory.log == [("GPIO23", 1.0), ("GPIO23", 0.0)]
+
+
 def test_sonar_fails_after_three_missed_echoes_and_comes_back() -> None:
     """A cable came loose: the last "far" must not be believed for long."""
     hardware = FakeHardware()
@@ -192,6 +232,34 @@ def test_gyroscope_learns_its_zero_while_the_robot_rests() -> None:
     assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.0)
     hardware.bus.chips[0x68] |= _motion(0, 0, 8192, 1310)
     assert imu.read(0, 1.0)["yaw_rate"] == pytest.approx(math.radians(10.0))
+
+
+@pytest.mark.parametrize("counts", [-32768, -1, 1, 32767])
+def test_motion_uses_the_whole_range(counts: int) -> None:
+    """Full scale is 4 g and 500 deg/s, with a sign."""
+    hardware = FakeHardware({0x69: _motion(counts, -1 - counts, 8192, counts)})
+    read = hardware.sensor("mpu6050", bus=1, address=0x69).read(0, 1.0)
+    assert read["acceleration_x"] == pytest.approx(counts / 8192 * 9.80665)
+    assert read["acceleration_y"] == pytest.approx((-1 - counts) / 8192 * 9.80665)
+    assert read["yaw_rate"] == pytest.approx(math.radians(counts / 65.5))
+
+
+@pytest.mark.parametrize(("deg_per_s", "learns"), [(-24.9, True), (24.9, True), (25.1, False)])
+def test_gyroscope_learns_no_zero_from_a_robot_that_turns(deg_per_s: float, learns: bool) -> None:
+    """Above 25 deg/s the robot itself turns, as when someone carries it."""
+    hardware = FakeHardware({0x68: _motion(0, 0, 8192, round(deg_per_s * 65.5))})
+    yaw_rate = hardware.sensor("mpu6050", bus=1, address=0x68).read(0, 0.0)["yaw_rate"]
+    expected = 0.0 if learns else math.radians(round(deg_per_s * 65.5) / 65.5)
+    assert yaw_rate == pytest.approx(expected)
+
+
+def test_gyroscope_zero_follows_slowly() -> None:
+    """By 2 % of the difference in each reading at rest."""
+    hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
+    imu = hardware.sensor("mpu6050", bus=1, address=0x68)
+    imu.read(0, 0.0)
+    hardware.bus.chips[0x68] |= _motion(0, 0, 8192, 655)
+    assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.98 * math.radians(10.0))
 
 
 def test_other_chip_or_none_is_named() -> None:

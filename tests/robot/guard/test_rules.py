@@ -464,6 +464,29 @@ def test_a_low_battery_is_believed_after_a_while_and_then_for_good() -> None:
     assert _ask(rules, 3, later, 0.5) == (0.5, "")
 
 
+@pytest.mark.parametrize(("name", "bad"), [("battery", 6.3), ("temperature", 80.5)])
+def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, bad: float) -> None:
+    """Not 1 ns earlier, and at exactly that time."""
+    limits = LimitPlan(low_battery_v=6.4, high_temperature_c=80.0, stall_s=0.0)
+    half_a_second = 500 * MS
+    for after_ns, stops in ((half_a_second - 1, False), (half_a_second, True)):
+        rules = _driving(quick_car(limits))
+        _sense(rules, _T0, **{name: bad})
+        _sense(rules, _T0 + after_ns, **{name: bad})
+        rules.offer(command(2, _T0 + after_ns), _T0 + after_ns)
+        assert bool(rules.tick(_T0 + after_ns).stop_reason) is stops
+
+
+def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
+    """And a low one starts again from zero after each good reading."""
+    rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
+    for ms in range(0, 1200, 100):
+        _sense(rules, _T0 + ms * MS, battery=6.4 if ms < 700 else 6.39)
+    assert _ask(rules, 2, _T0 + 1_199 * MS, 0.5) == (0.5, "")
+    _sense(rules, _T0 + 1_200 * MS, battery=6.39)
+    assert "battery" in rules.tick(_T0 + 1_200 * MS).stop_reason
+
+
 def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
     """Arming again and again gives no driving in between."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))

@@ -7,7 +7,7 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
-from shapechanger.robot.cameras.jpeg import check_jpeg, turned
+from shapechanger.robot.cameras.jpeg import checked_frame
 
 __all__ = ["Folder", "open_driver"]
 
@@ -37,13 +37,9 @@ class Folder:
         file = self._files[self._next]
         self._next = (self._next + 1) % len(self._files)
         try:
-            jpeg = file.read_bytes()
-            check_jpeg(jpeg, self._plan.size)
+            return checked_frame(file.read_bytes(), captured_ns, self._plan)
         except (OSError, RobotError) as error:
             raise RobotError(f"{file}: {error}") from error
-        if self._plan.flip:
-            jpeg = turned(jpeg, self._plan.jpeg_quality)
-        return Frame(jpeg, captured_ns)
 
     def close(self) -> None:
         """Interrupt a waiting `read`."""

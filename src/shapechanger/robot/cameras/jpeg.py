@@ -9,8 +9,16 @@ import numpy as np
 import simplejpeg
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
-__all__ = ["MAX_JPEG", "FreezeDetector", "JpegSplitter", "captured_ns_of", "check_jpeg", "turned"]
+__all__ = [
+    "MAX_JPEG",
+    "FreezeDetector",
+    "JpegSplitter",
+    "captured_ns_of",
+    "check_jpeg",
+    "checked_frame",
+]
 
 MAX_JPEG: Final = 4 * 1024 * 1024
 """Size of the largest frame, bytes."""
@@ -58,16 +66,30 @@ class FreezeDetector:
         return new
 
 
-def turned(jpeg: bytes, quality: int) -> bytes:
-    """Rotate a frame by 180 degrees by decoding and encoding it.
+def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
+    """Return a frame of the camera's size, rotated by 180 degrees if the camera is upside down.
+
+    The data is decoded only in order to rotate it.
 
     Args:
-        jpeg: A complete JPEG, see `check_jpeg`.
-        quality: 1 to 100.
+        jpeg: Data from a camera.
+        captured_ns: Time of capture, ns.
+        plan: Settings of the camera.
+
+    Raises:
+        RobotError: If the data is no complete JPEG of that size, or cannot be decoded to rotate it.
     """
-    image = simplejpeg.decode_jpeg(jpeg, strict=False)
+    check_jpeg(jpeg, plan.size)
+    if not plan.flip:
+        return Frame(jpeg, captured_ns)
+    try:
+        # Strict: without it, missing blocks would become grey, and the new JPEG would hide that.
+        image = simplejpeg.decode_jpeg(jpeg, strict=True)
+    except ValueError as error:
+        raise RobotError(f"The camera sent a JPEG that cannot be decoded: {error}.") from error
     upright = np.ascontiguousarray(image[::-1, ::-1])
-    return simplejpeg.encode_jpeg(upright, quality, colorsubsampling="420")
+    encoded = simplejpeg.encode_jpeg(upright, plan.jpeg_quality, colorsubsampling="420")
+    return Frame(encoded, captured_ns, encoded_here=True)
 
 
 _START: Final = b"\xff\xd8"

@@ -83,7 +83,7 @@ class Pattern:
 
     def __init__(self, plan: CameraPlan) -> None:
         self._width, self._height = plan.size
-        if self._width < 96 or self._height < barcode_rows(self._width):
+        if self._width < _LEAST_WIDTH or self._height < barcode_rows(self._width):
             raise RobotError(
                 f"A test pattern of {self._width} by {self._height} pixels has no room for its "
                 "barcode: it needs a width of 96 at least."
@@ -97,7 +97,7 @@ class Pattern:
         image = self._drawn(captured_ns)
         draw_barcode(image, captured_ns)
         jpeg = simplejpeg.encode_jpeg(image, self._quality, colorsubsampling="420")
-        return Frame(jpeg, captured_ns)
+        return Frame(jpeg, captured_ns, encoded_here=True)
 
     def close(self) -> None:
         """Interrupt a waiting `read`."""

@@ -71,7 +71,8 @@ class PiCamera:
                 f"the profile says {width} by {height}."
             )
         quality = self._plan.jpeg_quality
-        return Frame(simplejpeg.encode_jpeg(image, quality, colorsubsampling="420"), captured_ns)
+        jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling="420")
+        return Frame(jpeg, captured_ns, encoded_here=True)
 
     def close(self) -> None:
         """Stop the camera after a `read` in progress."""

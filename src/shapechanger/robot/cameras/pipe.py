@@ -16,7 +16,7 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
-from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, check_jpeg, turned
+from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, checked_frame
 
 __all__ = ["Pipe", "open_driver"]
 
@@ -58,10 +58,7 @@ class Pipe:
             jpeg = self._newest(jpeg)
             captured_ns = captured_ns_of(jpeg)
         arrived_ns = time.monotonic_ns()
-        check_jpeg(jpeg, self._plan.size)
-        if self._plan.flip:
-            jpeg = turned(jpeg, self._plan.jpeg_quality)
-        return Frame(jpeg, arrived_ns if captured_ns is None else captured_ns)
+        return checked_frame(jpeg, arrived_ns if captured_ns is None else captured_ns, self._plan)
 
     def close(self) -> None:
         """Interrupt a waiting `read`, and end the program."""

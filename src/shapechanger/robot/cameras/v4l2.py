@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
-from shapechanger.robot.cameras.jpeg import check_jpeg, turned
+from shapechanger.robot.cameras.jpeg import checked_frame
 
 __all__ = [
     "BUFFER_FLAG_ERROR",
@@ -168,10 +168,7 @@ class V4l2:
             jpeg, captured_ns = self._newest()
         except OSError as error:
             raise RobotError(f"The camera {self._device} does not answer: {error}.") from error
-        check_jpeg(jpeg, self._plan.size)
-        if self._plan.flip:
-            jpeg = turned(jpeg, self._plan.jpeg_quality)
-        return Frame(jpeg, captured_ns)
+        return checked_frame(jpeg, captured_ns, self._plan)
 
     def close(self) -> None:
         """Interrupt a waiting `read`."""

@@ -64,12 +64,13 @@ class FrameChecks:
 
     def refusal(self, frame: Frame) -> str:
         """Return the reason to reject a frame, or "" if it is valid and new."""
-        try:
-            check_jpeg(frame.jpeg, self._size)
-            # To the last block: strict rejects data that a decoder would fill up with grey.
-            simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
-        except (RobotError, ValueError) as error:
-            return str(error)
+        if not frame.encoded_here:
+            try:
+                check_jpeg(frame.jpeg, self._size)
+                # To the last block: strict rejects data that a decoder would fill up with grey.
+                simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
+            except (RobotError, ValueError) as error:
+                return str(error)
         if not self._freeze.is_new(frame.jpeg):
             return "The camera repeats the same frame."
         if frame.captured_ns <= self._newest_ns:

@@ -16,7 +16,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, RealClock
 
 __all__ = ["Hcsr04", "open_driver"]
 
@@ -29,9 +29,12 @@ _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for
 class Hcsr04:
     """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
 
-    def __init__(self, trigger: int, echo: int, max_m: float, factory: Any, name: str) -> None:
+    def __init__(
+        self, trigger: int, echo: int, max_m: float, factory: Any, name: str, trigger_ns: int
+    ) -> None:
         self._name = name
         self._max_m = max_m
+        self._trigger_ns = trigger_ns
         self._ticks_diff = factory.ticks_diff
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._rise: float | None = None
@@ -74,9 +77,11 @@ class Hcsr04:
         with in_words(self._name):
             self._trigger.on()
             # Spin: the shortest sleep takes several times as long, and the guard waits for it.
-            end_ns = time.perf_counter_ns() + _TRIGGER_NS
-            while time.perf_counter_ns() < end_ns:
-                pass
+            # Simulated pins need no pulse width.
+            if self._trigger_ns:
+                end_ns = time.perf_counter_ns() + self._trigger_ns
+                while time.perf_counter_ns() < end_ns:
+                    pass
             self._trigger.off()
 
     def _changed(self, at_s: float, level: int) -> None:
@@ -104,4 +109,5 @@ def open_driver(plan: SensorPlan, hardware: Hardware) -> Hcsr04:
             number(settings, "max_m"),
             hardware.pin_factory(),
             name,
+            trigger_ns=_TRIGGER_NS if isinstance(hardware.clock, RealClock) else 0,
         )

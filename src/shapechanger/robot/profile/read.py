@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.errors import ProfileError
-from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
-from shapechanger.robot.profile.mistakes import Place, Source, called, choice, shown
+from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, StopPlan
+from shapechanger.robot.profile.mistakes import Source, choice
 from shapechanger.robot.profile.profile import (
     EnablePlan,
     Profile,
@@ -32,18 +31,14 @@ from shapechanger.robot.profile.schema import (
     ProfileKey,
 )
 from shapechanger.robot.profile.sections import (
+    Section,
     check_mix,
-    check_pulses,
     check_stop,
     read_action,
     read_camera,
-    read_keys,
     read_limits,
     read_output,
     read_sensor,
-    refuse_bad_name,
-    refuse_unknown_keys,
-    table_at,
 )
 from shapechanger.robot.profile.wiring import PinAllocation
 
@@ -78,24 +73,31 @@ class _Reader:
 
     def __init__(self, source: Source, data: Mapping[str, Any]) -> None:
         self._source = source
-        self._data = data
+        self._root = Section(source, (), data)
         self._wiring = PinAllocation(source)
 
     def profile(self) -> Profile:
         """Read the whole profile."""
-        robot = self._only_table("robot", ROBOT_KEYS)
-        named = {name: read_action(self._source, name, t) for name, t in self._named("action")}
+        root = self._root
+        robot = root.section("robot").read(ROBOT_KEYS)
+        named = {name: read_action(name, table) for name, table in self._named("action").items()}
         if not named:
             words = "a robot needs an action, such as [action.throttle]"
-            raise self._source.mistake(("action",), words)
-        outputs = self._outputs(named)
-        sensors = self._sensors()
-        camera = self._camera()
-        stop = StopPlan(**self._only_table("stop", STOP_KEYS))
+            raise root.mistake(words, "action")
+        outputs = tuple(read_output(name, table) for name, table in self._named("output").items())
+        check_mix(self._source, named, outputs)
+        outputs = self._wiring.take_outputs(outputs)
+        sensors = tuple(read_sensor(name, table) for name, table in self._named("sensor").items())
+        for sensor in sensors:
+            self._wiring.take_sensor(sensor)
+        camera = read_camera(root.section("camera")) if "camera" in root else None
+        stop = StopPlan(**root.section("stop").read(STOP_KEYS))
         check_stop(self._source, stop, named, outputs)
-        outputs, sensors = self._servo_bus(outputs, sensors, stop)
-        table = table_at(self._source, self._data, ("limits",))
-        limits = read_limits(self._source, table, robot["control_hz"], camera, sensors)
+        bus = root.section("servo_bus").read(SERVO_BUS_KEYS) if "servo_bus" in root else None
+        outputs, sensors = with_servo_bus(self._source, bus, outputs, sensors, stop)
+        limits = read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
+        enable = self._with_pin("enable", ENABLE_KEYS)
+        button = self._with_pin("emergency_button", EMERGENCY_BUTTON_KEYS)
         actions = tuple(named.values())
         return Profile(
             path=self._source.path,
@@ -108,98 +110,52 @@ class _Reader:
             max_observation_age_ms=limits["max_observation_age_ms"],
             arming=limits["arming"],
             stop=stop,
-            reward=RewardPlan(**self._only_table("reward", REWARD_KEYS)),
+            reward=RewardPlan(**root.section("reward").read(REWARD_KEYS)),
             reset=self._reset(actions),
-            enable=self._enable(),
-            stop_pin=self._stop_pin(),
+            enable=EnablePlan(**enable) if enable else None,
+            stop_pin=button["pin"] if button else None,
         )
-
-    def _outputs(self, actions: Mapping[str, ActionPlan]) -> tuple[OutputPlan, ...]:
-        outputs = tuple(read_output(self._source, name, t) for name, t in self._named("output"))
-        for output in outputs:
-            check_pulses(self._source, output)
-        check_mix(self._source, actions, outputs)
-        return self._wiring.take_outputs(outputs)
-
-    def _sensors(self) -> tuple[SensorPlan, ...]:
-        sensors = tuple(read_sensor(self._source, name, t) for name, t in self._named("sensor"))
-        for sensor in sensors:
-            self._wiring.take_sensor(sensor)
-        return sensors
-
-    def _servo_bus(
-        self, outputs: tuple[OutputPlan, ...], sensors: tuple[SensorPlan, ...], stop: StopPlan
-    ) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
-        settings = self._only_table("servo_bus", SERVO_BUS_KEYS)
-        asked = "servo_bus" in self._data
-        return with_servo_bus(self._source, settings if asked else None, outputs, sensors, stop)
-
-    def _camera(self) -> CameraPlan | None:
-        if "camera" not in self._data:
-            return None
-        return read_camera(self._source, table_at(self._source, self._data, ("camera",)))
 
     def _reset(self, actions: Sequence[ActionPlan]) -> tuple[ResetStep, ...]:
-        steps = self._data.get("reset", [])
+        steps = self._root.table.get("reset", [])
         if not isinstance(steps, list):
             words = "the steps of the reset routine are written [[reset]], with two brackets"
-            raise self._source.mistake(("reset",), words)
-        return tuple(
-            self._step(("reset", i), step, actions)
-            for i, step in enumerate(cast("list[Any]", steps))
-        )
+            raise self._root.mistake(words, "reset")
+        tables = enumerate(cast("list[Any]", steps))
+        return tuple(_step(Section(self._source, ("reset", i), t), actions) for i, t in tables)
 
-    def _step(self, place: Place, table: Any, actions: Sequence[ActionPlan]) -> ResetStep:
-        if not isinstance(table, dict):
-            words = f"{called(place)} must be a table, not {shown(table)}"
-            raise self._source.mistake(place, words)
-        step = self._keys(cast("dict[str, Any]", table), place, RESET_KEYS)
-        values: dict[str, float] = step["values"]
-        known = {action.name: action for action in actions}
-        for name, value in values.items():
-            at = (*place, "values", name)
-            if name not in known:
-                words = f"values of {called(place)} name no action: {choice(name, known)}"
-                raise self._source.mistake(at, words)
-            low, high = known[name].low, known[name].high
-            if not low <= value <= high:
-                words = f"{name} of {called(place)} must be {low:g} to {high:g}, its own caps"
-                raise self._source.mistake(at, words)
-        filled = tuple(values.get(action.name, action.rest) for action in actions)
-        return ResetStep(filled, step["seconds"])
-
-    def _enable(self) -> EnablePlan | None:
-        if "enable" not in self._data:
+    def _with_pin(self, name: str, keys: Sequence[ProfileKey]) -> dict[str, Any] | None:
+        """Read a table with a pin, and allocate the pin; None if it is missing."""
+        if name not in self._root:
             return None
-        enable = EnablePlan(**self._only_table("enable", ENABLE_KEYS))
-        self._wiring.take_pin(enable.pin, ("enable", "pin"))
-        return enable
+        values = self._root.section(name).read(keys)
+        self._wiring.take_pin(values["pin"], (name, "pin"))
+        return values
 
-    def _stop_pin(self) -> int | None:
-        if "emergency_button" not in self._data:
-            return None
-        pin: int = self._only_table("emergency_button", EMERGENCY_BUTTON_KEYS)["pin"]
-        self._wiring.take_pin(pin, ("emergency_button", "pin"))
-        return pin
-
-    def _only_table(self, name: str, keys: Sequence[ProfileKey]) -> dict[str, Any]:
-        return self._keys(table_at(self._source, self._data, (name,)), (name,), keys)
-
-    def _keys(
-        self, table: Mapping[str, Any], place: Place, keys: Sequence[ProfileKey]
-    ) -> dict[str, Any]:
-        refuse_unknown_keys(self._source, table, place, [key.name for key in keys])
-        return read_keys(self._source, table, place, keys)
-
-    def _named(self, kind: str) -> list[tuple[str, dict[str, Any]]]:
+    def _named(self, kind: str) -> dict[str, Section]:
         """Return the tables of one kind by name, in the order of the file."""
-        tables = table_at(self._source, self._data, (kind,))
-        for name in tables:
-            refuse_bad_name(self._source, (kind, name))
+        tables = self._root.section(kind).named()
         if len(tables) > _MOST_NAMED:
             words = f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}"
-            raise self._source.mistake((kind,), words)
-        return [(name, table_at(self._source, tables, (kind, name))) for name in tables]
+            raise self._root.mistake(words, kind)
+        return tables
+
+
+def _step(section: Section, actions: Sequence[ActionPlan]) -> ResetStep:
+    """Read one step of the reset routine; actions without a value are at rest."""
+    step = section.read(RESET_KEYS)
+    values: dict[str, float] = step["values"]
+    known = {action.name: action for action in actions}
+    for name, value in values.items():
+        if name not in known:
+            words = f"values of {section} name no action: {choice(name, known)}"
+            raise section.mistake(words, "values", name)
+        low, high = known[name].low, known[name].high
+        if not low <= value <= high:
+            words = f"{name} of {section} must be {low:g} to {high:g}, its own caps"
+            raise section.mistake(words, "values", name)
+    filled = tuple(values.get(action.name, action.rest) for action in actions)
+    return ResetStep(filled, step["seconds"])
 
 
 def _toml(text: str, path: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Read the sections of a profile: actions, outputs, sensors, camera, limits and stop."""
+"""Read the tables of a profile: actions, outputs, sensors, camera, limits and stop."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, cast
 
+from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import ActionPlan, OutputPlan, SensorPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice, shown
@@ -31,238 +32,121 @@ from shapechanger.robot.profile.schema import (
 )
 
 __all__ = [
+    "Section",
     "check_mix",
-    "check_pulses",
     "check_stop",
-    "joints_in",
     "read_action",
     "read_camera",
-    "read_joints",
-    "read_key",
-    "read_keys",
     "read_limits",
     "read_output",
     "read_sensor",
-    "refuse_bad_name",
-    "refuse_unknown_keys",
-    "table_at",
 ]
 
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
-def table_at(source: Source, data: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """Return a nested table, or an empty one if it is missing.
+class Section:
+    """One table of a profile and its path, so that a mistake in it can be located.
 
-    Raises:
-        ProfileError: If it is not a table.
-    """
-    found = data.get(str(place[-1]), {})
-    if not isinstance(found, dict):
-        what = shown(found)
-        raise source.mistake(place, f"{called(place)} must be a table, not {what}")
-    return cast("dict[str, Any]", found)
-
-
-def read_keys(
-    source: Source, table: Mapping[str, Any], place: Place, keys: Iterable[ProfileKey]
-) -> dict[str, Any]:
-    """Return the value of each key, with defaults.
-
-    Raises:
-        ProfileError: If one is missing or invalid.
-    """
-    return {key.name: read_key(source, table, place, key) for key in keys}
-
-
-def read_key(source: Source, table: Mapping[str, Any], place: Place, key: ProfileKey) -> Any:
-    """Return the value of a key, or its default.
-
-    Raises:
-        ProfileError: If it is missing or invalid.
-    """
-    if key.name not in table:
-        if key.default is REQUIRED:
-            words = f"{called(place)} lacks the key {key.name!r}, {key.wanted}"
-            raise source.mistake(place, words)
-        return key.default
-    written = table[key.name]
-    try:
-        return key.value_of(written)
-    except ValueError as error:
-        words = f"{key.name} of {called(place)} must be {key.wanted}, {error}"
-        raise source.mistake((*place, key.name), words) from None
-
-
-def refuse_bad_name(source: Source, place: Place) -> None:
-    """Refuse a table with an invalid name, the last of its path.
-
-    Raises:
-        ProfileError: If the name is invalid.
-    """
-    name = str(place[-1])
-    if _NAME.fullmatch(name) is None:
-        words = (
-            f"the name {name!r} must begin with a letter and have at most 32 letters, digits, "
-            "'_' and '-'"
-        )
-        raise source.mistake(place, words)
-
-
-def refuse_unknown_keys(
-    source: Source,
-    table: Mapping[str, Any],
-    place: Place,
-    known: Iterable[str],
-    elsewhere: Mapping[str, str] | None = None,
-) -> None:
-    """Refuse unknown keys.
-
-    Args:
-        source: Where the table was read.
-        table: The table.
-        place: Path of the table.
-        known: The permitted keys.
-        elsewhere: For keys of other tables, where they belong.
-
-    Raises:
-        ProfileError: If there is one. The message names the key with the right unit, the table
-            where it belongs, or the known keys.
-    """
-    names = tuple(known)
-    for name in table:
-        if name in names:
-            continue
-        if (meant := with_unit(name, names)) is not None:
-            raise _unit_is_missing(source, place, name, meant)
-        if elsewhere and name in elsewhere:
-            words = f"{name!r} belongs to {elsewhere[name]}, not to {called(place)}"
-        else:
-            words = f"{called(place)} has no key {choice(name, names)}"
-        raise source.mistake((*place, name), words)
-
-
-def _unit_is_missing(source: Source, place: Place, name: str, meant: str) -> Exception:
-    what = f"{name!r} of {called(place)} lacks its unit or has another one"
-    return source.mistake((*place, name), f"{what}: write {meant!r} ({unit_of(meant)})")
-
-
-def joints_in(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the joint tables of a sensor, by name."""
-    return {name: cast("dict[str, Any]", t) for name, t in table.items() if isinstance(t, dict)}
-
-
-def read_joints(
-    source: Source, place: Place, joints: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Any]:
-    """Return the settings of all joints as lists, in the order of the file.
+    Every method raises a `ProfileError` with one sentence and the line.
 
     Args:
         source: Where the profile was read.
-        place: The sensor.
-        joints: Table of each joint.
-
-    Returns:
-        `joints`, their names, and their `channels`, `zeros` and `directions`.
-
-    Raises:
-        ProfileError: If there is no joint, a key is unknown, missing or invalid, or a channel is
-            used twice.
+        place: Path of the table.
+        table: Its keys and nested tables; anything else is refused.
     """
-    if not joints:
-        words = f"{called(place)} needs a table for each joint, such as {called((*place, 'knee'))}"
-        raise source.mistake(place, words)
-    rows: list[dict[str, Any]] = []
-    users: dict[int, str] = {}
-    for name, table in joints.items():
-        at = (*place, name)
-        refuse_bad_name(source, at)
-        refuse_unknown_keys(source, table, at, [key.name for key in JOINT_KEYS])
-        row = read_keys(source, table, at, JOINT_KEYS)
-        if row["direction"] == 0:
-            words = f"direction of {called(at)} must be 1 or -1, not 0"
-            raise source.mistake((*at, "direction"), words)
-        other = users.setdefault(row["channel"], name)
-        if other != name:
-            words = f"channel {row['channel']} of {called(at)} is that of {other}, too"
-            raise source.mistake((*at, "channel"), words)
-        rows.append(row)
-    return {
-        "joints": list(joints),
-        "channels": [row["channel"] for row in rows],
-        "zeros": [row["zero"] for row in rows],
-        "directions": [row["direction"] for row in rows],
-    }
+
+    def __init__(self, source: Source, place: Place, table: Any) -> None:
+        self.source = source
+        self.place = place
+        if not isinstance(table, dict):
+            raise self.mistake(f"{self} must be a table, not {shown(table)}")
+        self.table = cast("dict[str, Any]", table)
+
+    def __str__(self) -> str:
+        return called(self.place)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.table
+
+    def mistake(self, words: str, *at: str | int) -> ProfileError:
+        """Return the error for a mistake in this table, or in one of its keys."""
+        return self.source.mistake((*self.place, *at), words)
+
+    def section(self, name: str) -> Section:
+        """Return a nested table, which is empty if it is missing."""
+        return Section(self.source, (*self.place, name), self.table.get(name, {}))
+
+    def named(self) -> dict[str, Section]:
+        """Return the nested tables by name; refuse names that are not allowed for a part."""
+        for name in self.table:
+            if _NAME.fullmatch(name) is None:
+                words = "must begin with a letter and have at most 32 letters, digits, '_' and '-'"
+                raise self.mistake(f"the name {name!r} {words}", name)
+        return {name: self.section(name) for name in self.table}
+
+    def read(
+        self, keys: Iterable[ProfileKey], elsewhere: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        """Return the value of each key, with defaults, and refuse unknown keys.
+
+        Args:
+            keys: The permitted keys.
+            elsewhere: For keys of other tables, where they belong.
+        """
+        known = {key.name: key for key in keys}
+        for name in self.table:
+            if name in known:
+                continue
+            if (meant := with_unit(name, known)) is not None:
+                words = f"{name!r} of {self} lacks its unit or has another one: write {meant!r}"
+                raise self.mistake(f"{words} ({unit_of(meant)})", name)
+            if elsewhere and name in elsewhere:
+                words = f"{name!r} belongs to {elsewhere[name]}, not to {self}"
+            else:
+                words = f"{self} has no key {choice(name, known)}"
+            raise self.mistake(words, name)
+        return {name: self.value(key) for name, key in known.items()}
+
+    def value(self, key: ProfileKey) -> Any:
+        """Return the value of one key, or its default."""
+        if key.name not in self.table:
+            if key.default is REQUIRED:
+                raise self.mistake(f"{self} lacks the key {key.name!r}, {key.wanted}")
+            return key.default
+        try:
+            return key.value_of(self.table[key.name])
+        except ValueError as error:
+            words = f"{key.name} of {self} must be {key.wanted}, {error}"
+            raise self.mistake(words, key.name) from None
 
 
-_Table = Mapping[str, Any]
+def read_action(name: str, section: Section) -> ActionPlan:
+    """Read one number of a command, which must be able to rest within its caps."""
+    values = section.read(ACTION_KEYS)
+    lowest = 0.0 if values["one_sided"] else -1.0
+    low: float = lowest if values["low"] is None else values["low"]
+    action = replace(ActionPlan(name), **{**values, "low": low})
+    if low < lowest:
+        raise section.mistake(f"low of {section} must be 0 to 1, because it is one-sided", "low")
+    if not low < action.high:
+        words = f"{section} may only move from low = {low:g} to high = {action.high:g}"
+        raise section.mistake(f"{words}, which is nowhere", "high")
+    if not low <= action.rest <= action.high:
+        words = f"rest of {section} must lie between low and high, {low:g} to {action.high:g}"
+        raise section.mistake(words, "rest")
+    if action.propels and action.rest != 0.0:
+        raise section.mistake(f"rest of {section} must be 0, because it propels", "rest")
+    if action.gain != 1.0 and action.unit == "1":
+        raise section.mistake(f"gain of {section} needs a unit, such as unit = 'deg'", "gain")
+    return action
+
 
 _NOT_GPIOZERO: Final = (
     "gpiozero makes the pulses of a servo in steps of 200 µs, and 1.4 ms out of a neutral of "
     f"1.5 ms (gpiozero#1209); use the driver servo or esc, over one of {', '.join(OVER)}"
 )
 _DRIVER, _OVER = OUTPUT_KEYS[0], next(key for key in OUTPUT_SETTINGS["servo"] if key.name == "over")
-
-
-def read_output(source: Source, name: str, table: _Table) -> OutputPlan:
-    """Read one motor, servo or controller.
-
-    Raises:
-        ProfileError: If a key is unknown, missing or invalid.
-    """
-    place: Place = ("output", name)
-    for key in (_DRIVER, _OVER):
-        _refuse_gpiozero(source, table, place, key)
-    driver: str = read_key(source, table, place, _DRIVER)
-    keys: tuple[ProfileKey, ...] = OUTPUT_SETTINGS[driver]
-    if _OVER in keys:
-        keys += OVER_SETTINGS[read_key(source, table, place, _OVER)]
-    known = [key.name for key in (*OUTPUT_KEYS, *keys)]
-    refuse_unknown_keys(source, table, place, known, _ELSEWHERE)
-    common = read_keys(source, table, place, OUTPUT_KEYS)
-    return OutputPlan(name=name, **common, settings=read_keys(source, table, place, keys))
-
-
-def read_sensor(source: Source, name: str, table: _Table) -> SensorPlan:
-    """Read one sensor.
-
-    Raises:
-        ProfileError: If a key is unknown, missing or invalid.
-    """
-    place: Place = ("sensor", name)
-    driver: str = read_keys(source, table, place, SENSOR_KEYS)["driver"]
-    keys = SENSOR_SETTINGS[driver]
-    known = [key.name for key in (*SENSOR_KEYS, *keys)]
-    joints = joints_in(table) if driver == "as5600" else {}
-    rest = {key: value for key, value in table.items() if key not in joints}
-    refuse_unknown_keys(source, rest, place, known, _SENSORS_ELSEWHERE)
-    settings = read_keys(source, rest, place, keys)
-    if driver == "as5600":
-        settings |= read_joints(source, place, joints)
-    return SensorPlan(name=name, driver=driver, measures=MEASURES[driver], settings=settings)
-
-
-def read_camera(source: Source, table: _Table) -> CameraPlan:
-    """Read the camera.
-
-    Raises:
-        ProfileError: If a key is unknown, missing or invalid.
-    """
-    place: Place = ("camera",)
-    driver: str = read_key(source, table, place, CAMERA_KEYS[0])
-    keys = CAMERA_SETTINGS[driver]
-    known = [key.name for key in (*CAMERA_KEYS, *keys)]
-    refuse_unknown_keys(source, table, place, known, _CAMERAS_ELSEWHERE)
-    common = read_keys(source, table, place, CAMERA_KEYS)
-    return CameraPlan(**common, settings=read_keys(source, table, place, keys))
-
-
-def _refuse_gpiozero(source: Source, table: _Table, place: Place, key: ProfileKey) -> None:
-    """Explain why gpiozero is not supported as a pulse source, although it looks as if it were."""
-    written = table.get(key.name)
-    if isinstance(written, str) and "gpiozero" in written.lower():
-        words = f"{key.name} of {called(place)} cannot be {written!r}: {_NOT_GPIOZERO}"
-        raise source.mistake((*place, key.name), words)
 
 
 def _owners(kind: str, tables: Mapping[str, Iterable[ProfileKey]]) -> dict[str, str]:
@@ -282,7 +166,80 @@ _SENSORS_ELSEWHERE: Final = _owners("the driver", SENSOR_SETTINGS)
 _CAMERAS_ELSEWHERE: Final = _owners("the driver", CAMERA_SETTINGS)
 
 
-_PLACE: Final[Place] = ("limits",)
+def _split(
+    values: dict[str, Any], common: Iterable[ProfileKey]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Separate the values of common keys from those of the driver."""
+    names = {key.name for key in common}
+    return (
+        {name: value for name, value in values.items() if name in names},
+        {name: value for name, value in values.items() if name not in names},
+    )
+
+
+def read_output(name: str, section: Section) -> OutputPlan:
+    """Read one motor, servo or controller."""
+    for key in (_DRIVER, _OVER):
+        written = section.table.get(key.name)
+        if isinstance(written, str) and "gpiozero" in written.lower():
+            words = f"{key.name} of {section} cannot be {written!r}: {_NOT_GPIOZERO}"
+            raise section.mistake(words, key.name)
+    keys: tuple[ProfileKey, ...] = OUTPUT_SETTINGS[section.value(_DRIVER)]
+    if _OVER in keys:
+        keys += OVER_SETTINGS[section.value(_OVER)]
+    values = section.read((*OUTPUT_KEYS, *keys), _ELSEWHERE)
+    common, settings = _split(values, OUTPUT_KEYS)
+    output = OutputPlan(name=name, **common, settings=settings)
+    _check_pulses(section, output)
+    return output
+
+
+def read_sensor(name: str, section: Section) -> SensorPlan:
+    """Read one sensor."""
+    driver: str = section.value(SENSOR_KEYS[0])
+    is_joint = {
+        name: driver == "as5600" and isinstance(v, dict) for name, v in section.table.items()
+    }
+    table = {name: value for name, value in section.table.items() if not is_joint[name]}
+    joints = {name: value for name, value in section.table.items() if is_joint[name]}
+    keys = (*SENSOR_KEYS, *SENSOR_SETTINGS[driver])
+    values = Section(section.source, section.place, table).read(keys, _SENSORS_ELSEWHERE)
+    settings = _split(values, SENSOR_KEYS)[1]
+    if driver == "as5600":
+        settings |= _joints(Section(section.source, section.place, joints))
+    return SensorPlan(name=name, driver=driver, measures=MEASURES[driver], settings=settings)
+
+
+def _joints(sensor: Section) -> dict[str, Any]:
+    """Return names, channels, zeros and directions of all joints, in the order of the file."""
+    if not sensor.table:
+        example = called((*sensor.place, "knee"))
+        raise sensor.mistake(f"{sensor} needs a table for each joint, such as {example}")
+    rows: list[dict[str, Any]] = []
+    users: dict[int, str] = {}
+    for name, joint in sensor.named().items():
+        row = joint.read(JOINT_KEYS)
+        if row["direction"] == 0:
+            raise joint.mistake(f"direction of {joint} must be 1 or -1, not 0", "direction")
+        other = users.setdefault(row["channel"], name)
+        if other != name:
+            words = f"channel {row['channel']} of {joint} is that of {other}, too"
+            raise joint.mistake(words, "channel")
+        rows.append(row)
+    columns = (("channels", "channel"), ("zeros", "zero"), ("directions", "direction"))
+    return {"joints": list(sensor.table)} | {
+        column: [row[key] for row in rows] for column, key in columns
+    }
+
+
+def read_camera(section: Section) -> CameraPlan:
+    """Read the camera."""
+    settings_keys = CAMERA_SETTINGS[section.value(CAMERA_KEYS[0])]
+    values = section.read((*CAMERA_KEYS, *settings_keys), _CAMERAS_ELSEWHERE)
+    common, settings = _split(values, CAMERA_KEYS)
+    return CameraPlan(**common, settings=settings)
+
+
 _CAMERA_STALE_MS: Final = 500
 _NEEDS: Final = {
     "stop_distance_m": "distance",
@@ -294,62 +251,54 @@ _NEEDS: Final = {
 
 
 def read_limits(
-    source: Source,
-    table: Mapping[str, Any],
+    section: Section,
     control_hz: float,
     camera: CameraPlan | None,
     sensors: Iterable[SensorPlan],
 ) -> dict[str, Any]:
-    """Read the limits.
+    """Read the limits; refuse those that need something that is missing or too slow.
 
     Args:
-        source: Where the profile was read.
-        table: The table of limits.
+        section: The table of limits.
         control_hz: Expected rate of commands, Hz.
-        camera: Its camera.
-        sensors: Its sensors.
-
-    Raises:
-        ProfileError: If a key is unknown or invalid, a limit needs a missing sensor or camera, or
-            the rate of commands or frames is too low for it.
+        camera: The camera; None without one.
+        sensors: The sensors.
     """
-    refuse_unknown_keys(source, table, _PLACE, [key.name for key in LIMIT_KEYS])
-    limits = read_keys(source, table, _PLACE, LIMIT_KEYS)
+    limits = section.read(LIMIT_KEYS)
     if limits["deadline_ms"] * control_hz < 1000:
         words = (
-            f"deadline_ms of [limits] must be at least {1000 / control_hz:.0f} ms, the time from "
+            f"deadline_ms of {section} must be at least {1000 / control_hz:.0f} ms, the time from "
             f"one command to the next at control_hz = {control_hz:g}"
         )
-        raise source.mistake((*_PLACE, "deadline_ms"), words)
+        raise section.mistake(words, "deadline_ms")
     measured = {sensor.measures for sensor in sensors}
     for name, what in _NEEDS.items():
-        if table.get(name) and what not in measured:
+        if section.table.get(name) and what not in measured:
             drivers = " or ".join(d for d, m in MEASURES.items() if m == what)
             words = (
-                f"{name} of [limits] needs a sensor that measures {what}, such as one with the "
+                f"{name} of {section} needs a sensor that measures {what}, such as one with the "
                 f"driver {drivers}"
             )
-            raise source.mistake((*_PLACE, name), words)
-    limits["camera_stale_ms"] = _camera_stale_ms(source, limits["camera_stale_ms"], camera)
+            raise section.mistake(words, name)
+    limits["camera_stale_ms"] = _camera_stale_ms(section, limits["camera_stale_ms"], camera)
     return limits
 
 
-def _camera_stale_ms(source: Source, stale_ms: int | None, camera: CameraPlan | None) -> int:
-    place = (*_PLACE, "camera_stale_ms")
+def _camera_stale_ms(section: Section, stale_ms: int | None, camera: CameraPlan | None) -> int:
+    key = "camera_stale_ms"
     if camera is None:
         if stale_ms is not None:
-            raise source.mistake(place, "camera_stale_ms of [limits] needs a [camera]")
+            raise section.mistake(f"{key} of {section} needs a [camera]", key)
         return 0
     if stale_ms is None:
         stale_ms = _CAMERA_STALE_MS
-    # Tolerates the loss of one frame.
-    needed_ms = 2000 / camera.fps
+    needed_ms = 2000 / camera.fps  # One frame may be lost.
     if stale_ms < needed_ms:
         words = (
-            f"camera_stale_ms of [limits] must be at least {needed_ms:.0f} ms, the time of two "
-            f"pictures at fps = {camera.fps:g}"
+            f"{key} of {section} must be at least {needed_ms:.0f} ms, the time of two pictures at "
+            f"fps = {camera.fps:g}"
         )
-        raise source.mistake(place, words)
+        raise section.mistake(words, key)
     return stale_ms
 
 
@@ -358,65 +307,26 @@ _PULSES: Final = {
     "servo": ("left_us", "centre_us", "right_us"),
     "esc": ("backward_us", "neutral_us", "forward_us"),
 }
-# 1 s in µs; a pulse must end before the next one starts.
+# 1 s in µs; a pulse must end before the next one begins.
 _SECOND_US: Final = 1_000_000
 
 
-def read_action(source: Source, name: str, table: Mapping[str, Any]) -> ActionPlan:
-    """Read one action.
-
-    Raises:
-        ProfileError: If a key is unknown or invalid, or the rest lies outside the caps.
-    """
-    place: Place = ("action", name)
-    refuse_unknown_keys(source, table, place, [key.name for key in ACTION_KEYS])
-    values = read_keys(source, table, place, ACTION_KEYS)
-    lowest = 0.0 if values["one_sided"] else -1.0
-    low: float = lowest if values["low"] is None else values["low"]
-    action = replace(ActionPlan(name), **{**values, "low": low})
-    if low < lowest:
-        words = f"low of {called(place)} must be 0 to 1, because it is one-sided"
-        raise source.mistake((*place, "low"), words)
-    if not low < action.high:
-        words = f"{called(place)} may only move from low = {low:g} to high = {action.high:g}"
-        raise source.mistake((*place, "high"), f"{words}, which is nowhere")
-    if not low <= action.rest <= action.high:
-        words = f"rest of {called(place)} must lie between low and high, {low:g} to {action.high:g}"
-        raise source.mistake((*place, "rest"), words)
-    if action.propels and action.rest != 0.0:
-        words = f"rest of {called(place)} must be 0, because it propels"
-        raise source.mistake((*place, "rest"), words)
-    if action.gain != 1.0 and action.unit == "1":
-        words = f"gain of {called(place)} needs a unit, such as unit = 'deg'"
-        raise source.mistake((*place, "gain"), words)
-    return action
-
-
-def check_pulses(source: Source, output: OutputPlan) -> None:
-    """Refuse settings that an output cannot satisfy.
-
-    Raises:
-        ProfileError: If the middle pulse is not between the others, pulses are longer than their
-            period, or a motor has no range between start and full speed.
-    """
-    place: Place = ("output", output.name)
+def _check_pulses(section: Section, output: OutputPlan) -> None:
+    """Refuse a range of duties or pulses that is empty, or a pulse longer than its period."""
     settings: dict[str, Any] = {**output.settings}
-    if "full" in settings:
-        if not float(settings["start"]) < float(settings["full"]):
-            words = f"start of {called(place)} must be below full, which is {settings['full']:g}"
-            raise source.mistake((*place, "start"), words)
-        return
+    if "full" in settings and not settings["start"] < settings["full"]:
+        words = f"start of {section} must be below full, which is {settings['full']:g}"
+        raise section.mistake(words, "start")
     if output.driver not in _PULSES:
         return
     names = _PULSES[output.driver]
-    first, middle, last = (int(settings[name]) for name in names)
+    first, middle, last = (settings[name] for name in names)
     low, high = sorted((first, last))
     if not low < middle < high:
-        words = f"{names[1]} of {called(place)} must lie between {names[0]} and {names[2]}"
-        raise source.mistake((*place, names[1]), f"{words}, {low} and {high}")
-    if high * int(settings["hz"]) >= _SECOND_US:
-        words = f"hz of {called(place)} leaves no time for a pulse of {high} µs"
-        raise source.mistake((*place, "hz"), words)
+        words = f"{names[1]} of {section} must lie between {names[0]} and {names[2]}"
+        raise section.mistake(f"{words}, {low} and {high}", names[1])
+    if high * settings["hz"] >= _SECOND_US:
+        raise section.mistake(f"hz of {section} leaves no time for a pulse of {high} µs", "hz")
 
 
 def check_mix(

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import (
     ServoSettings,
     bus_settings,
@@ -20,8 +19,9 @@ from shapechanger.robot.drivers.settings import text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # It needs the SDK, which is loaded when a bus is opened.
+if TYPE_CHECKING:  # They need the SDK, which is loaded when a bus is opened.
     from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+    from shapechanger.robot.drivers.dynamixel.health import BusState
 
 __all__ = ["SharedBus", "TendonOutput", "bus_at", "join_bus", "open_driver"]
 
