@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import EnvArgumentError, MissingExtra, SpaceMismatch, UnknownName
-from shapechanger.headless import choose_gl, require_screen
+from shapechanger.rendering import choose_gl, require_screen
 
 try:
     import mujoco
