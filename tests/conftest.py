@@ -13,8 +13,8 @@ from hypothesis import settings
 
 from tests.drawing import draws, missing
 
-# Background processes, such as those of `nohup`, ignore Ctrl-C, and so do their children; some tests
-# interrupt theirs.
+# Background processes, such as those of `nohup`, ignore Ctrl-C, and so do their children; some
+# tests interrupt theirs.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

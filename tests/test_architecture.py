@@ -50,9 +50,7 @@ _RULES = {
     "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
     "bodies": _Rule(_names("errors layout morphology"), never=_HARDWARE | {"torch"}),
     # Courses, their scenes, and the expert that drives them with a vehicle.
-    "worlds": _Rule(
-        _names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}
-    ),
+    "worlds": _Rule(_names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}),
     # Rewards and endings: no model file.
     "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
     # Envs join bodies and tasks. A vehicle's env runs the whole robot in one process, and the

@@ -9,7 +9,7 @@ import tyro
 
 from shapechanger.cli.demos.edit import Bad, CutEpisode, Good, MarkStep, Merge, RepairEpisodes
 from shapechanger.cli.demos.exchange import Export, Import
-from shapechanger.cli.demos.record import RecordEpisodes
+from shapechanger.cli.demos.record import RecordDemonstrations
 from shapechanger.cli.demos.replay import Replay
 from shapechanger.cli.demos.show import ListEpisodes, ShowEpisodes
 from shapechanger.cli.demos.train import Evaluate, TrainClone
@@ -22,7 +22,7 @@ class Demos:
     """Record, inspect and edit demonstrations, and learn from them."""
 
     command: (
-        Annotated[RecordEpisodes, tyro.conf.subcommand("record")]
+        Annotated[RecordDemonstrations, tyro.conf.subcommand("record")]
         | Annotated[ListEpisodes, tyro.conf.subcommand("list")]
         | Annotated[ShowEpisodes, tyro.conf.subcommand("show")]
         | Annotated[CutEpisode, tyro.conf.subcommand("cut")]
