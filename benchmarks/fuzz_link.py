@@ -143,8 +143,8 @@ def fuzz(
     counts: collections.Counter[str] = collections.Counter()
     orders: list[Order] = []
     now_ns = 1_000_000_000
-    cockpit = SessionHub(PLAN, lambda: now_ns, orders.append)
-    owner = Session(0, cockpit, Authenticator())
+    hub = SessionHub(PLAN, lambda: now_ns, orders.append)
+    owner = Session(0, hub, Authenticator())
     owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
     owner.receive(encode(Take()))
     known: Session | None = None
@@ -152,7 +152,7 @@ def fuzz(
         now_ns += 1_000_000
         data = mutated(rng)
         if number % 4 == 0:  # A stranger at a door with a key.
-            stranger = Session(number, cockpit, Authenticator(KEY))
+            stranger = Session(number, hub, Authenticator(KEY))
             try:
                 stranger.introduce(data)
             except LinkError:
@@ -161,7 +161,7 @@ def fuzz(
                 raise AssertionError(f"A stranger was let in with {data!r}.")
             continue
         if known is None:
-            known = Session(number, cockpit, Authenticator(), MessageRate(1e9))
+            known = Session(number, hub, Authenticator(), MessageRate(1e9))
             known.introduce(encode(Hello(version=VERSION, proof=b"", name="known")))
             known.observe()
         try:
@@ -181,7 +181,7 @@ def fuzz(
         orders.clear()
         if number % 50_000 < 4:
             progress(number)
-    if not cockpit.lease.holds(0):
+    if not hub.lease.holds(0):
         raise AssertionError("The owner lost the command.")
     return counts
 

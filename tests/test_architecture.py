@@ -45,21 +45,20 @@ _RULES = {
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
     # The OpenGL library to draw with.
-    "headless": _Rule(_names("errors")),
     "rendering": _Rule(_names("errors")),
     # Models and edits: no environment, no reward, no robot.
     "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
     "bodies": _Rule(_names("errors layout morphology"), never=_HARDWARE | {"torch"}),
     # Courses, their scenes, and the expert that drives them with a vehicle.
     "worlds": _Rule(
-        _names("errors headless rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}
+        _names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}
     ),
     # Rewards and endings: no model file.
     "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
     # Envs join bodies and tasks. A vehicle's env runs the whole robot in one process, and the
     # remote ones reach it over the link.
     "envs": _Rule(
-        _names("errors layout headless rendering morphology bodies tasks")
+        _names("errors layout rendering morphology bodies tasks")
         | _names("link robot remote twin worlds identify"),
         never=_HARDWARE | {"torch"},
     ),
@@ -80,7 +79,7 @@ _RULES = {
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
         _names("errors layout link morphology bodies tasks envs transfer robot remote twin")
-        | _names("teleop demos reports testing shapechanger headless rendering worlds identify")
+        | _names("teleop demos reports testing shapechanger rendering worlds identify")
     ),
     "identify": _Rule(
         _names("errors layout morphology bodies tasks"),

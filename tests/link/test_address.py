@@ -60,7 +60,7 @@ def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> 
 
 
 @given(text=st.text(max_size=30))
-def test_any_text_is_an_address_or_refused(text: str) -> None:
+def test_any_text_is_an_address_or_an_error(text: str) -> None:
     """An address survives a round trip; any other text is a `LinkError`."""
     try:
         address = parse_address(text)

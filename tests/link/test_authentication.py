@@ -41,19 +41,19 @@ def test_a_proof_fits_nothing_else(
 
 
 @given(proof=st.binary(max_size=64))
-def test_no_guess_is_a_proof(proof: bytes) -> None:
-    """Nor any bytes of another length."""
+def test_random_bytes_are_no_proof(proof: bytes) -> None:
+    """Of any length."""
     assert not is_proof(proof, b"k" * 16, b"n" * NONCE_BYTES, b"", "program")
 
 
 def test_keys_and_nonces_are_new() -> None:
-    """Never the same twice."""
+    """No two are equal."""
     assert len({new_key() for _ in range(100)}) == 100
     assert len({new_nonce() for _ in range(100)}) == 100
 
 
 def test_a_key_can_be_copied_by_hand() -> None:
-    """Groups, spaces, small letters and misread numbers do not matter."""
+    """Groups, spaces, letter case and misread digits do not matter."""
     key = new_key()
     assert len(parse_key(key)) == 16
     for written in (

@@ -1,4 +1,4 @@
-"""The messages of the link: they arrive as they left, or not at all."""
+"""Messages of the link: round trips, bounds and invalid bytes."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
 
 
 @given(message=client_messages)
-def test_what_a_client_says_arrives(message: ClientMessage) -> None:
-    """A message comes out as it went in."""
+def test_client_messages_survive_a_round_trip(message: ClientMessage) -> None:
+    """For every type of message."""
     assert decode_client_message(encode(message)) == message
 
 
 @given(message=robot_messages)
-def test_what_a_robot_says_arrives(message: RobotMessage) -> None:
-    """A message comes out as it went in."""
+def test_robot_messages_survive_a_round_trip(message: RobotMessage) -> None:
+    """For every type of message."""
     assert decode_robot_message(encode(message)) == message
 
 
 def test_every_message_is_tried() -> None:
-    """A new kind of message must join the tests."""
+    """A new type of message must join the strategies."""
     for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
         tried = {kind.__name__ for kind in get_args(union)}
         assert all(f"{name}" in repr(strategy) for name in tried)
@@ -50,7 +50,7 @@ def test_every_message_is_tried() -> None:
 @pytest.mark.parametrize("side", DECODERS)
 @given(data=st.binary(max_size=300))
 def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
-    """Nothing but `LinkError` comes out of a decoder."""
+    """A decoder raises nothing but `LinkError`."""
     with contextlib.suppress(LinkError):
         DECODERS[side](data)
 
@@ -59,7 +59,7 @@ def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
 def test_a_cut_message_is_refused(
     message: ClientMessage | RobotMessage, data: st.DataObject
 ) -> None:
-    """No message is the beginning of another one."""
+    """No message is a prefix of another one."""
     whole = encode(message)
     cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
     for decode in DECODERS.values():
@@ -71,7 +71,7 @@ def test_a_cut_message_is_refused(
 def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
     message: ClientMessage, data: st.DataObject
 ) -> None:
-    """What a decoder lets through can be said again in the same words."""
+    """A message that decodes also encodes."""
     damaged = bytearray(encode(message))
     bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
     damaged[bit // 8] ^= 1 << bit % 8
@@ -82,14 +82,14 @@ def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
     assert encode(decode_client_message(encode(heard))) == encode(heard)
 
 
-def test_a_message_with_something_behind_it_is_refused() -> None:
-    """One message a WebSocket message, and nothing smuggled behind it."""
+def test_trailing_bytes_are_refused() -> None:
+    """A WebSocket message holds one message."""
     with pytest.raises(LinkError):
         decode_client_message(encode(messages.Take()) + b"\x00")
 
 
 def test_a_large_message_is_refused_before_it_is_read() -> None:
-    """The size is looked at first, whatever it holds."""
+    """The size is checked before the content."""
     with pytest.raises(LinkError, match="larger than the 65536 allowed"):
         decode_client_message(bytes(MAX_CLIENT_MESSAGE + 1))
 
@@ -105,8 +105,8 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
         b"\x82\xa4kind\xa4take\xa1x" + b"\x81\xa1x" * 20_000,
     ],
 )
-def test_a_length_that_lies_costs_nothing(lie: bytes) -> None:
-    """Four billion numbers are not made room for, and nesting does not reach the stack's end."""
+def test_a_false_length_costs_no_memory(lie: bytes) -> None:
+    """Nor does deep nesting exhaust the stack."""
     with pytest.raises(LinkError):
         decode_client_message(lie)
 
@@ -133,20 +133,20 @@ def test_a_length_that_lies_costs_nothing(lie: bytes) -> None:
     ],
 )
 def test_values_out_of_bounds_are_refused(fields: object) -> None:
-    """The bounds that the messages state are kept."""
+    """For the bounds of every message."""
     with pytest.raises(LinkError, match="Not a valid message"):
         decode_client_message(msgspec.msgpack.encode(fields))
 
 
 def test_unknown_keys_are_ignored() -> None:
-    """A newer minor version may say more."""
+    """A newer minor version may add keys."""
     fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
     heard = decode_client_message(msgspec.msgpack.encode(fields))
     assert heard == Command(seq=1, answers=2, values=(1.0,))
 
 
-def test_a_picture_travels_as_it_is() -> None:
-    """A JPEG costs its own bytes and a few for its length; no base64."""
+def test_a_frame_is_sent_as_bytes() -> None:
+    """Without base64, a JPEG costs its own bytes and a few for its length."""
     jpeg = bytes(range(256)) * 20
     fields = {name: 0 for name in Observation.__struct_fields__}
     empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
@@ -156,7 +156,7 @@ def test_a_picture_travels_as_it_is() -> None:
 
 
 def test_bytes_are_counted_and_not_shown() -> None:
-    """A log line with a message in it is no picture, and tells no proof."""
+    """A log must not hold frames or proofs."""
     fields = {name: 0 for name in Observation.__struct_fields__}
     seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
     assert "frame=<5000 bytes>" in repr(seen)
@@ -167,7 +167,7 @@ def test_bytes_are_counted_and_not_shown() -> None:
     assert repr(hello).startswith("Hello(version=1, proof=<30 bytes>, name='', role='program'")
 
 
-def test_an_arming_answers_something() -> None:
-    """One that does not say what was seen is no message."""
+def test_a_request_to_arm_must_answer_an_observation() -> None:
+    """Without `answers` it is not a valid message."""
     with pytest.raises(LinkError, match="answers"):
         decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))

@@ -1,4 +1,4 @@
-"""A robot for tests: a real WebSocket over TLS on loopback, and a point on a line for a body."""
+"""Fake robot: a real WebSocket over TLS on loopback, with a point on a line as its body."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STATE = (
 
 
 def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
-    """Wait for a condition, and no longer than needed."""
+    """Wait for a condition."""
     until = time.monotonic() + within_s
     while not is_true():
         assert time.monotonic() < until, "This did not happen in time."
@@ -108,38 +108,38 @@ class Robot:
 
     @property
     def address(self) -> str:
-        """Where it is."""
+        """Address of the robot."""
         return f"127.0.0.1:{self.port}"
 
     @property
     def fingerprint(self) -> str:
-        """Of its certificate."""
+        """Fingerprint of its certificate."""
         assert self._credentials is not None
         return fingerprint_hex(self._credentials.fingerprint)
 
     @property
     def known(self) -> KnownRobot:
-        """What a workstation remembers of it."""
+        """The robot as a known robot."""
         return KnownRobot("tin", self.address, self.key, self.fingerprint)
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What the env takes."""
+        """Arguments of the env."""
         return {"robot": self.address, "key": self.key, "fingerprint": self.fingerprint}
 
     def told(self, kind: type[Any]) -> list[Any]:
-        """The messages of one kind that it heard."""
+        """Return the received messages of a type."""
         return [message for message in self.heard if type(message) is kind]
 
     def stand_at(self, place: float) -> None:
-        """Put it somewhere, m."""
+        """Move the robot to a place, m."""
         self._place = place
 
     # Its life.
 
     @contextlib.contextmanager
     def running(self, folder: Path, port: int = 0) -> Iterator[Robot]:
-        """Serve until the end of the block."""
+        """Serve within the block."""
         self._credentials = make_credentials(folder, "tin")
         self._started.clear()
         thread = threading.Thread(target=lambda: asyncio.run(self._serve(port)))
@@ -152,7 +152,7 @@ class Robot:
             thread.join()
 
     def cut(self) -> None:
-        """End every connection, without a word."""
+        """Cut every connection."""
 
         def abort() -> None:
             for socket in self._sockets:
@@ -165,7 +165,7 @@ class Robot:
         self._loop.call_soon_threadsafe(abort)
 
     def say(self, message: Any) -> None:
-        """Say something to everybody that nobody asked for."""
+        """Send a message to all clients."""
 
         async def send() -> None:
             for socket in self._sockets:
@@ -366,7 +366,7 @@ class Robot:
 
 
 def picture(size: tuple[int, int], number: int) -> bytes:
-    """A JPEG of one colour that tells its number: red is 8 times it, modulo 256."""
+    """Return a JPEG that encodes a number: red is 8 times the number, modulo 256."""
     pixels = np.zeros((size[1], size[0], 3), np.uint8)
     pixels[..., 0] = 8 * number % 256
     pixels[..., 1] = np.linspace(0, 255, size[0], dtype=np.uint8)[None, :]

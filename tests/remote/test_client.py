@@ -1,4 +1,4 @@
-"""The client against a robot on a real socket: what goes well, and what is refused."""
+"""Client against a fake robot on a real socket."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Run = Callable[..., Robot]
 Connect = Callable[..., RobotClient]
 
 
-def test_a_program_takes_arms_commands_and_sees(run: Run, connect: Connect) -> None:
-    """The whole conversation, in the order in which it is had."""
+def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -> None:
+    """The whole exchange, in order."""
     robot = run()
     client = connect(robot, pace="lockstep", name="ada")
     client.take()
@@ -40,8 +40,8 @@ def test_a_program_takes_arms_commands_and_sees(run: Run, connect: Connect) -> N
     assert (command.answers, command.ttl_ms, command.scale) == (before.message.seq, 250, 1.0)
 
 
-def test_arming_answers_what_is_true_now_and_ends_what_was_seen(run: Run, connect: Connect) -> None:
-    """An emergency stop of a moment ago is not ended by who has not seen it."""
+def test_arming_ends_only_an_emergency_stop_that_was_seen(run: Run, connect: Connect) -> None:
+    """An emergency stop after the last observation stays in force."""
     robot = run()
     client = connect(robot, role="person")
     client.take()
@@ -53,8 +53,8 @@ def test_arming_answers_what_is_true_now_and_ends_what_was_seen(run: Run, connec
     assert arm.emergency == seen.emergencies == 0
 
 
-def test_commands_are_numbered_whoever_sends_them(run: Run, connect: Connect) -> None:
-    """Two threads never send the same number."""
+def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Connect) -> None:
+    """Numbers are never used twice."""
     client = connect(run(), pace="lockstep")
     numbers: list[int] = []
     threads = [
@@ -70,15 +70,15 @@ def test_commands_are_numbered_whoever_sends_them(run: Run, connect: Connect) ->
     assert sorted(numbers) == list(range(1, 101))
 
 
-def test_a_ping_takes_some_time(run: Run, connect: Connect) -> None:
-    """And brings the robot's."""
+def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
+    """It also returns the robot's time."""
     took_s, now_ns = connect(run()).ping()
     assert 0.0 < took_s < 5.0
     assert now_ns > 0
 
 
-def test_without_a_fingerprint_one_is_shown_and_nothing_is_trusted(run: Run) -> None:
-    """A person compares it; the message has the command that remembers it."""
+def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
+    """The message has the command that stores it after a comparison."""
     robot = run()
     with pytest.raises(LinkError) as refused:
         RobotClient.connect(robot.address, key=robot.key)
@@ -90,7 +90,7 @@ def test_without_a_fingerprint_one_is_shown_and_nothing_is_trusted(run: Run) -> 
 
 
 def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
-    """Before the key has been used for anything."""
+    """Before the key has been used."""
     robot = run()
     expected = "ab" * 32
     with pytest.raises(RobotRefused) as refused:
@@ -101,20 +101,20 @@ def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
 
 
 def test_a_wrong_key_is_refused(run: Run) -> None:
-    """In the robot's words."""
+    """With the robot's message."""
     with pytest.raises(RobotRefused, match="Wrong key"):
         RobotClient.connect(replace(run().known, key=new_key()))
 
 
 @pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
 def test_another_version_says_what_to_update(run: Run, version: int, older: str) -> None:
-    """The side that is behind."""
+    """It names the older side."""
     with pytest.raises(LinkError, match=f"on the {older}"):
         RobotClient.connect(run(version=version).known)
 
 
-def test_nobody_there_is_said_at_once(run: Run, credentials: object) -> None:
-    """With what to look at."""
+def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> None:
+    """The message says what to check."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -122,8 +122,8 @@ def test_nobody_there_is_said_at_once(run: Run, credentials: object) -> None:
         RobotClient.connect(known)
 
 
-def test_a_program_that_finds_nobody_sees_one_error(run: Run, credentials: object) -> None:
-    """In our words alone: no chain of the socket's errors, no calls of another thread."""
+def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None:
+    """Without a chain of socket errors, or frames of another thread."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -135,8 +135,8 @@ def test_a_program_that_finds_nobody_sees_one_error(run: Run, credentials: objec
     assert "asyncio" not in shown
 
 
-def test_a_question_that_fails_is_one_error(run: Run, connect: Connect) -> None:
-    """Also where the link is lost between question and answer."""
+def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
+    """Also if the link is lost between request and answer."""
     robot = run(delay_s=60.0)
     client = connect(robot, timeout_s=30.0)
     threading.Thread(
@@ -147,8 +147,8 @@ def test_a_question_that_fails_is_one_error(run: Run, connect: Connect) -> None:
     assert "".join(traceback.format_exception(refused.value)).count("Traceback") == 1
 
 
-def test_a_client_that_is_abandoned_gives_the_robot_back(run: Run, connect: Connect) -> None:
-    """Without waiting for anything, and twice does nothing more."""
+def test_an_abandoned_client_gives_control_back(run: Run, connect: Connect) -> None:
+    """Without waiting, and any number of times."""
     robot = run()
     client = connect(robot)
     client.take()
@@ -158,21 +158,21 @@ def test_a_client_that_is_abandoned_gives_the_robot_back(run: Run, connect: Conn
     assert len(robot.told(m.Release)) == 1
 
 
-def test_without_tls_only_what_was_typed_connects(run: Run) -> None:
-    """A plain connection to a port that speaks TLS fails in words."""
+def test_plain_connections_must_be_asked_for(run: Run) -> None:
+    """A plain connection to a TLS port is an error."""
     with pytest.raises(LinkError):
         RobotClient.connect(run().address, fingerprint="insecure", timeout_s=1.0)
 
 
-def test_a_robot_that_somebody_else_drives_is_not_taken(run: Run, connect: Connect) -> None:
-    """In the robot's words."""
+def test_control_of_another_client_is_not_taken(run: Run, connect: Connect) -> None:
+    """The error is the robot's message."""
     client = connect(run(held_by="Grace"))
     with pytest.raises(RobotRefused, match="Grace has control"):
         client.take()
 
 
-def test_arming_is_refused_in_words(run: Run, connect: Connect) -> None:
-    """Only a person arms, by default."""
+def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
+    """By default only a person arms."""
     client = connect(run(arming="person"))
     client.take()
     with pytest.raises(RobotRefused, match="Only a person"):
@@ -182,8 +182,8 @@ def test_arming_is_refused_in_words(run: Run, connect: Connect) -> None:
     person.arm()
 
 
-def test_a_refused_command_says_why(run: Run, connect: Connect) -> None:
-    """Of this command, not of the one before."""
+def test_a_refused_command_has_a_reason(run: Run, connect: Connect) -> None:
+    """The reason is that of this command, not of the one before."""
     robot = run(refusal="It is too old.")
     client = connect(robot, pace="lockstep")
     client.take()
@@ -194,8 +194,8 @@ def test_a_refused_command_says_why(run: Run, connect: Connect) -> None:
     assert client.refusal(seq + 1) == ""
 
 
-def test_what_happens_is_told_once(run: Run, connect: Connect) -> None:
-    """Events wait until somebody asks, and are bounded."""
+def test_events_are_returned_once(run: Run, connect: Connect) -> None:
+    """Events are kept until they are read, up to a limit."""
     robot = run()
     client = connect(robot)
     for i in range(300):
@@ -205,8 +205,8 @@ def test_what_happens_is_told_once(run: Run, connect: Connect) -> None:
     assert client.events() == []
 
 
-def test_an_emergency_stop_leaves_before_the_goodbye(run: Run, connect: Connect) -> None:
-    """Whoever stops and closes has stopped."""
+def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) -> None:
+    """A stop followed by a close stops the robot."""
     robot = run()
     client = connect(robot)
     client.emergency_stop("a dog")
@@ -214,8 +214,8 @@ def test_an_emergency_stop_leaves_before_the_goodbye(run: Run, connect: Connect)
     eventually(lambda: robot.told(m.EmergencyStop) == [m.EmergencyStop(reason="a dog")])
 
 
-def test_a_closed_client_says_so(run: Run, connect: Connect) -> None:
-    """To whatever is asked of it."""
+def test_a_closed_client_raises_an_error(run: Run, connect: Connect) -> None:
+    """From every method."""
     client = connect(run())
     client.close()
     assert not client.alive
@@ -234,7 +234,7 @@ def _in_child(client: RobotClient, answers: multiprocessing.Queue[str]) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork.*:DeprecationWarning")
 def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -> None:
-    """A worker process must connect for itself; the parent's link stands."""
+    """A worker process must open its own connection."""
     client = connect(run(), pace="lockstep")
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
@@ -249,7 +249,7 @@ def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -
 
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
-def test_a_timeout_that_is_none_is_refused(timeout_s: float) -> None:
+def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
     """Before anything is connected."""
     with pytest.raises(LinkError, match="above 0"):
         RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

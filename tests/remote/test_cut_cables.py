@@ -1,4 +1,4 @@
-"""Links that break: each is noticed in time, said in words, and never hidden by old data."""
+"""Broken links: noticed in time, reported, and never hidden by old data."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _ready(client: RobotClient) -> None:
 
 
 def test_a_black_hole_is_noticed_in_time(run: Run, connect: Connect) -> None:
-    """The socket stays open, no FIN comes, and the link is lost all the same."""
+    """The socket stays open without a FIN, and the link is lost."""
     robot = run()
     client = connect(robot, pace="lockstep", timeout_s=TIMEOUT_S)
     _ready(client)
@@ -44,8 +44,8 @@ def test_a_black_hole_is_noticed_in_time(run: Run, connect: Connect) -> None:
     assert not client.alive
 
 
-def test_silence_that_nobody_asked_about_is_no_loss(run: Run, connect: Connect) -> None:
-    """A client that wants nothing asks whether anybody is there, and is answered."""
+def test_an_idle_link_stays_up(run: Run, connect: Connect) -> None:
+    """An idle client sends pings, and the robot answers."""
     robot = run()
     client = connect(robot, timeout_s=TIMEOUT_S)
     eventually(lambda: len(robot.told(m.Ping)) > 3)
@@ -53,7 +53,7 @@ def test_silence_that_nobody_asked_about_is_no_loss(run: Run, connect: Connect) 
 
 
 def test_a_robot_that_dies_is_noticed_at_once(credentials: Path) -> None:
-    """Whoever waits for an observation is told, long before any timeout."""
+    """A call that waits for an observation ends before its timeout."""
     robot = Robot()
     with robot.running(credentials):
         client = RobotClient.connect(robot.known, timeout_s=30.0)
@@ -74,8 +74,8 @@ def test_a_robot_that_dies_is_noticed_at_once(credentials: Path) -> None:
     client.close()
 
 
-def test_a_cut_between_question_and_answer_is_an_answer(run: Run, connect: Connect) -> None:
-    """Nobody waits for what cannot come."""
+def test_a_cut_ends_a_waiting_request(run: Run, connect: Connect) -> None:
+    """No call waits for an answer that cannot arrive."""
     robot = run(delay_s=60.0)
     client = connect(robot, timeout_s=30.0)
     threading.Thread(
@@ -86,7 +86,7 @@ def test_a_cut_between_question_and_answer_is_an_answer(run: Run, connect: Conne
 
 
 def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
-    """No observation in time is an error of its own, and the link stands."""
+    """A late observation is an error of its own, and the link stays up."""
     client = connect(run(delay_s=0.2))
     client.acknowledge()
     with pytest.raises(StaleObservation):
@@ -94,8 +94,8 @@ def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
     assert client.observation(timeout_s=10.0).message.seq == 1
 
 
-def test_closing_a_dead_line_takes_no_time(run: Run, connect: Connect) -> None:
-    """A robot that says nothing cannot hold up whoever leaves."""
+def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> None:
+    """A silent robot cannot delay `close`."""
     robot = run()
     client = connect(robot, timeout_s=60.0)
     robot.silent = True
@@ -105,8 +105,8 @@ def test_closing_a_dead_line_takes_no_time(run: Run, connect: Connect) -> None:
 
 
 @given(garbage=st.binary(max_size=100))
-def test_garbage_ends_the_link_in_words(credentials: Path, garbage: bytes) -> None:
-    """No thread dies of it, and nobody waits on."""
+def test_an_invalid_message_ends_the_link(credentials: Path, garbage: bytes) -> None:
+    """With an error for all waiting calls."""
     robot = Robot(garbage=garbage)
     with robot.running(credentials), RobotClient.connect(robot.known) as client:
         with pytest.raises(LinkError, match="Not a valid message"):
@@ -115,7 +115,7 @@ def test_garbage_ends_the_link_in_words(credentials: Path, garbage: bytes) -> No
 
 
 def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
-    """Somebody who replays is not believed."""
+    """It may be a replay."""
     robot = run()
     client = connect(robot)
     robot._seq = 10
@@ -126,7 +126,7 @@ def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
 
 
 def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connect) -> None:
-    """The robot's words, not a broken pipe."""
+    """The error is the robot's message, not a broken pipe."""
     robot = run()
     client = connect(robot)
     robot.say(m.Refused(reason="Too many messages.", fatal=True))
@@ -135,8 +135,8 @@ def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connec
         client.ask()
 
 
-def test_a_stuck_line_brings_the_newest_command_only(run: Run, connect: Connect) -> None:
-    """Commands that could not leave are replaced, never played back."""
+def test_a_blocked_connection_delivers_only_the_newest_command(run: Run, connect: Connect) -> None:
+    """Older commands are replaced, never played back."""
     robot = run()
     client = connect(robot)
     client.take()

@@ -1,4 +1,4 @@
-"""The one slot between the thread that receives and the one that decides."""
+"""Inbox between the receiving thread and the callers."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observatio
     )
 
 
-def test_only_the_newest_is_there() -> None:
-    """Who is slow skips what is old."""
+def test_the_inbox_holds_only_the_newest_observation() -> None:
+    """A slow reader skips older ones."""
     inbox = Inbox(lambda: 5.0)
     for seq in (1, 2, 3):
         inbox.put(seen(seq))
@@ -44,8 +44,8 @@ def test_only_the_newest_is_there() -> None:
     assert (found.message.seq, found.received_at) == (3, 5.0)
 
 
-def test_an_old_one_is_never_new() -> None:
-    """What was seen is not served again; the error says how old the newest is."""
+def test_an_observation_is_returned_once() -> None:
+    """The error gives the age of the newest one."""
     now = [10.0]
     inbox = Inbox(lambda: now[0])
     inbox.put(seen(1))
@@ -58,16 +58,16 @@ def test_an_old_one_is_never_new() -> None:
 
 
 @pytest.mark.parametrize("seq", [1, 2])
-def test_nothing_is_replayed(seq: int) -> None:
-    """A number that is not larger ends the link."""
+def test_a_replay_is_an_error(seq: int) -> None:
+    """A number that does not increase ends the link."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(2))
     with pytest.raises(LinkError, match="as in a replay"):
         inbox.put(seen(seq))
 
 
-def test_a_picture_survives_the_observation_that_brought_it() -> None:
-    """Each picture is sent once, and the slot holds only the last observation."""
+def test_a_frame_outlives_its_observation() -> None:
+    """Each frame is sent once, and the slot holds only the last observation."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(1, frame_seq=7, frame=b"seven"))
     inbox.put(seen(2, frame_seq=7))
@@ -76,8 +76,8 @@ def test_a_picture_survives_the_observation_that_brought_it() -> None:
     assert inbox.take(2, 0.0).jpeg is None
 
 
-def test_who_waits_learns_of_the_end_at_once() -> None:
-    """And everybody later gets the same reason, as an error of their own."""
+def test_a_lost_link_ends_all_waits_at_once() -> None:
+    """Later calls raise the same error."""
     inbox = Inbox(lambda: 0.0)
     errors: list[LinkError] = []
 

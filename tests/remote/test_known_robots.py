@@ -1,4 +1,4 @@
-"""What a workstation remembers of robots, and who else may read it."""
+"""Files of known robots."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_robot_is_recalled_as_it_was() -> None:
-    """By its name; forgetting it is possible."""
+    """By its name, until it is forgotten."""
     robot = KnownRobot("new-bright", "car.local:5000", new_key(), PRINT)
     path = remember(robot)
     assert recall("new-bright") == robot
@@ -36,7 +36,7 @@ def test_a_robot_is_recalled_as_it_was() -> None:
 
 
 def test_a_new_address_replaces_the_old() -> None:
-    """And leaves no second file behind."""
+    """In the same file."""
     key = new_key()
     remember(KnownRobot("car", "car.local", key, PRINT))
     path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
@@ -44,15 +44,15 @@ def test_a_new_address_replaces_the_old() -> None:
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_a_misspelt_name_is_told_what_there_is() -> None:
+def test_a_misspelt_name_gets_a_suggestion() -> None:
     """With the nearest spelling."""
     remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
     with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
         recall("new-brigt")
 
 
-def test_a_key_that_others_can_read_is_not_used() -> None:
-    """As ssh does; the message has the command."""
+def test_a_key_that_other_users_can_read_is_refused() -> None:
+    """As in ssh; the message has the command to fix it."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.chmod(0o644)
     with pytest.raises(LinkError, match="chmod 600"):
@@ -61,7 +61,7 @@ def test_a_key_that_others_can_read_is_not_used() -> None:
 
 @pytest.mark.parametrize("text", ["adress = 1", "not toml", 'address = "a"\nkey = 1\n'])
 def test_a_broken_file_is_named(text: str) -> None:
-    """Whoever edits it by hand finds it again."""
+    """The message has its path."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.write_text(text)
     with pytest.raises(LinkError, match=r"car\.toml"):
@@ -78,20 +78,18 @@ def test_a_broken_file_is_named(text: str) -> None:
         ("car", "car.local", KEY, "trust me"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(
-    name: str, address: str, key: str, fingerprint: str
-) -> None:
-    """Before it is written down."""
+def test_invalid_attributes_are_errors(name: str, address: str, key: str, fingerprint: str) -> None:
+    """Before the file is written."""
     with pytest.raises(LinkError):
         KnownRobot(name, address, key, fingerprint)
 
 
 def test_without_encryption_there_may_be_no_key() -> None:
-    """That word must be typed."""
+    """With "insecure" as the fingerprint."""
     assert KnownRobot("car", "car.local", "", "insecure").key == ""
 
 
 def test_a_key_does_not_get_into_a_log() -> None:
-    """What is printed shows no secret."""
+    """`repr` leaves it out."""
     key = new_key()
     assert key not in repr(KnownRobot("car", "car.local", key, PRINT))

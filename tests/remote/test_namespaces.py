@@ -1,4 +1,4 @@
-"""A radio that really dies: the robot here, its driver in a network namespace, the cable cut."""
+"""Cut cable between network namespaces."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def there(robot: RunningRobot) -> KnownRobot:
 
 
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
-    """At full throttle: at rest at the deadline; joined again, somebody can drive again."""
+    """The robot stops at its deadline, and can be driven again after the cable is joined."""
     profile = write_profile(tmp_path)
     wiring = TwinWiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)

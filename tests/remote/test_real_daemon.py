@@ -1,4 +1,4 @@
-"""The env against the daemon that runs on robots, with a guard and a camera that are faked."""
+"""Remote env against the real daemon, with a fake guard and camera."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def made(robot: Served, **how: Any) -> gym.Env[Any, Any]:
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) -> None:
-    """The guard does what the action says, and the reward is what it senses."""
+    """The guard applies the actions, and the reward comes from its sensors."""
     robot = serve(arming="anyone")
     env = made(robot, pace=pace, state=True)
     seen, info = env.reset(seed=0)
@@ -139,8 +139,8 @@ def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) 
     eventually(lambda: "disarm" in robot.running.guard.kinds())
 
 
-def test_a_person_takes_the_robot_from_a_program(serve: Callable[..., Served]) -> None:
-    """The episode is truncated with the person's name; the next one waits for them."""
+def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> None:
+    """The episode is truncated with the person's name, and the next reset waits."""
     robot = serve(arming="anyone")
     env = made(robot, pace="lockstep", reset_timeout_s=0.3)
     env.reset(seed=0)
@@ -155,7 +155,7 @@ def test_a_person_takes_the_robot_from_a_program(serve: Callable[..., Served]) -
 
 
 def test_a_person_arms_what_a_program_drives(serve: Callable[..., Served]) -> None:
-    """The program waits, the person clicks, the program drives; an emergency stop ends it."""
+    """The program waits for the person, then drives; an emergency stop ends the episode."""
     robot = serve()
     with RobotClient.connect(robot.known, role="person", name="Grace") as person:
 
@@ -175,8 +175,8 @@ def test_a_person_arms_what_a_program_drives(serve: Callable[..., Served]) -> No
         env.close()
 
 
-def test_an_answer_to_what_was_never_seen_is_refused(serve: Callable[..., Served]) -> None:
-    """In the daemon's words."""
+def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[..., Served]) -> None:
+    """The error is the daemon's message."""
     robot = serve(arming="anyone")
     with RobotClient.connect(robot.known, pace="lockstep") as client:
         client.take()
@@ -187,8 +187,8 @@ def test_an_answer_to_what_was_never_seen_is_refused(serve: Callable[..., Served
         assert "was not sent to this client" in client.refusal(seq)
 
 
-def test_who_arms_after_a_long_silence_arms(serve: Callable[..., Served]) -> None:
-    """The client looks first: what it saw last is too old to arm by."""
+def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
+    """The client asks for a new observation first."""
     robot = serve(max_observation_age_ms=100)
     with RobotClient.connect(robot.known, role="person") as person:
         person.take()

@@ -1,4 +1,4 @@
-"""What a program records of a robot that it drives through the env."""
+"""Recording of a remote env by the program."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ pytestmark = pytest.mark.realtime
 Run = Callable[..., Robot]
 
 
-def test_pictures_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
-    """Byte for byte, with the robot's own times and what its outputs did."""
+def test_frames_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
+    """Byte for byte, with the robot's times and applied outputs."""
     robot = run(arm_by_itself=True)
     options: dict[str, Any] = {"pace": "lockstep", "state": True} | robot.arguments
     with gym.make("shapechanger/RemoteVehicle-v1", **options) as made:

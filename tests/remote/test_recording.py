@@ -1,4 +1,4 @@
-"""The client's side of recording, suggesting and looking at recordings, on the real daemon."""
+"""Client's side of recordings and suggestions, with the real daemon."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def test_a_person_records_marks_and_undoes(robot: Served, tmp_path: Path) -> Non
     assert len(read_episode(path).kept) == 8
 
 
-def test_what_cannot_be_is_said_and_the_link_stands(robot: Served) -> None:
-    """Nonsense is found here, where its author is; the rest by the robot, in its words."""
+def test_refused_requests_leave_the_link_up(robot: Served) -> None:
+    """The client finds invalid fields; the robot refuses the rest."""
     with RobotClient.connect(robot.known, role="person") as client:
         for nonsense in (
             lambda: client.record(name="x" * 65),
@@ -90,7 +90,7 @@ def test_what_cannot_be_is_said_and_the_link_stands(robot: Served) -> None:
 
 
 def test_a_program_suggests_while_a_person_drives(robot: Served) -> None:
-    """Both see what the other one wants."""
+    """Each sees the values of the other."""
     with (
         RobotClient.connect(robot.known, role="person", name="Ada") as person,
         RobotClient.connect(robot.known, name="net") as program,

@@ -1,4 +1,4 @@
-"""The control rate, on a clock that is moved by hand."""
+"""Control period, on a clock that the test moves."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Clock:
 
 @given(late=st.lists(st.floats(0.0, 0.99 * LATE * PERIOD), min_size=1, max_size=100))
 def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
-    """After n of them n periods have gone by, and what the last one was late."""
+    """Only the delay of the last step remains."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     for each in late:
@@ -36,7 +36,7 @@ def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
 
 @given(slower=st.floats(1.0, 1.0 + 0.9 * LATE), steps=st.integers(1, 200))
 def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) -> None:
-    """However long: the difference does not add up to a missed deadline."""
+    """The difference never adds up to a missed deadline."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     for i in range(1, steps + 1):
@@ -46,7 +46,7 @@ def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) ->
 
 
 def test_a_step_that_is_too_late_is_counted_and_not_made_up_for() -> None:
-    """After a long one the next has its whole period."""
+    """The next step has a full period."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     clock.now += 3.7 * PERIOD
@@ -54,8 +54,8 @@ def test_a_step_that_is_too_late_is_counted_and_not_made_up_for() -> None:
     assert schedule.left_s == pytest.approx(PERIOD)
 
 
-def test_a_schedule_starts_when_it_is_told() -> None:
-    """The time between reset and the first step is nobody's delay."""
+def test_a_schedule_starts_with_the_first_step() -> None:
+    """The time since the reset is not a delay."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     clock.now += 60.0

@@ -1,4 +1,4 @@
-"""A person takes the robot from a program and gives it back, and the episode goes on."""
+"""Episodes in which a person takes control and gives it back."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _step_until(
 
 
 def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
-    """What they command is in the info, what the program wants is shown to them, and it goes on."""
+    """The info has the person's commands, and the person sees the program's."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         info = _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -80,7 +80,7 @@ def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
 
 
 def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
-    """An emergency stop is no intervention, and neither is disarming a program that drives."""
+    """An emergency stop is no intervention, nor is disarming a program that drives."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -96,7 +96,7 @@ def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
 
 
 def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) -> None:
-    """A program that does not know of interventions must not think that it still drives."""
+    """A program without interventions must not believe that it still drives."""
     with _made(robot) as env, robot.client(role="person") as person:
         env.reset()
         person.take()

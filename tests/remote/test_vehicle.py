@@ -1,4 +1,4 @@
-"""The env against a robot on a real socket."""
+"""Remote env against a fake robot on a real socket."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
     ],
     ids=lambda promise: promise.__name__,
 )
-def test_an_env_with_pictures_keeps_its_promises(
+def test_an_env_with_pictures_passes_the_checks(
     run: Run, promise: Callable[[MakeEnv], None]
 ) -> None:
-    """All but those about flat observations, which a picture is not."""
+    """Except those for flat observations."""
     promise(partial(made, run(home_at_take=True)))
 
 
@@ -73,16 +73,16 @@ def test_an_env_with_pictures_keeps_its_promises(
     ids=lambda promise: promise.__name__,
 )
 @pytest.mark.parametrize("image", [None, False])
-def test_an_env_without_pictures_keeps_its_promises(
+def test_an_env_without_pictures_passes_the_checks(
     run: Run, promise: Callable[[MakeEnv], None], image: bool | None
 ) -> None:
-    """A robot without a camera, or one whose pictures nobody wants."""
+    """For a robot without a camera, and with `image=False`."""
     robot = run(home_at_take=True, image_size=None if image is None else (160, 120))
     promise(partial(made, robot, image=image))
 
 
 def test_layouts_name_pictures_and_states(run: Run) -> None:
-    """A picture is one block, in the order in which Gymnasium flattens a Dict."""
+    """A picture is one block, in Gymnasium's order of a flattened Dict."""
     env = made(run(), state=True, size=(40, 30))
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))
@@ -95,7 +95,7 @@ def test_layouts_name_pictures_and_states(run: Run) -> None:
 
 
 @pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
-def test_pictures_have_the_size_that_was_asked_for(run: Run, size: tuple[int, int]) -> None:
+def test_pictures_have_the_requested_size(run: Run, size: tuple[int, int]) -> None:
     """160 x 120 by default, 128 x 128 as in 2017."""
     env = made(run(), size=size, render_mode="rgb_array")
     seen, _ = env.reset(seed=0)
@@ -105,7 +105,7 @@ def test_pictures_have_the_size_that_was_asked_for(run: Run, size: tuple[int, in
 
 
 def test_the_reward_is_metres_forward(run: Run) -> None:
-    """Signed, so backwards costs; the sensors are named."""
+    """Signed, so reversing costs; the sensors are named."""
     robot = run(reward={"velocity": 2.0})
     env = made(robot, reward={"stall": -5.0})
     env.reset(seed=0)
@@ -122,7 +122,7 @@ def test_the_reward_is_metres_forward(run: Run) -> None:
 
 
 def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
-    """Terminated, not truncated: the task is over, the link is not."""
+    """Terminated, not truncated."""
     robot = run()
     env = made(robot, on_reset=lambda seed: robot.stand_at(0.0))
     env.reset(seed=0)
@@ -142,7 +142,7 @@ def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
 
 
 def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
-    """The robot tells of it even when it is over; the bumper's own word is not counted again."""
+    """The event reports it after it is over; the bumper's value is not counted again."""
     robot = run(reward={"collision_ends_episode": 0.0})
     env = made(robot)
     env.reset(seed=0)
@@ -157,7 +157,7 @@ def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
 
 
 def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
-    """No term, and a source that says so; the number itself is named in info."""
+    """It has no term, and `info` names it."""
     robot = run(absent=("speed", "stall"))
     env = made(robot, state=True)
     seen, _ = env.reset(seed=0)
@@ -170,7 +170,7 @@ def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
 
 
 def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
-    """A command that the robot did not act on has no way to the pins."""
+    """A command that was not applied has no time to the outputs."""
     robot = run(clock="real")
     env = made(robot)
     env.reset(seed=0)
@@ -190,8 +190,8 @@ def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
     env.close()
 
 
-def test_a_command_answers_what_was_seen(run: Run) -> None:
-    """The observation that the step before returned."""
+def test_a_command_answers_the_last_observation(run: Run) -> None:
+    """The one that the previous step returned."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -205,7 +205,7 @@ def test_a_command_answers_what_was_seen(run: Run) -> None:
 
 @pytest.mark.parametrize("how", ["frozen", "broken"])
 def test_an_old_picture_is_never_passed_off_as_new(run: Run, how: str) -> None:
-    """A camera that freezes or sends garbage: the picture is the last one, and info says so."""
+    """After a freeze or invalid frames the picture is the last one, and info reports it."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -222,8 +222,8 @@ def test_an_old_picture_is_never_passed_off_as_new(run: Run, how: str) -> None:
     env.close()
 
 
-def test_a_camera_that_gives_nothing_new_does_not_start_an_episode(run: Run) -> None:
-    """The first observation is of the time after the reset."""
+def test_an_episode_needs_a_new_frame(run: Run) -> None:
+    """The first observation was made after the reset."""
     env = made(run(frozen=True), reset_timeout_s=0.2)
     with pytest.raises(LinkError, match="Does its camera still work"):
         env.reset(seed=0)
@@ -231,8 +231,8 @@ def test_a_camera_that_gives_nothing_new_does_not_start_an_episode(run: Run) -> 
 
 
 @pytest.mark.parametrize("action", [[0.0], [0.0, np.nan], [0.0, np.inf], [[0.0, 0.0]]])
-def test_an_action_that_cannot_be_meant_is_not_sent(run: Run, action: Any) -> None:
-    """The message says which numbers there are."""
+def test_an_invalid_action_is_an_error(run: Run, action: Any) -> None:
+    """The message has the expected numbers."""
     robot = run()
     env = RemoteVehicleEnv(pace="lockstep", **robot.arguments)
     env.reset(seed=0)
@@ -244,7 +244,7 @@ def test_an_action_that_cannot_be_meant_is_not_sent(run: Run, action: Any) -> No
 
 
 def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
-    """As every env does."""
+    """As in every env."""
     env = RemoteVehicleEnv(pace="lockstep", **run().arguments)
     env.reset(seed=0)
     *_, info = env.step(np.array([-3.0, 2.0], np.float32))
@@ -261,7 +261,7 @@ def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
     ],
 )
 def test_a_person_truncates(run: Run, change: dict[str, Any], because: str) -> None:
-    """The task did not end; somebody ended it, and info says who."""
+    """With the reason and the person's name in info."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -274,7 +274,7 @@ def test_a_person_truncates(run: Run, change: dict[str, Any], because: str) -> N
 
 
 def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Path) -> None:
-    """The last observation comes once more, with the reason; then the episode is over."""
+    """The last observation is returned once more, with the reason."""
     robot = Robot()
     with robot.running(credentials):
         env = made(robot, reset_timeout_s=20.0)
@@ -310,7 +310,7 @@ def test_a_silent_link_truncates_in_time(run: Run) -> None:
 
 
 def test_reset_waits_for_the_operator(run: Run) -> None:
-    """Who is told once what is waited for; afterwards the robot is ours and armed."""
+    """`on_waiting` is called once; afterwards we have control of an armed robot."""
     robot = run(arming="person")
     said: list[str] = []
 
@@ -331,8 +331,8 @@ def test_reset_waits_for_the_operator(run: Run) -> None:
     env.close()
 
 
-def test_a_hand_that_puts_it_back_finds_it_disarmed(run: Run) -> None:
-    """Nor does the last command of the episode before act on."""
+def test_a_reset_disarms_the_robot_first(run: Run) -> None:
+    """The last command of the previous episode is not in force either."""
     robot = run()
     disarmed: list[int] = []
     env = made(robot, on_reset=lambda _: disarmed.append(len(robot.told(m.Disarm))))
@@ -344,7 +344,7 @@ def test_a_hand_that_puts_it_back_finds_it_disarmed(run: Run) -> None:
 
 
 def test_no_round_trip_is_claimed_across_two_clocks(run: Run) -> None:
-    """A second of a twin's clock is none of ours."""
+    """A twin's second has another length."""
     env = made(run(clock="twin"))
     env.reset(seed=0)
     *_, info = env.step(AHEAD)
@@ -361,10 +361,10 @@ def test_reset_does_not_wait_for_ever(run: Run) -> None:
     env.close()
 
 
-def test_a_reset_that_nobody_is_told_of_says_what_it_waits_for(
+def test_a_long_reset_logs_what_it_waits_for(
     run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Once for each thing, in the log, with the command and the key that help."""
+    """Once for each thing, with the command and the key that help."""
     monkeypatch.setattr("shapechanger.envs.remote.operator._LOG_AFTER_S", 0.0)
     robot = run(arming="person")
     remember(robot.known)
@@ -380,8 +380,8 @@ def test_a_reset_that_nobody_is_told_of_says_what_it_waits_for(
     env.close()
 
 
-def test_a_short_wait_is_not_worth_a_warning(run: Run, caplog: pytest.LogCaptureFixture) -> None:
-    """What is over within two seconds is said to nobody."""
+def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    """Up to two seconds."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused):
         env.reset(seed=0)
@@ -389,8 +389,8 @@ def test_a_short_wait_is_not_worth_a_warning(run: Run, caplog: pytest.LogCapture
     env.close()
 
 
-def test_a_robot_that_a_person_has_armed_for_themselves_is_waited_for(run: Run) -> None:
-    """Armed is not enough: it must be ours too."""
+def test_reset_waits_for_control_of_an_armed_robot(run: Run) -> None:
+    """Armed for another client is not enough."""
     robot = run(arming="person")
     said: list[str] = []
 
@@ -407,8 +407,8 @@ def test_a_robot_that_a_person_has_armed_for_themselves_is_waited_for(run: Run) 
     env.close()
 
 
-def test_reset_waits_until_whoever_drives_is_done(run: Run) -> None:
-    """And says in the robot's words who that is."""
+def test_reset_waits_for_another_driver(run: Run) -> None:
+    """The reason is the robot's message."""
     robot = run(held_by="Grace")
     said: list[str] = []
 
@@ -427,8 +427,8 @@ def test_reset_waits_until_whoever_drives_is_done(run: Run) -> None:
     env.close()
 
 
-def test_the_routine_of_the_profile_brings_it_back(run: Run) -> None:
-    """Each step as long as it says, by the robot's clock."""
+def test_the_reset_routine_of_the_profile_runs(run: Run) -> None:
+    """Each step has its duration, by the robot's clock."""
     robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
     env = made(robot, on_reset="routine")
     env.reset(seed=0)
@@ -438,8 +438,8 @@ def test_the_routine_of_the_profile_brings_it_back(run: Run) -> None:
     env.close()
 
 
-def test_a_routine_that_is_not_there_is_asked_for_in_words(run: Run) -> None:
-    """The message says how to get one, and nothing was armed for it."""
+def test_a_missing_reset_routine_is_an_error(run: Run) -> None:
+    """The message says how to add one, and the robot was not armed."""
     robot = run()
     env = made(robot, on_reset="routine")
     with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
@@ -448,8 +448,8 @@ def test_a_routine_that_is_not_there_is_asked_for_in_words(run: Run) -> None:
     env.close()
 
 
-def test_a_function_gets_the_seed(run: Run) -> None:
-    """A twin's operator can put the robot where the seed says."""
+def test_on_reset_gets_the_seed(run: Run) -> None:
+    """A twin's operator can choose the start by the seed."""
     seeds: list[int | None] = []
     env = made(run(), on_reset=seeds.append)
     env.reset(seed=3)
@@ -459,7 +459,7 @@ def test_a_function_gets_the_seed(run: Run) -> None:
 
 
 def test_steps_last_a_control_period(run: Run) -> None:
-    """In real time; the robot's answers are waited for, and none is older than the command."""
+    """In real time, with no observation older than the command."""
     robot = run(control_hz=50.0, clock="real")
     env = made(robot, pace="realtime")
     env.reset(seed=0)
@@ -473,13 +473,13 @@ def test_steps_last_a_control_period(run: Run) -> None:
 
 
 def test_a_twins_clock_is_driven_in_lockstep_only(run: Run) -> None:
-    """Its time moves with each observation, so that commands in real time are always too old."""
+    """Its time moves with each observation, so commands in real time would always be too old."""
     with pytest.raises(RobotRefused, match="pass pace='lockstep'"):
         RemoteVehicleEnv(**run(clock="twin").arguments)
 
 
 def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
-    """Tendons pull and do not push; without a camera the observation is the state."""
+    """Tendons only pull; without a camera the observation is the state."""
     robot = run(
         actions=TENDONS,
         state=tuple(Feature(f"{f.name}/applied", "1", 0.0, 1.0, f.element) for f in TENDONS),
@@ -503,7 +503,7 @@ def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
 
 
 def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
-    """Also in another process, from the id and its arguments alone."""
+    """Also in another process, from the id and its arguments."""
     remember(run().known)
     with EnvRef(ID, {"robot": "tin", "pace": "lockstep"}).make() as env:
         env.reset(seed=0)
@@ -519,16 +519,16 @@ def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
         ({"size": (0, 10)}, SpaceMismatch),
     ],
 )
-def test_arguments_that_cannot_be_meant_are_refused(
+def test_invalid_arguments_are_errors(
     run: Run, how: dict[str, Any], error: type[Exception]
 ) -> None:
-    """And no connection stays open."""
+    """No connection stays open."""
     with pytest.raises(error):
         RemoteVehicleEnv(**run().arguments, **how)
 
 
-def test_closing_gives_the_robot_back(run: Run) -> None:
-    """Twice does nothing more."""
+def test_closing_gives_control_back(run: Run) -> None:
+    """Any number of times."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -537,7 +537,7 @@ def test_closing_gives_the_robot_back(run: Run) -> None:
     eventually(lambda: len(robot.told(m.Release)) == 1)
 
 
-def test_an_env_that_is_dropped_gives_the_robot_back(run: Run) -> None:
+def test_a_dropped_env_gives_control_back(run: Run) -> None:
     """A notebook that makes a second env must find the robot free."""
     robot = run()
     env = made(robot)
@@ -549,7 +549,7 @@ def test_an_env_that_is_dropped_gives_the_robot_back(run: Run) -> None:
 
 
 def test_four_keys_drive_as_in_2017(run: Run) -> None:
-    """The columns of labels.csv in their order; a key that steers does not drive."""
+    """In the order of the columns of labels.csv; a key that steers does not drive."""
     env = FourWay(made(run()), throttle=0.6, steering=0.4)
     env.reset(seed=0)
     applied = {
@@ -564,8 +564,8 @@ def test_four_keys_drive_as_in_2017(run: Run) -> None:
     env.close()
 
 
-def test_four_keys_drive_nothing_else(run: Run) -> None:
-    """A finger has no steering."""
+def test_four_keys_need_steering_and_throttle(run: Run) -> None:
+    """A finger has neither."""
     env = made(run(actions=(THROTTLE,)))
     with pytest.raises(SpaceMismatch, match="steering, throttle"):
         FourWay(env)
@@ -573,8 +573,8 @@ def test_four_keys_drive_nothing_else(run: Run) -> None:
 
 
 @pytest.mark.parametrize("key", [4, -1, 1.5, "forward", [0.0, 1.0], None])
-def test_a_key_that_is_none_is_refused_in_words(run: Run, key: Any) -> None:
-    """The message says which keys there are."""
+def test_an_invalid_key_of_the_four_is_an_error(run: Run, key: Any) -> None:
+    """The message lists the keys."""
     env = FourWay(made(run()))
     with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
         env.action(key)

@@ -18,7 +18,7 @@ from shapechanger.envs.catalogue import (
     find_task,
 )
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
-from shapechanger.headless import require_known_gl
+from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "options_of", "require_seed"]

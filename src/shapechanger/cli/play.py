@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import env_ref, opened, require_seed
 from shapechanger.errors import StudyError
-from shapechanger.headless import has_screen
+from shapechanger.rendering import has_screen
 
 __all__ = ["Play"]
 

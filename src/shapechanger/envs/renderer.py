@@ -15,7 +15,7 @@ from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenView
 from numpy.typing import NDArray
 
 from shapechanger.errors import RenderError
-from shapechanger.headless import choose_gl, require_context
+from shapechanger.rendering import choose_gl, require_context
 
 __all__ = ["Renderer", "body_reach", "draw", "halve_textures"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import EnvArgumentError, MissingExtra, SpaceMismatch, UnknownName
-from shapechanger.headless import choose_gl, require_screen
+from shapechanger.rendering import choose_gl, require_screen
 
 try:
     import mujoco
@@ -403,15 +403,16 @@ def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) 
         UnknownName: If there is no such argument.
         EnvArgumentError: If one has the wrong type.
     """
-    base = next(each for each in env.__mro__ if each.__module__.startswith("gymnasium."))
+    # `main_body` is a number or a name; MuJoCo refuses an unknown one.
+    base: Any = next(each for each in env.__mro__ if each.__module__.startswith("gymnasium."))
     known: dict[str, Any] = dict(_OWN_ARGUMENTS)
-    for constructor in (MujocoEnv.__init__, base.__init__):
+    for constructor in (cast("Any", MujocoEnv).__init__, base.__init__):
         parameters = inspect.signature(constructor).parameters.values()
         known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
     for name, value in arguments.items():
         if name not in known:
             raise UnknownName(f"argument of {family}", name, ("body", *known))
-        if expected := _mismatch(known[name], value):
+        if name != "main_body" and (expected := _mismatch(known[name], value)):
             raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
 
 
@@ -424,10 +425,13 @@ def _mismatch(default: Any, value: Any) -> str:
     if isinstance(default, bool):
         return "" if isinstance(value, (bool, np.bool_)) else "True or False"
     if isinstance(default, (int, float)):
-        return "" if isinstance(value, Real) and not isinstance(value, bool) else "a number"
+        return (
+            ""
+            if isinstance(value, Real) and value is not True and value is not False
+            else "a number"
+        )
     if isinstance(default, tuple):
-        pair: Any = value
-        fits = isinstance(pair, (tuple, list, np.ndarray)) and len(pair) == 2
-        fits = fits and all(isinstance(each, Real) for each in pair)
+        pair: list[Any] = [*value] if isinstance(value, (tuple, list, np.ndarray)) else []
+        fits = len(pair) == 2 and all(isinstance(each, Real) for each in pair)
         return "" if fits else "two numbers"
     return ""

@@ -139,6 +139,7 @@ class RobotSpaces:
         self.observation_layout = self._layout()
         self.observation_space = self._space()
         self._picture: NDArray[np.uint8] | None = None
+        self._tried_seq = 0
         self._picture_seq = 0
         self._viewed_seq = 0
 
@@ -193,14 +194,20 @@ class RobotSpaces:
         After an invalid frame `picture` is still the previous one, and `View.fresh` is False.
         """
         seq = received.message.frame_seq
-        if received.jpeg is None or seq == self._picture_seq:
-            return received.jpeg is not None
-        try:
-            self._picture = decode_picture(received.jpeg)
-        except LinkError:
+        if received.jpeg is None:
             return False
-        self._picture_seq = seq
-        return True
+        if seq != self._tried_seq:  # An invalid frame is tried once, too.
+            self._tried_seq = seq
+            try:
+                self._picture = decode_picture(received.jpeg)
+            except LinkError:
+                return False
+            self._picture_seq = seq
+        return seq == self._picture_seq
+
+    def reconnect(self) -> None:
+        """Forget the numbers of frames: after a restart, the robot counts from 1 again."""
+        self._tried_seq = self._picture_seq = self._viewed_seq = 0
 
     def view(self, received: Received) -> View:
         """Return the env's observation for an observation of the robot.

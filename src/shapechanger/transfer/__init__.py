@@ -1,6 +1,6 @@
-"""Moving a skill from one body to another, and measuring what the move was worth.
+"""Transfer of policies between bodies: maps, transplants, studies and measures.
 
-Here are the parts that need no learner. `shapechanger.transfer.study` runs whole studies,
+This package exports what needs no learner. `shapechanger.transfer.study` runs studies and
 `shapechanger.transfer.transplant` moves the weights of a policy; both need the extra `learn`.
 """
 

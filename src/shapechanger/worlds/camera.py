@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import RenderError, WorldError
-from shapechanger.headless import choose_gl, open_context
+from shapechanger.rendering import choose_gl, open_context
 
 __all__ = ["CameraJitter", "OnboardCamera", "move_camera"]
 

@@ -51,10 +51,10 @@ def test_a_muscle_resists_being_stretched() -> None:
 
 
 def test_lengths_go_from_the_longest_to_the_shortest() -> None:
-    """At -1 no posture is pulled at; at 1 every posture is, with all there is."""
+    """At -1 no posture has a pull; at 1 every posture has the full one."""
     drive = drive_of("length", NOMINAL)
     rng = np.random.default_rng(0)
-    for angles in rng.uniform(*JOINT_RANGE.T, (50, 4)):
+    for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
         length = -MOMENT_ARMS @ angles
         assert (drive.tension(-np.ones(7), length, _STILL) <= LEAST_TENSION_N + 1e-9).all()
         assert (drive.tension(np.ones(7), length, _STILL) >= MOST_TENSION_N).all()

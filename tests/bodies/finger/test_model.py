@@ -51,7 +51,7 @@ def test_each_tendon_moves_the_joints_as_anatomy_says(
         seconds = 0.08 + parameters.command_delay
         mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
         ends[pulled] = np.degrees(data.qpos[:4])
-    moved = dict(zip(JOINTS, ends[1.0] - ends[-1.0], strict=True))
+    moved: dict[str, float] = dict(zip(JOINTS, ends[1.0] - ends[-1.0], strict=True))
     for joint, sign in _ANATOMY[tendon].items():
         assert sign * moved[joint] > 1.0, moved
 

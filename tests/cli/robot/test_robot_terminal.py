@@ -395,7 +395,7 @@ def test_a_person_lets_a_waiting_program_drive(
             while not truncated:
                 *_, truncated, info = env.step(np.array([0.0, 0.3], np.float32))
             assert info["truncated_because"].startswith("Emergency stop")
-            assert "commands" in waits[0]
+            assert "has control" in waits[0]
             env.close()
             person.press("q")
             assert person.end() == 0

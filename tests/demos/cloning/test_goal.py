@@ -59,9 +59,9 @@ def test_what_cannot_be_chosen_from_is_refused() -> None:
     """Too many classes, or one."""
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
-    with pytest.raises(CloningError, match="200 different actions, and classes are at most 16"):
+    with pytest.raises(CloningError, match="200 different actions, but at most 16"):
         goal_of(many, _STEERS, "class")
-    with pytest.raises(CloningError, match=r"the same in all of 5 steps \(left\)"):
+    with pytest.raises(CloningError, match=r"All of 5 actions are equal \(left\)"):
         goal_of(_keys("LLLLL"), _KEYS, "auto")
 
 

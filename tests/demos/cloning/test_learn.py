@@ -105,7 +105,7 @@ def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
     _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
     assert training.mirrored == 0.0
     assert training.mirror_note == (
-        "Nothing is mirrored: nothing is known of the mirror of joint_0/angle."
+        "No picture is mirrored, because the mirror image of joint_0/angle is unknown."
     )
 
 
@@ -139,7 +139,7 @@ def test_what_is_held_out_is_not_learned_from() -> None:
 
 def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Training]) -> None:
     """In a sentence with both."""
-    with pytest.raises(PolicyError, match=r"decides forward \[1\].*takes steering \[1\]"):
+    with pytest.raises(PolicyError, match=r"policy are forward \[1\].*here are steering \[1\]"):
         judge(keys[0], stripes(10, 0, STEERS))
     keys[0].card.require_layouts(KEYS)
     felt, _ = learn(
@@ -147,7 +147,7 @@ def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Traini
         settings=msgspec.structs.replace(QUICK, fewest_steps=1, most_steps=1),
         inputs="state",
     )
-    with pytest.raises(PolicyError, match=r"feels distance \[m\].*gives no state"):
+    with pytest.raises(PolicyError, match=r"needs the state distance \[m\].*gets none"):
         felt.card.require_layouts(KEYS)
 
 
@@ -155,7 +155,7 @@ def test_a_policy_of_the_package_drives_what_steers() -> None:
     """Its file is older than layouts, and says nothing of them."""
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.card.require_layouts(STEERS)
-    with pytest.raises(PolicyError, match="decides steering, throttle"):
+    with pytest.raises(PolicyError, match="policy are steering, throttle"):
         policy.card.require_layouts(KEYS)
 
 
@@ -169,5 +169,5 @@ def test_what_cannot_be_learned_from_is_refused() -> None:
     with pytest.raises(CloningError, match="no state"):
         learn(replace(data, states=None, state_layout=None), settings=QUICK, inputs="both")
     data.actions[3, 0] = np.nan
-    with pytest.raises(CloningError, match=r"Action 3 is \[nan"):
+    with pytest.raises(CloningError, match=r"Action 3 must be finite, got \[nan"):
         learn(data, settings=QUICK)

@@ -44,12 +44,12 @@ def test_a_state_is_mirrored_with_the_picture() -> None:
         (_layout("hip_1/angle", "throttle"), "hip_1/angle"),
         (_layout("left", "throttle"), "left"),
         (_layout("steering", low=0.0), "steering"),
-        (Layout((Feature("speed", "1", shape=(3,)),)), "block speed"),
+        (Layout((Feature("speed", "1", shape=(3,)),)), "array speed"),
     ],
 )
 def test_a_layout_without_a_mirror_says_why(layout: Layout, name: str) -> None:
     """A wrong mirror would teach the wrong side."""
-    with pytest.raises(CloningError, match=f"nothing is known of the mirror of .*{name}"):
+    with pytest.raises(CloningError, match=f"the mirror image of .*{name}"):
         mirror_of(layout)
 
 

@@ -67,7 +67,7 @@ def test_no_pictures_are_no_pictures() -> None:
 @pytest.mark.parametrize(
     ("pictures", "words"),
     [
-        (_pictures(1, 0, 40), "hold no pixel"),
+        (_pictures(1, 0, 40), "have no pixels"),
         (_pictures(1)[0], r"shape \(120, 160, 3\)"),
         (_pictures(1)[..., :1], r"shape \(1, 120, 160, 1\)"),
         (_pictures(1).astype(np.float32), "float32"),
@@ -84,5 +84,5 @@ def test_what_cannot_be_seen_is_refused(pictures: np.ndarray, words: str) -> Non
 )
 def test_a_framing_shows_something(wrong: dict[str, float]) -> None:
     """Nothing is left to see, or nothing can be."""
-    with pytest.raises(CloningError, match="A policy cannot see"):
+    with pytest.raises(CloningError, match="Invalid framing of"):
         Framing(**wrong)  # pyright: ignore[reportArgumentType]

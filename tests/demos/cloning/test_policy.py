@@ -17,6 +17,7 @@ import torch
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import OutputError
 from tests.demos.cloning.small import SMALL, shown
 
@@ -80,9 +81,9 @@ def test_light_hardly_matters() -> None:
 def test_a_picture_of_another_size_is_seen_and_no_picture_is_refused() -> None:
     """In a sentence, not with a page of Torch."""
     assert _policy().predict(np.zeros((50, 50, 3), np.uint8)).shape == (2,)
-    with pytest.raises(CloningError, match="Pictures are an array of uint8"):
+    with pytest.raises(CloningError, match="Pictures must be uint8"):
         _policy().predict(np.zeros((50, 50), np.uint8))
-    with pytest.raises(CloningError, match="drives by pictures, and there is none"):
+    with pytest.raises(CloningError, match="needs a picture, but there is none"):
         _policy().predict(None, np.zeros(3))
 
 
@@ -121,7 +122,7 @@ def _changed(path: Path, **entries: bytes | None) -> None:
 def test_half_a_policy_is_refused(path: Path, missing: str) -> None:
     """A zip of something else is no policy."""
     _changed(path, **{missing: None})
-    with pytest.raises(PolicyError, match="is no whole policy: "):
+    with pytest.raises(PolicyError, match="is not an intact policy: "):
         CameraPolicy.load(path)
 
 
@@ -143,7 +144,7 @@ def test_weights_that_are_not_the_policys_are_refused(path: Path) -> None:
         b"",
     ):
         _changed(path, weights=weights)
-        with pytest.raises(PolicyError, match="is no whole policy: "):
+        with pytest.raises(PolicyError, match="is not an intact policy: "):
             CameraPolicy.load(path)
 
 
@@ -153,6 +154,24 @@ def test_nothing_in_the_file_is_run(path: Path, capsys: pytest.CaptureFixture[st
     with pytest.raises(PolicyError):
         CameraPolicy.load(path)
     assert "trapped" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("value", "name"),
+    [(_Trap(), "print"), (torch.Size([2]), "torch.Size"), (torch.float16, "torch.float16")],
+)
+def test_only_tensors_are_unpickled(path: Path, value: object, name: str) -> None:
+    """Weights are refused before unpickling, even objects that PyTorch regards as safe."""
+    _changed(path, weights=_weights({"hands.bias": value}))
+    with pytest.raises(PolicyError, match=f"weights contain .*{name}, but only tensors"):
+        CameraPolicy.load(path)
+
+
+@pytest.mark.parametrize("clone", [*CLONES.values()], ids=[*CLONES])
+def test_the_policies_of_the_package_load(clone: Path) -> None:
+    """The shipped files, written by earlier versions, contain tensors only."""
+    action = CameraPolicy.load(clone).predict(np.zeros((120, 160, 3), np.uint8))
+    assert action.shape == (2,)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +198,7 @@ def test_a_card_that_lies_is_refused(path: Path, changes: dict[str, Any]) -> Non
 def test_another_file_is_refused(path: Path, content: bytes) -> None:
     """The message names it."""
     path.write_bytes(content)
-    with pytest.raises(PolicyError, match=r"corridor\.zip is not a policy"):
+    with pytest.raises(PolicyError, match=r"corridor\.zip is not a cloned policy"):
         CameraPolicy.load(path)
 
 
@@ -196,7 +215,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     """So that a misspelt path is seen."""
     with pytest.raises(PolicyError, match=r"There is no policy file .*nowhere\.zip"):
         CameraPolicy.load(tmp_path / "nowhere.zip")
-    with pytest.raises(PolicyError, match="is not a policy"):
+    with pytest.raises(PolicyError, match="is not a cloned policy"):
         CameraPolicy.load(tmp_path)
 
 

@@ -115,7 +115,7 @@ def test_a_critic_is_freed_of_mean_and_spread() -> None:
 @pytest.mark.parametrize(
     ("env", "error", "words"),
     [
-        (_Road(high=2.0), PolicyError, r"lie in \[-1, 1\]"),
+        (_Road(high=2.0), PolicyError, r"are in \[-1, 1\]"),
     ],
 )
 def test_an_env_that_does_not_fit_is_refused(
@@ -130,8 +130,8 @@ def test_an_env_without_pictures_is_refused(policy: CameraPolicy) -> None:
     """Its numbers are no picture; and nothing steers a pole on a cart."""
     env = _Road()
     env.observation_space = gym.spaces.Box(0, 1, (4,), np.float32)
-    with pytest.raises(PolicyError, match="cannot see Box"):
+    with pytest.raises(PolicyError, match="observations are Box"):
         to_sb3(policy, env)
     env.action_space = gym.spaces.Discrete(2)  # pyright: ignore[reportAttributeAccessIssue]
-    with pytest.raises(PolicyError, match="cannot act in Discrete"):
+    with pytest.raises(PolicyError, match="the env takes Discrete"):
         to_sb3(policy, env)

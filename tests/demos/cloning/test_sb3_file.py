@@ -111,7 +111,7 @@ def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
 
 def test_sac_cannot_choose() -> None:
     """And says what can."""
-    with pytest.raises(PolicyError, match="write it for PPO"):
+    with pytest.raises(PolicyError, match="use PPO"):
         as_sac(_policy(KEYS), _SIZE)
 
 
@@ -133,5 +133,5 @@ def test_demonstrations_stay_in_the_replay() -> None:
     shown = replay.demonstrations
     assert (shown.size(), int(shown.dones.sum())) == (19, 1)  # The last of the first leads nowhere.
     np.testing.assert_array_equal(shown.observations[0, 0].transpose(1, 2, 0), data.pictures[0])
-    with pytest.raises(CloningError, match="an observation, an action and a reward"):
+    with pytest.raises(CloningError, match="an observation, an action and a finite reward"):
         keep_demonstrations(model, data.pictures, data.actions, rewards[:3], [20])

@@ -26,7 +26,7 @@ def test_what_cannot_be_split_is_refused() -> None:
     """With the way out."""
     with pytest.raises(CloningError, match=r"one episode only.*split by time"):
         judged_steps([10, 0], "episode", 0.2)
-    with pytest.raises(CloningError, match=r"share is in \[0, 1\)"):
+    with pytest.raises(CloningError, match=r"share must be in \[0, 1\)"):
         judged_steps([10], "time", 1.0)
 
 

@@ -181,7 +181,7 @@ _GOOD = shown(4, 0)
         (_GOOD.pictures[:0], _GOOD.actions[:0], "There is no picture to learn from."),
         (_GOOD.pictures, _GOOD.actions[:3], "4 pictures and 3 actions"),
         (_GOOD.pictures, _GOOD.actions[:, :1], r"shape \(4, 1\)"),
-        (_GOOD.pictures[..., 0], _GOOD.actions, "Pictures are an array of uint8"),
+        (_GOOD.pictures[..., 0], _GOOD.actions, "Pictures must be uint8"),
         (_GOOD.pictures, np.full((4, 2), np.nan), r"action 0 is \[nan, nan\]"),
         (_GOOD.pictures, np.array([[0, 0], [0, 1], [0, 1.5], [3, 0]]), r"action 2 is \[0.0, 1.5\]"),
     ],
@@ -196,7 +196,7 @@ def test_what_cannot_be_learned_from_is_refused(
 
 def test_episodes_add_up() -> None:
     """A wrong length would hold out the wrong pictures."""
-    with pytest.raises(CloningError, match="5 pictures together, but there are 4 pictures"):
+    with pytest.raises(CloningError, match="5 pictures in total, but there are 4 pictures"):
         clone(_GOOD.pictures, _GOOD.actions, settings=_QUICK, seed=0, episodes=[2, 3])
 
 

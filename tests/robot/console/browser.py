@@ -1,4 +1,4 @@
-"""A page of a robot's console, as a person uses it, and what the twin's pins do meanwhile."""
+"""Console in a browser, with the twin's pins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A real Chromium, and pages of a robot in it."""
+"""Fixtures with Chromium and a served twin."""
 
 from __future__ import annotations
 

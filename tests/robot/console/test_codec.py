@@ -1,4 +1,4 @@
-"""The page and the robot mean the same by the same bytes, and make the same proof."""
+"""The console and the robot agree on messages and proofs."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _again(console: Console, *packed: bytes) -> list[str]:
     return console.page.evaluate(_AGAIN, [base64.b64encode(each).decode() for each in packed])
 
 
-def test_every_value_comes_back_as_it_was(car: RunningRobot, visit: Visit) -> None:
+def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> None:
     """Each width of integers, texts, bytes, arrays and maps, to the last nanosecond."""
     console = visit(car, key="")
     packed = [msgspec.msgpack.encode(value) for value in _VALUES if abs(_number(value)) < 2**64]
@@ -62,8 +62,8 @@ def test_every_value_comes_back_as_it_was(car: RunningRobot, visit: Visit) -> No
         assert msgspec.msgpack.decode(base64.b64decode(text)) == value
 
 
-def test_a_message_of_each_side_is_understood(car: RunningRobot, visit: Visit) -> None:
-    """What the page says is a message to the robot, and what the robot says keeps its meaning."""
+def test_messages_of_both_sides_are_decoded(car: RunningRobot, visit: Visit) -> None:
+    """The robot decodes the page's messages, and the page the robot's."""
     console = visit(car, key="")
     said = [
         m.Hello(version=m.VERSION, proof=b"x" * 32, name="Ada", role="person"),
@@ -79,7 +79,7 @@ def test_a_message_of_each_side_is_understood(car: RunningRobot, visit: Visit) -
 
 
 def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
-    """Cut off, too long, too deep, or of a kind that no message has."""
+    """Cut off, too long, too deep, or of an unknown type."""
     console = visit(car, key="")
     whole = m.encode(m.Pong(token=1, now_ns=2**40))
     broken = [whole[:-1], whole + b"\xc0", b"", b"\x91" * 100 + b"\xc0", b"\xc1", b"\xd4\x00\x00"]
@@ -87,8 +87,8 @@ def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
     assert _again(console, *broken) == ["RangeError"] * len(broken)
 
 
-def test_the_proof_is_the_robots(car: RunningRobot, visit: Visit) -> None:
-    """For keys as people write them, and with a certificate or without."""
+def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> None:
+    """For keys as people write them, with and without a certificate."""
     console = visit(car, key="")
     cases = [(new_key(), bytes(range(32)), certificate) for certificate in (b"", b"\x01" * 32)]
     for key, nonce, certificate in cases:
@@ -105,7 +105,7 @@ def test_the_proof_is_the_robots(car: RunningRobot, visit: Visit) -> None:
         assert made == [list(parse_key(key)), list(proof)]
 
 
-def test_the_page_speaks_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
+def test_the_page_has_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
     """It would be refused otherwise."""
     console = visit(car, key="")
     version = "async () => (await import('/console/link.js')).VERSION"

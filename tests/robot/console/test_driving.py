@@ -1,4 +1,4 @@
-"""A person sees and drives a robot with the page, and it stops whenever they cannot any more."""
+"""Driving with the console, and its stops."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _at_the_start(car: RunningRobot) -> None:
 
 
 def test_the_picture_moves(car: RunningRobot, visit: Visit) -> None:
-    """The canvas holds the camera's picture, and another one soon after."""
+    """The canvas shows the camera's picture, and another one soon after."""
     console = visit(car)
     console.await_state(picture="live")
     before = console.pixels()
@@ -39,7 +39,7 @@ def test_the_picture_moves(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit) -> None:
-    """Each way, and at rest at once after key-up."""
+    """In each direction, and at rest at once after key-up."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for key, way in (("s", -1.0), ("ArrowDown", -1.0), ("w", 1.0)):
@@ -51,7 +51,7 @@ def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit
 
 
 def test_a_page_that_loses_the_focus_drives_no_more(car: RunningRobot, visit: Visit) -> None:
-    """What was held must be pressed again."""
+    """Held keys must be pressed again."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -65,7 +65,7 @@ def test_a_page_that_loses_the_focus_drives_no_more(car: RunningRobot, visit: Vi
 
 
 def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> None:
-    """Nobody sees what the robot does."""
+    """Its person cannot see the robot."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -84,7 +84,7 @@ def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> Non
 def test_closing_the_tab_stops_the_robot_within_the_deadline(
     hasty_car: RunningRobot, visit: Visit, how: str
 ) -> None:
-    """By the ledger, counted from the last command that arrived; however the page ends."""
+    """By the ledger, counted from the last command; for any end of the page."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -112,10 +112,10 @@ def test_closing_the_tab_stops_the_robot_within_the_deadline(
 
 @pytest.mark.parametrize("key", ["Space", "Escape"])
 @pytest.mark.parametrize("focus", ["#stage", "#hand", "#cap", "#leave", "#log"])
-def test_space_and_escape_stop_everything_wherever_the_focus_is(
+def test_space_and_escape_stop_the_robot_with_any_focus(
     car: RunningRobot, visit: Visit, key: str, focus: str
 ) -> None:
-    """Neither presses a button that has the focus, and only arming again ends the stop."""
+    """Neither presses a focused button, and only arming again ends the stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)

@@ -1,4 +1,4 @@
-"""Who may see what, what the page asks for, and whether everybody can use it."""
+"""Access, requests and accessibility of the console."""
 
 from __future__ import annotations
 

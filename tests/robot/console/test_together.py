@@ -1,4 +1,4 @@
-"""Several who want the robot, a page that is slow, a robot that starts afresh, and recordings."""
+"""Several clients, a slow page, a restarted robot, and recordings."""
 
 from __future__ import annotations
 

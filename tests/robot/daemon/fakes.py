@@ -1,4 +1,4 @@
-"""A guard, a camera and a clock without a robot, that remember what they were told."""
+"""Fake guard, camera and clock for tests of the daemon."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.robot.daemon.plans import guard_state
 
 
 class FakeGuard:
-    """The other end of the daemon's socket: it obeys at once, and answers with its state."""
+    """The guard's end of the socket: it applies orders at once, and answers with its state."""
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -28,17 +28,17 @@ class FakeGuard:
         self._socket = ours
 
     def attach(self) -> None:
-        """Answer as orders come, as on a real clock."""
+        """Answer orders as they arrive, as on a real clock."""
         asyncio.get_running_loop().add_reader(self._socket, self.tick)
 
     def close(self) -> None:
-        """Die."""
+        """Close the socket."""
         if self._socket.fileno() >= 0:
             asyncio.get_running_loop().remove_reader(self._socket)
             self._socket.close()
 
     def tick(self) -> None:
-        """Read all orders, and say what follows."""
+        """Apply all orders, and send the state."""
         while True:
             try:
                 data = self._socket.recv(MAX_DATAGRAM)
@@ -92,27 +92,27 @@ class FakeGuard:
 
 
 class FakeCamera:
-    """Gives the pictures that a test puts in."""
+    """Camera that returns the frames of a test."""
 
     def __init__(self) -> None:
         self.opened = 0
         self._frames: queue.Queue[Frame | str | int] = queue.Queue()
 
     def open(self, plan: CameraPlan) -> FakeCamera:
-        """As `open_camera`."""
+        """Stand in for `open_camera`."""
         self.opened += 1
         return self
 
     def put(self, frame: Frame) -> None:
-        """Give this next."""
+        """Return this frame next."""
         self._frames.put(frame)
 
     def fail(self, why: str) -> None:
-        """Fail next."""
+        """Raise an error next."""
         self._frames.put(why)
 
     def read(self) -> Frame:
-        """The next picture."""
+        """Return the next frame."""
         while True:
             frame = self._frames.get()
             if isinstance(frame, Frame):
@@ -123,12 +123,12 @@ class FakeCamera:
                 raise RobotError("The camera is closed.")
 
     def close(self) -> None:
-        """Let whoever reads go."""
+        """End a waiting `read`."""
         self._frames.put(self.opened)
 
 
 class SteppedClock:
-    """Time that moves when the daemon asks, as a twin's."""
+    """Clock that moves in steps, as a twin's."""
 
     def __init__(self) -> None:
         self.ns = 1_000_000_000
@@ -137,15 +137,15 @@ class SteppedClock:
         self.captured_ns: int | None = None
 
     def now_ns(self) -> int:
-        """The time."""
+        """Return the time, ns."""
         return self.ns
 
     def wait(self, readable: Any, until_ns: int, at_most_s: float) -> bool:
-        """For the guard only."""
+        """Not used by the daemon."""
         raise NotImplementedError
 
     async def sleep(self, seconds: float) -> int | None:
-        """Let so much time go by, and the guard look."""
+        """Advance the time, and let the guard tick."""
         await asyncio.sleep(0)
         self.steps.append(seconds)
         self.ns += round(seconds * 1e9)

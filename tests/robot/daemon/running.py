@@ -1,4 +1,4 @@
-"""A daemon in this process over real sockets, and a client that speaks bytes."""
+"""A daemon in this process on real sockets, and a client of raw messages."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PATIENCE_S = 20.0
 
 
 async def until(condition: Callable[[], object], what: str) -> None:
-    """Wait until something holds, and say what did not."""
+    """Wait for a condition; the error names it."""
     try:
         async with asyncio.timeout(PATIENCE_S):
             while not condition():
@@ -56,7 +56,7 @@ async def until(condition: Callable[[], object], what: str) -> None:
 
 
 class Client:
-    """One end of a connection, without any manners of its own."""
+    """Client that sends exactly what a test asks for."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse, certificate: bytes) -> None:
         self.socket = socket
@@ -68,7 +68,7 @@ class Client:
         await self.socket.send_bytes(encode(message))
 
     async def hear(self) -> RobotMessage | None:
-        """The next message; None when the robot has closed."""
+        """Return the next message; None after the robot closed the connection."""
         async with asyncio.timeout(PATIENCE_S):
             message = await self.socket.receive()
         if message.type is not aiohttp.WSMsgType.BINARY:
@@ -78,14 +78,14 @@ class Client:
         return heard
 
     async def expect(self, kind: type[_M]) -> _M:
-        """The next message of a kind, whatever comes before."""
+        """Return the next message of a type, and skip others."""
         while (message := await self.hear()) is not None:
             if isinstance(message, kind):
                 return message
         raise AssertionError(f"The robot closed without a {kind.__name__}: {self.heard}")
 
     async def closed_with(self) -> str:
-        """Why the robot closes."""
+        """Return the reason with which the robot closes the connection."""
         refused = await self.expect(Refused)
         while not refused.fatal:
             refused = await self.expect(Refused)
@@ -93,7 +93,7 @@ class Client:
         return refused.reason
 
     async def greet(self, key: bytes = b"", **hello: Any) -> Welcome:
-        """Say hello."""
+        """Authenticate."""
         challenge = await self.expect(Challenge)
         role = hello.setdefault("role", "program")
         proof = make_proof(key, challenge.nonce, self.certificate, role)
@@ -101,12 +101,12 @@ class Client:
         return await self.expect(Welcome)
 
     async def take(self) -> Lease:
-        """Ask for the command."""
+        """Ask for control."""
         await self.say(Take())
         return await self.expect(Lease)
 
     async def obtain(self) -> None:
-        """Ask for the command until it is had; what was told about another's comes first."""
+        """Ask for control until it is given."""
         while not (await self.take()).mine:
             pass
 
@@ -124,7 +124,7 @@ class Client:
 
 @dataclass
 class Running:
-    """A daemon that serves."""
+    """A serving daemon and its surroundings."""
 
     plan: DaemonPlan
     clock: Clock
@@ -143,18 +143,18 @@ class Running:
 
     @staticmethod
     def transport(client: Client) -> asyncio.Transport:
-        """What a client's bytes go through, to treat it badly."""
+        """Return the transport of a client, to break it."""
         connection: Any = client.socket
         return connection._conn.transport
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """URL of the console."""
         return f"{'https' if self.plan.certificate else 'http'}://127.0.0.1:{self.port}"
 
     @contextlib.asynccontextmanager
     async def connect(self, **settings: Any) -> AsyncIterator[Client]:
-        """A connection that has said nothing yet."""
+        """Connect without a hello."""
         context = ssl.create_default_context()
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
         async with self.session.ws_connect(
@@ -166,7 +166,7 @@ class Running:
 
     @contextlib.asynccontextmanager
     async def idle(self, stranger: socket.socket) -> AsyncIterator[None]:
-        """A connection through the handshake that says nothing then."""
+        """Connect through the TLS handshake, and send nothing."""
         context = ssl.create_default_context()
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
         _, writer = await asyncio.open_connection(sock=stranger, ssl=context, server_hostname="x")
@@ -175,18 +175,18 @@ class Running:
 
     @contextlib.asynccontextmanager
     async def client(self, key: bytes = b"", **hello: Any) -> AsyncIterator[Client]:
-        """A connection that is known."""
+        """Connect and authenticate."""
         async with self.connect() as client:
             await client.greet(key, **hello)
             yield client
 
     async def arm(self, client: Client, emergency: int = 0) -> None:
-        """Let a client ask for arming, in answer to what it sees now."""
+        """Send a request to arm in answer to a new observation."""
         seen = await client.observe()
         await client.say(Arm(answers=seen.seq, emergency=emergency))
 
     async def armed(self, client: Client) -> None:
-        """Let a person take the command and arm."""
+        """Let a person take control and arm."""
         await client.obtain()
         await self.arm(client)
         await until(lambda: self.guard.state.armed, "the guard is armed")
@@ -196,7 +196,7 @@ class Running:
 async def running(
     plan: DaemonPlan, monkeypatch: pytest.MonkeyPatch, clock: Clock | None = None
 ) -> AsyncIterator[Running]:
-    """A daemon with a fake guard and a fake camera."""
+    """Run a daemon with a fake guard and a fake camera."""
     clock = RealClock() if clock is None else clock
     camera = FakeCamera()
     reader = lambda *arguments: FrameReader(*arguments, opener=camera.open)  # noqa: E731

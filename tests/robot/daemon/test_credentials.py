@@ -1,4 +1,4 @@
-"""The key and the certificate of a robot."""
+"""Key and certificate of a robot."""
 
 from __future__ import annotations
 
@@ -125,13 +125,13 @@ def test_the_folder_follows_the_desktop(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 @pytest.mark.parametrize("name", ["", "..", ".hidden", "a/b", "a\0b"])
 def test_a_name_cannot_lead_elsewhere(name: str) -> None:
-    """It is that of one folder."""
+    """It must be a valid folder name."""
     with pytest.raises(RobotError, match="valid folder name"):
         credentials_folder(name)
 
 
-def test_nobody_serves_others_without_a_key_by_accident() -> None:
-    """Only this machine, or by a word that says what it is."""
+def test_serving_other_machines_needs_a_key() -> None:
+    """Unless `insecure` is set."""
     check_exposure(car_plan(host="127.0.0.1"))
     check_exposure(car_plan(host="0.0.0.0", insecure=True))
     secured = {"certificate": "c", "private_key": "p", "key_file": "k"}
@@ -141,8 +141,8 @@ def test_nobody_serves_others_without_a_key_by_accident() -> None:
             check_exposure(car_plan(host="0.0.0.0", **(secured | {missing: ""})))
 
 
-def test_reading_credentials_does_not_load_what_makes_them() -> None:
-    """A daemon holds no certificate builder in its memory."""
+def test_reading_credentials_does_not_import_the_certificate_builder() -> None:
+    """It would cost the daemon 10 MB."""
     script = (
         "import sys, shapechanger.robot.daemon.process; "
         "assert 'cryptography' not in sys.modules and 'gpiozero' not in sys.modules"

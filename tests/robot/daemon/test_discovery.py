@@ -1,4 +1,4 @@
-"""The announcement on the local network."""
+"""Announcement on the local network."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class FakeZeroconf:
         self.closed = True
 
 
-def test_it_says_who_where_and_which_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Everything that `shapechanger robot find` shows."""
+def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With all that `shapechanger robot find` shows."""
     fake = FakeZeroconf()
     monkeypatch.setattr(discovery, "AsyncZeroconf", lambda: fake)
 

@@ -1,4 +1,4 @@
-"""A little of `benchmarks/fuzz_link.py` with each run of the tests."""
+"""Short run of `benchmarks/fuzz_link.py`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.realtime
 
 
 def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
-    """Strangers stay outside, and who does not command gives no command."""
+    """Clients stay unauthenticated, and those without control send no command."""
     counts = fuzz(5_000, seed=1)
     assert counts["strangers refused"] == 1_250
     assert counts["connections ended"] > 1_000
@@ -25,7 +25,7 @@ def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
 
 
 def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The daemon answers each with a reason or not at all, and serves the next one as ever."""
+    """The daemon answers with a reason or closes, and serves the next client."""
     secret = tmp_path / "secret"
     secret.mkdir()
     (secret / "episode.json").write_text("{}")

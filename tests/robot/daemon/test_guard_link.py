@@ -1,4 +1,4 @@
-"""The daemon's end of the socket to the guard."""
+"""Link from the daemon to the guard."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def ends() -> Iterator[Ends]:
     ends.guard.close()
 
 
-def test_states_come_in_order_and_nonsense_is_left_out(ends: Ends) -> None:
-    """A datagram that is no state costs only itself."""
+def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
+    """An invalid datagram costs only itself."""
     ends.guard.send(encode(guard_state(at_ns=1)))
     ends.guard.send(b"nonsense")
     ends.guard.send(b'{"at_ns": 3}')
@@ -56,7 +56,7 @@ def test_states_come_in_order_and_nonsense_is_left_out(ends: Ends) -> None:
 
 
 def test_a_guard_that_is_gone_is_noticed_once(ends: Ends) -> None:
-    """By its end of the socket; orders then go nowhere."""
+    """By the end of the socket; later orders are dropped."""
     ends.guard.close()
     ends.port.drain()
     ends.port.drain()
@@ -64,15 +64,15 @@ def test_a_guard_that_is_gone_is_noticed_once(ends: Ends) -> None:
     assert ends.lost == [True]
 
 
-def test_a_guard_that_is_gone_is_noticed_when_it_is_spoken_to(ends: Ends) -> None:
-    """Whichever comes first."""
+def test_a_guard_that_is_gone_is_noticed_by_sending(ends: Ends) -> None:
+    """Before or after the end of the socket is read."""
     ends.guard.close()
     ends.port.send(Order(kind="command"))
     assert ends.lost == [True]
 
 
-def test_to_a_guard_that_does_not_read_stops_are_kept_and_commands_are_not(ends: Ends) -> None:
-    """What it reads later is a stop, and no command that piled up behind it."""
+def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
+    """The guard reads a stop later, and no commands behind it."""
 
     async def play() -> list[Order]:
         ends.port.attach(asyncio.get_running_loop())

@@ -1,4 +1,4 @@
-"""What was recorded, as others see it: the same bytes, bounded, and nothing outside the folder."""
+"""Library of recordings: the same bytes, bounded, and nothing outside the folder."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def record(folder: Path, count: int, outcome: str = "") -> Path:
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100_000])
 def test_the_pieces_put_together_are_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
-    """To the last byte, however many lines are asked for at a time."""
+    """To the last byte, for any number of lines per request."""
     path = record(tmp_path, 60)
     lines, shown, pictures = b"", None, []
     at, total = 0, 1
@@ -86,7 +86,7 @@ def test_the_pieces_put_together_are_the_episode(ask: Ask, tmp_path: Path, count
 
 
 def test_a_piece_is_cut_where_it_would_be_too_large(ask: Ask, tmp_path: Path) -> None:
-    """One that is large by itself comes alone."""
+    """A single large line is sent alone."""
     large = b"\xff\xd8" + bytes(MAX_PIECE)
     with EpisodeWriter.create(tmp_path, HEADER) as writer:
         for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
@@ -103,10 +103,10 @@ def test_a_piece_is_cut_where_it_would_be_too_large(ask: Ask, tmp_path: Path) ->
     said=st.lists(st.tuples(st.booleans(), st.integers(0, 39), st.integers(0, 39)), max_size=5),
 )
 @settings(max_examples=25)
-def test_a_summary_says_what_reading_the_whole_episode_says(
+def test_a_summary_agrees_with_the_whole_episode(
     tmp_path_factory: pytest.TempPathFactory, count: int, said: list[tuple[bool, int, int]]
 ) -> None:
-    """Though it does not read it all; and again after each judgement."""
+    """After each judgement too."""
     folder = tmp_path_factory.mktemp("kept")
     path = record(folder, count, "time")
     summaries = Summaries(folder)
@@ -122,7 +122,7 @@ def test_a_summary_says_what_reading_the_whole_episode_says(
 
 
 def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
-    """The rest is asked for by the last one; what is no episode is not in it."""
+    """The last id asks for the rest; other folders are not listed."""
     (tmp_path / "notes.txt").touch()
     (tmp_path / "empty").mkdir()
     (tmp_path / ".hidden").mkdir()
@@ -147,7 +147,7 @@ def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
 
 
 def test_nothing_outside_the_folder_is_shown(ask: Ask, tmp_path: Path) -> None:
-    """Not by a name, which the message itself refuses, nor by a link."""
+    """By a name, which the message itself refuses, or by a link."""
     elsewhere = record(tmp_path / "elsewhere", 2)
     (tmp_path / "linked").symlink_to(elsewhere)
     for name in ("linked", "elsewhere", f"elsewhere/{elsewhere.name}", "..", ".", ""):
@@ -160,7 +160,7 @@ def test_nothing_outside_the_folder_is_shown(ask: Ask, tmp_path: Path) -> None:
 
 
 def test_a_line_cannot_name_a_file_elsewhere(ask: Ask, tmp_path: Path) -> None:
-    """However it came onto the disk."""
+    """The frame's name is checked."""
     path = record(tmp_path, 1)
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     (path / "steps.jsonl").write_text(
@@ -171,8 +171,8 @@ def test_a_line_cannot_name_a_file_elsewhere(ask: Ask, tmp_path: Path) -> None:
     assert "damaged" in answer.reason
 
 
-def test_what_is_damaged_is_said_and_the_rest_is_shown(ask: Ask, tmp_path: Path) -> None:
-    """In the list and in the answer; a last line that is cut off is not there yet."""
+def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -> None:
+    """In the list and in the answer; an incomplete last line is ignored."""
     path = record(tmp_path, 4)
     with (path / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"drop","first":0,"la')
@@ -193,8 +193,8 @@ _parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_00
 
 
 @given(parts=_parts)
-def test_every_complete_line_is_found_however_the_file_grew(parts: list[bytes]) -> None:
-    """As often as one looks, and only those that have ended."""
+def test_every_complete_line_of_a_growing_file_is_found(parts: list[bytes]) -> None:
+    """After each refresh, and only complete lines."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lines"
         path.touch()
@@ -210,8 +210,8 @@ def test_every_complete_line_is_found_however_the_file_grew(parts: list[bytes]) 
                 assert [index.read(file, n) for n in range(len(index))] == lines
 
 
-def test_a_file_that_was_replaced_or_cut_is_read_anew(tmp_path: Path) -> None:
-    """As `repair` does both."""
+def test_a_replaced_or_truncated_file_is_read_again(tmp_path: Path) -> None:
+    """`repair` does both."""
     path = tmp_path / "lines"
     path.write_bytes(b"one\ntwo\nthree\n")
     index = LineIndex(path)

@@ -1,4 +1,4 @@
-"""What a client is told of the robot."""
+"""Observations for one client."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def observation(**changes: Any) -> Any:
     return build_observation(**(fields | changes))
 
 
-def test_what_nothing_measures_is_absent_and_no_number() -> None:
+def test_an_absent_quantity_is_nan() -> None:
     """Never a zero that looks like a measurement."""
     seen = observation(state=guard_state(applied=(0.1, 0.5)))
     assert seen.state[0] == 0.25
@@ -38,8 +38,8 @@ def test_what_nothing_measures_is_absent_and_no_number() -> None:
     assert seen.sources == {"speed": "wheel", "distance": "absent"}
 
 
-def test_before_the_guard_has_spoken_nothing_is_known() -> None:
-    """And the robot is not said to be armed."""
+def test_without_a_state_of_the_guard_all_is_unknown() -> None:
+    """The robot does not count as armed."""
     seen = observation(state=None)
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
@@ -47,27 +47,27 @@ def test_before_the_guard_has_spoken_nothing_is_known() -> None:
     assert seen.state_ns == 50
 
 
-def test_a_picture_is_sent_once() -> None:
-    """The same picture keeps its number and time, and is not sent again."""
+def test_a_frame_is_sent_once() -> None:
+    """The same frame keeps its number and time."""
     assert observation().frame == b"jpeg"
     again = observation(frame_sent=3)
     assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
 
 
-def test_who_wants_no_pictures_gets_none() -> None:
-    """But knows when the newest was taken."""
+def test_a_client_may_decline_frames() -> None:
+    """The capture time of the newest one is sent anyway."""
     seen = observation(frame_sent=None)
     assert (seen.frame, seen.captured_ns) == (None, 30)
 
 
 def test_without_a_camera_the_time_is_that_of_the_state() -> None:
-    """There is no picture to have an age."""
+    """There is no capture time."""
     seen = observation(newest=None)
     assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
 
 
-def test_a_command_of_an_older_lease_is_not_this_drivers() -> None:
-    """Its number could be one of this driver's own."""
+def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
+    """Its number could be one of this client's own."""
     state = guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39)
     own = observation(state=state, command_ns=38)
     assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)

@@ -1,4 +1,4 @@
-"""Which web pages may open a connection."""
+"""Origin check of connections from web pages."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from shapechanger.robot.daemon.server import origin_refusal
         ("http://a b", "a b", True, False),
     ],
 )
-def test_only_the_robots_own_page(
+def test_only_the_robots_own_page_may_connect(
     origin: str | None, host: str, is_open: bool, allowed: bool
 ) -> None:
-    """Another page's scripts cannot drive it, nor a name server that points at it."""
+    """Not another page's script, nor a foreign name server (DNS rebinding)."""
     assert (origin_refusal(origin, host, is_open=is_open) == "") == allowed

@@ -1,4 +1,4 @@
-"""When a client gets its next observation."""
+"""Pace of observations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STEPPED = car_plan(clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone"
 
 
 def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Time moves by exactly that, and an order that is no command takes one tick of the guard."""
+    """Exactly; any other order takes one tick of the guard."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -59,8 +59,8 @@ def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch)
     play(script, monkeypatch, STEPPED, clock)
 
 
-def test_lockstep_waits_for_the_picture_of_that_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However long the camera's driver takes with it."""
+def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also with a slow camera driver."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -79,8 +79,8 @@ def test_lockstep_waits_for_the_picture_of_that_time(monkeypatch: pytest.MonkeyP
     play(script, monkeypatch, car_plan(clock="twin"), clock)
 
 
-def test_time_in_steps_belongs_to_who_commands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Somebody who watches does not make it go faster."""
+def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An observer does not make it faster."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -97,8 +97,8 @@ def test_time_in_steps_belongs_to_who_commands(monkeypatch: pytest.MonkeyPatch) 
     play(script, monkeypatch, STEPPED, clock)
 
 
-def test_lockstep_faster_than_the_rate_of_messages(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A thousand steps are no flood, since the robot keeps the pace."""
+def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The robot sets the pace of a thousand steps."""
 
     async def script(robot: Running) -> None:
         async with robot.client(pace="lockstep") as client:
@@ -109,7 +109,7 @@ def test_lockstep_faster_than_the_rate_of_messages(monkeypatch: pytest.MonkeyPat
 
 
 def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many acknowledgements are one credit, and pictures in between are left out."""
+    """Many acknowledgements are one credit, and frames in between are skipped."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -131,10 +131,10 @@ def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPa
     play(script, monkeypatch, car_plan())
 
 
-def test_without_pictures_observations_come_once_a_period(
+def test_without_frames_observations_are_sent_once_a_period(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """However fast the client asks."""
+    """Even if the client asks faster."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -147,7 +147,7 @@ def test_without_pictures_observations_come_once_a_period(
 
 
 def test_a_camera_that_freezes_keeps_its_old_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The guard and the client learn how old the picture is; the robot goes blind."""
+    """The guard and the client see the age of the frame."""
 
     async def script(robot: Running) -> None:
         robot.show()

@@ -1,4 +1,4 @@
-"""What the command line hands over."""
+"""Settings of the daemon."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from tests.robot.daemon.plans import car_plan
 
 
-def test_a_plan_crosses_as_json() -> None:
-    """With all that is in it."""
+def test_a_plan_survives_a_round_trip_through_json() -> None:
+    """With all fields."""
     plan = car_plan(reward={"speed": 1.0}, reset=(((0.0, -0.3), 1.5), ((0.0, 0.0), 0.5)))
     assert DaemonPlan.from_dict(json.loads(json.dumps(plan.to_dict()))) == plan
 
@@ -29,7 +29,7 @@ def test_a_plan_crosses_as_json() -> None:
         ({"camera": {"driver": "pattern", "size": [160]}}, "camera"),
     ],
 )
-def test_nonsense_is_refused_by_name(change: dict[str, object], words: str) -> None:
-    """The message names the field."""
+def test_an_invalid_field_is_named(change: dict[str, object], words: str) -> None:
+    """In the error message."""
     with pytest.raises(ProfileError, match=words):
         DaemonPlan.from_dict(json.loads(json.dumps(car_plan().to_dict() | change)))

@@ -1,4 +1,4 @@
-"""The daemon as a process of its own, as the supervisor starts it."""
+"""Daemon in its own process, as the supervisor starts it."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def started(begun: Started) -> Started:
     return begun
 
 
-def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> None:
-    """Exit status 0, and the guard sees the end of the socket."""
+def test_it_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
+    """With exit status 0; the guard sees the end of the socket."""
     assert started.heart.recv(16) == b"."
     with socket.create_connection(("127.0.0.1", started.port), 20.0):
         pass
@@ -107,8 +107,8 @@ def test_it_serves_shows_that_it_lives_and_ends_when_asked(started: Started) -> 
     assert "is not announced: only this machine reaches 127.0.0.1" in said
 
 
-def test_its_life_is_over_when_it_is_killed(started: Started) -> None:
-    """It says nothing before, and ends by itself then."""
+def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
+    """Not before."""
     poll = select.poll()
     poll.register(started.life, select.POLLIN)
     assert poll.poll(50) == []
@@ -116,8 +116,8 @@ def test_its_life_is_over_when_it_is_killed(started: Started) -> None:
     assert poll.poll(20_000) == [(started.life, select.POLLHUP)]
 
 
-def test_whoever_holds_its_life_holds_nothing_else(started: Started) -> None:
-    """A connection that the daemon closes is closed, though a thread has a copy of old files."""
+def test_the_lifeline_thread_holds_no_other_file(started: Started) -> None:
+    """A connection that the daemon closes is closed."""
     with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
         client.sendall(b"this is no request\r\n\r\n")
         while client.recv(4096):  # Until its end.
@@ -127,16 +127,16 @@ def test_whoever_holds_its_life_holds_nothing_else(started: Started) -> None:
     assert 1 in held.values()
 
 
-def test_a_guard_that_is_gone_before_is_no_crash() -> None:
-    """Whoever reads its socket says so in words."""
+def test_a_missing_guard_is_no_crash() -> None:
+    """The reader of the socket reports it."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
     with theirs:
         assert send_lifeline(theirs.fileno())
 
 
-def test_nobody_is_let_in_before_the_guard_has_spoken(begun: Started) -> None:
-    """They would see a robot of which nothing is known, not even what its outputs do."""
+def test_no_client_connects_before_the_first_state(begun: Started) -> None:
+    """The state of the outputs would be unknown."""
     assert begun.heart.recv(16) == b"."  # It runs.
     begun.guard.close()
     status, said = begun.ended()
@@ -146,7 +146,7 @@ def test_nobody_is_let_in_before_the_guard_has_spoken(begun: Started) -> None:
 
 
 def test_it_ends_with_the_guard(started: Started) -> None:
-    """In words, for the supervisor to start both again."""
+    """With an error message; the supervisor restarts both."""
     started.guard.close()
     status, said = started.ended()
     assert status == 1
@@ -154,15 +154,15 @@ def test_it_ends_with_the_guard(started: Started) -> None:
 
 
 def test_it_ends_with_the_supervisor(started: Started) -> None:
-    """Nobody would be there to stop it."""
+    """No process could stop the guard otherwise."""
     started.heart.close()
     status, said = started.ended()
     assert status == 1
     assert "The supervisor is gone." in said
 
 
-def test_a_log_that_nobody_can_write_does_not_end_it(started: Started) -> None:
-    """As with a full disk behind stderr: it goes on serving, and ends when asked."""
+def test_a_blocked_log_does_not_end_it(started: Started) -> None:
+    """As with a full disk behind stderr: it goes on serving."""
     assert started.process.stderr is not None
     started.process.stderr.close()
     for _ in range(20):

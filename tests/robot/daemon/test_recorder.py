@@ -1,4 +1,4 @@
-"""The thread that writes: what it takes, it writes; a disk that is too slow ends the episode."""
+"""Recorder: pairing of commands with observations, and the thread that writes."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def step(number: int) -> StepWithFrame:
     )
 
 
-def test_everything_is_written_in_the_order_in_which_it_was_told(tmp_path: Path) -> None:
-    """And the episode is closed with its outcome."""
+def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
+    """The episode is closed with its outcome."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
     scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
@@ -70,10 +70,8 @@ def test_everything_is_written_in_the_order_in_which_it_was_told(tmp_path: Path)
 
 
 @pytest.mark.parametrize("bytes_each", [0, 1 << 20])
-def test_a_disk_that_is_too_slow_ends_the_episode_and_keeps_what_it_took(
-    tmp_path: Path, bytes_each: int
-) -> None:
-    """Neither steps nor bytes of pictures pile up without end; here the disk is busy elsewhere."""
+def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_each: int) -> None:
+    """Queued steps and bytes are bounded; here the disk is busy elsewhere."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
     scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
@@ -90,8 +88,8 @@ def test_a_disk_that_is_too_slow_ends_the_episode_and_keeps_what_it_took(
     assert len(episode.steps) == taken == (15 if bytes_each else 256)
 
 
-def test_what_the_disk_says_is_reported(tmp_path: Path) -> None:
-    """Once, and it does not begin."""
+def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
+    """Once, and the episode does not begin."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
     scribe = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
@@ -117,8 +115,8 @@ while True:
 """
 
 
-def test_what_a_killed_daemon_leaves_can_be_finished(tmp_path: Path) -> None:
-    """SIGKILL at random moments: every step that was complete is there after repair."""
+def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
+    """After SIGKILL at random moments all complete steps are there."""
     rng = random.Random(5)
     for number in range(2):
         folder = tmp_path / str(number)
@@ -176,8 +174,8 @@ def frame(seq: int) -> NumberedFrame:
     return NumberedFrame(seq, Frame(b"jpeg %d" % seq, seq))
 
 
-def test_what_the_outputs_did_comes_with_the_next_observation() -> None:
-    """And why they did not do what they were told."""
+def test_the_next_observation_brings_the_applied_outputs() -> None:
+    """With the reason of a stop."""
     pairing = StepBuilder(lambda: 7)
     assert pairing.observed(1, seen(1, 100, suggested=(0.9,)), frame(1)) is None
     assert pairing.decided(ADA, 1, (0.5,), 110) is None
@@ -192,7 +190,7 @@ def test_what_the_outputs_did_comes_with_the_next_observation() -> None:
 
 
 def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
-    """A key that is let go at once."""
+    """As when a key is let go at once."""
     pairing = StepBuilder()
     pairing.observed(1, seen(1, 100), None)
     pairing.decided(ADA, 1, (0.5,), 110)
@@ -202,8 +200,8 @@ def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
     assert (done.step.action, done.step.decided_ns, done.step.applied) == ((0.0,), 115, None)
 
 
-def test_what_answers_nothing_that_was_seen_is_no_step() -> None:
-    """Such as something that was seen before recording began, or by somebody else."""
+def test_a_command_that_answers_no_known_observation_is_no_step() -> None:
+    """Such as one from before the recording, or of another client."""
     pairing = StepBuilder()
     pairing.observed(1, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
@@ -213,8 +211,8 @@ def test_what_answers_nothing_that_was_seen_is_no_step() -> None:
     assert pairing.complete() is None
 
 
-def test_who_lost_the_command_does_not_tell_what_its_command_did() -> None:
-    """By then the outputs follow somebody else."""
+def test_a_client_without_control_does_not_complete_applied_outputs() -> None:
+    """The outputs then follow another client."""
     pairing = StepBuilder()
     pairing.observed(2, seen(1, 100), None)
     pairing.decided(NET, 1, (0.5,), 110)
@@ -228,10 +226,10 @@ def test_who_lost_the_command_does_not_tell_what_its_command_did() -> None:
         st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
     )
 )
-def test_time_never_runs_backwards_and_no_picture_is_given_twice(
+def test_time_never_runs_backwards_and_no_frame_repeats(
     said: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
-    """Whatever is answered, by whom, and however late."""
+    """For any order of observations and commands."""
     pairing = StepBuilder()
     steps: list[StepWithFrame | None] = []
     newest = {ADA.session: 0, NET.session: 0}

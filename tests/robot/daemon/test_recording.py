@@ -1,4 +1,4 @@
-"""Recording on a daemon over real sockets: who may, what is written, and what others are told."""
+"""Recording with a daemon on real sockets."""
 
 from __future__ import annotations
 
@@ -82,10 +82,8 @@ def only(folder: Path) -> Path:
     return episode
 
 
-def test_a_step_is_what_was_seen_and_what_was_decided_on_seeing_it(
-    play: Any, tmp_path: Path
-) -> None:
-    """With the picture as the camera gave it, what the outputs did, and the robot's times."""
+def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) -> None:
+    """With the camera's frame, the applied outputs and the robot's times."""
     seen: list[Observation] = []
 
     async def script(robot: Running) -> None:
@@ -125,8 +123,8 @@ def test_a_step_is_what_was_seen_and_what_was_decided_on_seeing_it(
     assert len({step.frame for step in episode.steps}) > 6
 
 
-def test_nothing_is_recorded_while_the_outputs_are_at_rest(play: Any, tmp_path: Path) -> None:
-    """A robot that stands disarmed shows nothing that could be learned."""
+def test_nothing_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
+    """Such steps teach nothing."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -139,8 +137,8 @@ def test_nothing_is_recorded_while_the_outputs_are_at_rest(play: Any, tmp_path: 
     assert read_episode(only(tmp_path / "kept")).steps == ()
 
 
-def test_an_episode_goes_on_when_another_one_drives(play: Any, tmp_path: Path) -> None:
-    """Each step tells who decided it, and what the program wanted while a person drove."""
+def test_an_episode_goes_on_after_a_change_of_control(play: Any, tmp_path: Path) -> None:
+    """Each step has its driver, and the program's suggestion while a person drove."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client(name="net") as program:
@@ -165,8 +163,8 @@ def test_an_episode_goes_on_when_another_one_drives(play: Any, tmp_path: Path) -
     assert [step.wanted for step in steps] == [None, None, None, (-1.0, 5.0)]
 
 
-def test_undo_drops_what_was_recorded_last(play: Any, tmp_path: Path) -> None:
-    """It stays on the disk and does not count; with nothing left, that is said."""
+def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
+    """They stay on the disk; without steps it is refused."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -190,7 +188,7 @@ def test_undo_drops_what_was_recorded_last(play: Any, tmp_path: Path) -> None:
 
 
 def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
-    """A program may look at what was recorded."""
+    """A program may read recordings."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as program:
@@ -210,8 +208,8 @@ def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "kept").exists()
 
 
-def test_a_robot_without_a_folder_says_so(play: Any) -> None:
-    """In its welcome, and to whoever asks all the same."""
+def test_a_robot_without_a_folder_does_not_record(play: Any) -> None:
+    """Its welcome says so, and it refuses requests."""
 
     async def script(robot: Running) -> None:
         async with robot.connect() as person:
@@ -223,8 +221,8 @@ def test_a_robot_without_a_folder_says_so(play: Any) -> None:
     play(script, recordings="")
 
 
-def test_recording_is_refused_in_words_where_the_disk_says_no(play: Any, tmp_path: Path) -> None:
-    """To whoever asked; and to everybody, that nothing is recorded."""
+def test_recording_is_refused_if_the_disk_fails(play: Any, tmp_path: Path) -> None:
+    """The person gets the reason, and all clients the state."""
     (tmp_path / "kept").write_text("in the way")
 
     async def script(robot: Running) -> None:
@@ -237,10 +235,8 @@ def test_recording_is_refused_in_words_where_the_disk_says_no(play: Any, tmp_pat
     play(script)
 
 
-def test_recording_ends_by_itself_with_a_sentence_and_the_robot_drives_on(
-    play: Any, tmp_path: Path
-) -> None:
-    """Somebody takes the folder away in the middle of it."""
+def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path: Path) -> None:
+    """The folder is removed during the recording."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -265,15 +261,15 @@ def test_recording_ends_by_itself_with_a_sentence_and_the_robot_drives_on(
     play(script)
 
 
-def test_two_cannot_record_into_one_folder(play: Any, tmp_path: Path) -> None:
-    """Not two persons on one robot, and not two robots."""
+def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None:
+    """Neither of two persons on one robot, nor of two robots."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as one, robot.client(role="person") as two:
             with EpisodeWriter.create(tmp_path / "kept", header):
                 await one.say(Record(on=True))
-                assert "already" in (await one.expect(Refused)).reason
+                assert "in use by another recorder" in (await one.expect(Refused)).reason
             await recording(one)
             await two.say(Record(on=True))
             assert "recorded already" in (await two.expect(Refused)).reason
@@ -283,7 +279,7 @@ def test_two_cannot_record_into_one_folder(play: Any, tmp_path: Path) -> None:
 
 
 def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -> None:
-    """Nobody would be left who could end it; a program that drives on is told."""
+    """A program that drives on is informed."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as program:
@@ -301,8 +297,8 @@ def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -
     assert "last person" in read_episode(only(tmp_path / "kept")).outcome
 
 
-def test_everybody_is_told_each_second(play: Any) -> None:
-    """How many steps there are by now."""
+def test_the_state_is_broadcast_each_second(play: Any) -> None:
+    """With the number of steps."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client() as program:
@@ -320,7 +316,7 @@ def test_everybody_is_told_each_second(play: Any) -> None:
 def test_the_episode_is_closed_when_the_daemon_ends(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Properly, as if a person had ended it."""
+    """As if a person had ended it."""
 
     async def run() -> None:
         async with (
@@ -339,8 +335,8 @@ def test_the_episode_is_closed_when_the_daemon_ends(
     assert (episode.closed, episode.outcome, len(episode.steps)) == (True, "", 4)
 
 
-def test_what_was_recorded_can_be_seen_fetched_and_judged(play: Any, tmp_path: Path) -> None:
-    """The list, the lines and pictures as they are on the disk, and steps that are bad."""
+def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) -> None:
+    """The list, the lines and frames as on the disk, and bad steps."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(30):
@@ -383,7 +379,7 @@ def test_what_was_recorded_can_be_seen_fetched_and_judged(play: Any, tmp_path: P
 
 
 def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> None:
-    """Answers are large, so who asks many at once cannot fill the robot's memory."""
+    """Answers are large, and must not fill the robot's memory."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(200):
@@ -406,8 +402,8 @@ def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> N
     play(script)
 
 
-def test_who_is_only_told_things_stays_for_all_of_them(play: Any, tmp_path: Path) -> None:
-    """Over TLS, too, where a message that has left once seemed to wait for the next one."""
+def test_a_client_that_only_listens_gets_all_events(play: Any, tmp_path: Path) -> None:
+    """Over TLS too, where a sent message seemed to wait for the next one."""
     made = make_credentials(tmp_path / "credentials", "test car")
     secured = {"certificate": str(made.certificate), "private_key": str(made.private_key)}
 

@@ -1,4 +1,4 @@
-"""A daemon over real sockets: who is let in, and what becomes of those who misbehave."""
+"""Daemon on real sockets: authentication, control, limits and stops."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def secured(tmp_path: Path) -> tuple[DaemonPlan, bytes]:
     return plan, read_key(made.key_file)
 
 
-def test_who_holds_the_key_is_let_in(play: Any, secured: tuple[DaemonPlan, bytes]) -> None:
-    """Over TLS 1.3, and is told what the robot is."""
+def test_a_client_with_the_key_is_welcomed(play: Any, secured: tuple[DaemonPlan, bytes]) -> None:
+    """Over TLS 1.3, with a description of the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -88,7 +88,7 @@ def test_who_holds_the_key_is_let_in(play: Any, secured: tuple[DaemonPlan, bytes
     play(script, plan)
 
 
-def test_a_wrong_key_is_refused_in_words_and_slowly(
+def test_a_wrong_key_is_refused_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each time; the right key is accepted at once, from the same address too."""
@@ -214,7 +214,7 @@ def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
     play(script)
 
 
-def test_a_huge_message_ends_the_connection_before_it_is_whole(play: Any) -> None:
+def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
     """100 MB are not buffered first."""
 
     async def script(robot: Running) -> None:
@@ -365,7 +365,7 @@ def test_a_late_request_to_arm_is_refused(play: Any) -> None:
 
 
 def test_a_person_takes_an_armed_robot_as_it_is(play: Any) -> None:
-    """It stands, and stays armed: whoever takes it may have to steer out of somebody's way."""
+    """It stops, and stays armed: the person may have to steer at once."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as sac, robot.client(role="person") as ann:
@@ -380,8 +380,10 @@ def test_a_person_takes_an_armed_robot_as_it_is(play: Any) -> None:
 
 
 @pytest.mark.parametrize("what", ["says nothing", "half a handshake", "idles", "no hello"])
-def test_strangers_keep_nobody_out(play: Any, secured: tuple[DaemonPlan, bytes], what: str) -> None:
-    """A hundred of them, from the same address; whoever holds the key comes in and stops it."""
+def test_a_hundred_silent_connections_keep_no_client_out(
+    play: Any, secured: tuple[DaemonPlan, bytes], what: str
+) -> None:
+    """From the same address; a client with the key connects and stops the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -408,10 +410,10 @@ def test_strangers_keep_nobody_out(play: Any, secured: tuple[DaemonPlan, bytes],
 
 
 @pytest.mark.parametrize("secure", [True, False])
-def test_who_does_not_ask_for_the_link_is_dropped(
+def test_a_connection_without_a_request_is_dropped(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, secure: bool
 ) -> None:
-    """In its handshake or behind it; a client that is known stays."""
+    """During the TLS handshake or after it; an authenticated client stays."""
     plan, key = secured if secure else (car_plan(), b"")
     monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(timeout_s=0.2))
 
@@ -435,7 +437,7 @@ def test_who_does_not_ask_for_the_link_is_dropped(
 
 
 def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None:
-    """However new the command itself is."""
+    """The command itself may be new."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -449,8 +451,8 @@ def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None
     play(script, car_plan(max_observation_age_ms=20))
 
 
-def test_a_client_can_only_lower_what_it_asks(play: Any) -> None:
-    """Its own cap is multiplied; the picture's time goes along."""
+def test_the_scale_of_a_command_only_lowers_it(play: Any) -> None:
+    """Its values are multiplied; the frame's time is passed on."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -471,8 +473,8 @@ def test_a_client_can_only_lower_what_it_asks(play: Any) -> None:
 
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])
-def test_who_leaves_disarms(play: Any, how: str) -> None:
-    """By saying so, by closing, and by vanishing."""
+def test_leaving_disarms_the_robot(play: Any, how: str) -> None:
+    """By a release, by closing, and by vanishing."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person", name="Ann") as client:
@@ -489,8 +491,8 @@ def test_who_leaves_disarms(play: Any, how: str) -> None:
     play(script)
 
 
-def test_a_watcher_that_leaves_stops_nothing(play: Any) -> None:
-    """Only who commands."""
+def test_an_observer_that_leaves_stops_nothing(play: Any) -> None:
+    """Only the client in control does."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as driver:
@@ -503,8 +505,8 @@ def test_a_watcher_that_leaves_stops_nothing(play: Any) -> None:
     play(script)
 
 
-def test_anybody_stops_everything_and_only_a_person_ends_that(play: Any) -> None:
-    """Whoever is known, commanding or not; and the reason is told to all."""
+def test_any_client_can_stop_the_robot_and_only_a_person_can_end_that(play: Any) -> None:
+    """With or without control; all clients get the reason."""
 
     async def script(robot: Running) -> None:
         async with (
@@ -530,8 +532,8 @@ def test_anybody_stops_everything_and_only_a_person_ends_that(play: Any) -> None
 
 
 @pytest.mark.parametrize("arming", ["person", "anyone"])
-def test_who_may_arm(play: Any, arming: str) -> None:
-    """A program only where the profile says so, and only the one that commands."""
+def test_clients_that_may_arm(play: Any, arming: str) -> None:
+    """A program only if the profile permits it, and only with control."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as one, robot.client() as two:
@@ -559,8 +561,8 @@ def test_who_may_arm(play: Any, arming: str) -> None:
     play(script, car_plan(arming=arming))
 
 
-def test_what_the_guard_refuses_comes_back(play: Any) -> None:
-    """To whoever commands, with the number of the command."""
+def test_a_refusal_of_the_guard_is_passed_on(play: Any) -> None:
+    """To the client in control, with the number of the command."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -572,8 +574,8 @@ def test_what_the_guard_refuses_comes_back(play: Any) -> None:
     play(script)
 
 
-def test_a_ping_comes_back_with_the_time(play: Any) -> None:
-    """With its token."""
+def test_a_ping_is_answered_with_the_time(play: Any) -> None:
+    """And its token."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -586,10 +588,8 @@ def test_a_ping_comes_back_with_the_time(play: Any) -> None:
     play(script)
 
 
-def test_who_does_not_read_is_dropped_and_holds_up_nobody(
-    play: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another client sees no difference meanwhile."""
+def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meanwhile another client sees no difference."""
     patience_s = 3.0
     monkeypatch.setattr(connection, "_SEND_S", patience_s)
 
@@ -623,8 +623,8 @@ def test_who_does_not_read_is_dropped_and_holds_up_nobody(
     play(script, car_plan(control_hz=200.0))
 
 
-def test_the_page_says_what_this_is_and_no_more(play: Any) -> None:
-    """Who has no key gets files and a name; the headers let no other page use them."""
+def test_the_console_reveals_only_the_robots_name(play: Any) -> None:
+    """The headers keep other pages from using its files."""
 
     async def script(robot: Running) -> None:
         async with robot.session.get(robot.url) as page:
@@ -650,7 +650,7 @@ def test_the_page_says_what_this_is_and_no_more(play: Any) -> None:
 
 
 def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
-    """Its scripts run in the browsers of people who are near the robot."""
+    """Scripts of other pages run in the browsers of people near the robot."""
 
     async def script(robot: Running) -> None:
         with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
@@ -662,8 +662,8 @@ def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
     play(script)
 
 
-def test_a_port_that_is_taken_is_said(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And what that usually means."""
+def test_a_port_in_use_is_an_error(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The message has the likely reason."""
 
     async def script(robot: Running) -> None:
         with pytest.raises(RobotError, match="served already"):
@@ -674,7 +674,7 @@ def test_a_port_that_is_taken_is_said(play: Any, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_daemon_ends_when_the_guard_is_gone(play: Any) -> None:
-    """There is nothing left to serve."""
+    """It could not serve the robot."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -686,7 +686,7 @@ def test_the_daemon_ends_when_the_guard_is_gone(play: Any) -> None:
     play(script)
 
 
-def test_taking_it_twice_is_no_new_lease(play: Any) -> None:
+def test_taking_control_twice_makes_no_new_lease(play: Any) -> None:
     """Commands on their way still count."""
 
     async def script(robot: Running) -> None:

@@ -1,4 +1,4 @@
-"""Whatever clients say, in whatever order: who moves the robot is who may."""
+"""Sessions under random messages in random order: only permitted clients move the robot."""
 
 from __future__ import annotations
 

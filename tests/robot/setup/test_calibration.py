@@ -1,4 +1,4 @@
-"""From what a person saw to changes of a profile."""
+"""Profile changes from a calibration."""
 
 import pytest
 
@@ -24,8 +24,8 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 
 
 @pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
-def test_what_was_seen_is_the_pulse_that_was_sent_then(left_us: int, right_us: int) -> None:
-    """Also for a servo that is mounted the other way round."""
+def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
+    """Also for a servo mounted the other way round."""
     settings = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
     wide = with_widest_pulses(OutputPlan("steer", "servo", settings=settings))
     seen = JogResult(-0.5, 0.1, 0.4)
@@ -41,43 +41,43 @@ def test_what_was_seen_is_the_pulse_that_was_sent_then(left_us: int, right_us: i
 
 
 def test_a_middle_outside_the_ends_is_refused() -> None:
-    """Whoever pressed Enter three times in one place starts again."""
+    """As after three times Enter in one place."""
     with pytest.raises(RobotError, match="must lie between"):
         pulse_changes(_SERVO, JogResult(0.2, 0.2, 0.2))
 
 
 def test_a_motor_has_no_pulses() -> None:
-    """Only servos and controllers are jogged by width."""
+    """Only servos and motor controllers have pulse widths."""
     with pytest.raises(RobotError, match="sends no pulses"):
         with_widest_pulses(_MOTOR)
 
 
-def test_a_motor_that_went_backward_is_turned_round_by_its_mix() -> None:
-    """The pins stay as they are wired, so that the doctor's table stays true."""
+def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:
+    """The pins stay as they are wired."""
     assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
     assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
 
 
 @pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
 def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
-    """Otherwise there is nothing left to drive with."""
+    """Otherwise its range would be empty."""
     with pytest.raises(RobotError, match="must start at a duty"):
         motor_changes(_MOTOR, "forward", duty)
 
 
-def test_a_wheel_is_scaled_by_the_way_that_was_pushed() -> None:
-    """An encoder that counted half a metre for one belongs to a wheel twice as large."""
+def test_a_wheel_is_scaled_by_the_pushed_distance() -> None:
+    """An encoder that measured half a metre for one gets twice the distance per turn."""
     assert wheel_changes("wheel", 0.21, 1.0, 0.5) == {"sensor.wheel.wheel_m": 0.42}
 
 
 @pytest.mark.parametrize("measured_m", [0.0, -0.8])
-def test_a_wheel_that_counts_nothing_or_backward_is_a_matter_of_wires(measured_m: float) -> None:
-    """A scale would hide it."""
+def test_a_wheel_that_counts_nothing_or_backward_is_an_error(measured_m: float) -> None:
+    """A scale would hide wrong wires."""
     with pytest.raises(RobotError, match="check its wires"):
         wheel_changes("wheel", 0.21, 1.0, measured_m)
 
 
-def test_where_an_output_is_can_be_read() -> None:
-    """In the units of its settings."""
+def test_an_output_is_described_in_its_own_units() -> None:
+    """Microseconds or duty."""
     assert reading(_SERVO, 0.5) == "1700 µs"
     assert reading(OutputPlan("drive", "hbridge", settings={"full": 0.8}), -0.25) == "duty 0.20"

@@ -1,4 +1,4 @@
-"""What the doctor finds on a robot, before it drives."""
+"""Checks of a robot before it drives."""
 
 import socket
 import threading
@@ -69,16 +69,16 @@ def _write(root: Path, name: str, text: str) -> None:
         ("dtparam=i2c_arm=on", "missing"),
     ],
 )
-def test_strict_gpiod_is_looked_for_in_the_boot_configuration(
+def test_strict_gpiod_is_read_from_the_boot_configuration(
     tmp_path: Path, line: str, level: str
 ) -> None:
-    """Without it the kernel keeps a pin high when the process that set it dies."""
+    """Without it a pin stays high when the process that set it dies."""
     _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
     assert _found(tmp_path)["strict_gpiod"].level == level
 
 
-def test_away_from_a_pi_the_doctor_says_that_it_cannot_tell(tmp_path: Path) -> None:
-    """A workstation has no boot configuration, and that is no mistake."""
+def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
+    """A missing boot configuration is not an error there."""
     found = _found(tmp_path)
     assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
     assert "--twin" in found["computer"].sentence
@@ -99,22 +99,22 @@ def test_away_from_a_pi_the_doctor_says_that_it_cannot_tell(tmp_path: Path) -> N
 def test_the_systemd_unit_must_restart_and_make_safe(
     tmp_path: Path, unit: str, level: str, says: str
 ) -> None:
-    """A unit that only starts the robot leaves its pins to chance after a crash."""
+    """A unit that only starts the robot does not make its pins safe after a crash."""
     _write(tmp_path, f"etc/systemd/system/{unit_name('car')}", f"[Service]\n{unit}")
     finding = _found(tmp_path)["systemd"]
     assert finding.level == level
     assert says in finding.sentence
 
 
-def test_what_hardware_would_make_safe_is_asked_for(tmp_path: Path) -> None:
+def test_missing_safety_hardware_is_reported(tmp_path: Path) -> None:
     """A servo board without OE and motors without a one-shot outlive their processes."""
     found = _found(tmp_path, replace(CAR, outputs=(_SERVO,)))
     assert {found["enable line"].level, found["output enable"].level} == {"missing"}
     assert _found(tmp_path, replace(CAR, enable_pin=18))["enable line"].level == "good"
 
 
-def test_devices_are_looked_for_where_outputs_need_them(tmp_path: Path) -> None:
-    """A car on an H-bridge needs the pins, and no bus."""
+def test_only_the_devices_of_the_outputs_are_checked(tmp_path: Path) -> None:
+    """A car on an H-bridge needs pins, and no bus."""
     guard = replace(CAR, outputs=(_MOTOR, _SERVO))
     _write(tmp_path, "dev/gpiochip0", "")
     sentences = {
@@ -124,8 +124,8 @@ def test_devices_are_looked_for_where_outputs_need_them(tmp_path: Path) -> None:
     assert any("raspi-config" in sentence and "i2c-1" in sentence for sentence in sentences)
 
 
-def test_a_camera_shows_a_picture_or_says_why_not(tmp_path: Path) -> None:
-    """Blind means stop, so better to know before."""
+def test_the_camera_is_tried(tmp_path: Path) -> None:
+    """A robot without frames stops."""
     frame = Frame(b"\xff\xd8", 0)
     assert _found(tmp_path, camera=_CAMERA, gives=frame)["camera"].level == "good"
     broken = _found(tmp_path, camera=_CAMERA, gives=RobotError("It burns."))["camera"]
@@ -141,7 +141,7 @@ def test_a_camera_that_hangs_does_not_hang_the_doctor(
 
 
 def test_a_port_in_use_is_named(tmp_path: Path) -> None:
-    """Two daemons on one port is a common slip."""
+    """Two daemons on one port are a common mistake."""
     with socket.socket() as taken:
         taken.bind(("", 0))
         taken.listen()
@@ -150,8 +150,8 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
     assert [f.level for f in ports] == ["missing"]
 
 
-def test_an_adapter_that_waits_is_told_of(tmp_path: Path) -> None:
-    """Servos that are heard 16 ms late would be silent for the guard."""
+def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
+    """Answers that come 16 ms late would count as silence."""
     rig = load_profile(find_profile("finger")).guard_plan()
     timer = "sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
     assert _found(tmp_path, rig)["latency timer"].level == "unknown"

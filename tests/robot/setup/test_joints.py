@@ -1,4 +1,4 @@
-"""Where encoders stand while a finger is straight, and how their magnets sit."""
+"""Zeros and checks of the encoders at the joints."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def _board(tremble: float = 0.0) -> LocalBoard:
 
 @pytest.mark.parametrize("tremble", [0.0, 0.02])
 def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
-    """By the names that the profile's tables have, also around the count 0."""
+    """By the names in the profile's tables, also around the count 0."""
     zeros = find_joint_zeros(_PLAN, _board(tremble).hardware, lambda: None)
     names = ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"]
     assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
 
 
-def test_a_magnet_that_is_gone_has_no_zero() -> None:
-    """It is named. A robot without encoders has none to find."""
+def test_a_missing_magnet_is_an_error() -> None:
+    """It is named. A robot without encoders has no zeros."""
     board = _board()
     board.pins.encoder("DIP_flexion").set_magnet("gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
@@ -91,8 +91,8 @@ def root(tmp_path: Path) -> Path:
         ("strong", "missing: The magnet of PIP_flexion is too near to its encoder."),
     ],
 )
-def test_the_doctor_says_how_each_magnet_sits(root: Path, how: Magnet, says: str) -> None:
-    """The others are well."""
+def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, says: str) -> None:
+    """The others are good."""
     board = _board()
     board.pins.encoder("PIP_flexion").set_magnet(how)
     said = _found(root, _PLAN, board)["encoders"]
@@ -109,7 +109,7 @@ def test_the_doctor_names_a_chip_that_does_not_answer(root: Path) -> None:
     assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in said)
 
 
-def test_the_doctor_asks_no_encoder_of_a_robot_that_is_served(root: Path) -> None:
+def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> None:
     """A channel that it opens would give the guard the angle of another joint."""
     with socket.socket() as taken:
         taken.bind(("", 0))
@@ -127,8 +127,8 @@ def test_the_doctor_asks_no_encoder_of_a_robot_that_is_served(root: Path) -> Non
         ("dtparam=i2c_arm_baudrate=100000", "missing"),
     ],
 )
-def test_the_doctor_asks_for_a_fast_bus(root: Path, config: str, says: str) -> None:
-    """Only of a robot with encoders."""
+def test_the_doctor_checks_the_bus_speed(root: Path, config: str, says: str) -> None:
+    """Only for a robot with encoders."""
     (root / "boot/config.txt").write_text(config)
     assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(says)
     car = load_profile(find_profile("car")).guard_plan()

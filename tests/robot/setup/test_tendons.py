@@ -1,4 +1,4 @@
-"""Where servos stand while a finger is straight."""
+"""Zeros of the tendon servos."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def _plan(zero: int) -> GuardPlan:
     return replace(plan, outputs=outputs)
 
 
-def test_zeros_are_where_nothing_moves_any_more() -> None:
-    """And all servos have let go afterwards."""
+def test_zeros_are_measured_with_taut_tendons() -> None:
+    """All servos are released afterwards."""
     board = _board(_plan(5000))
     zeros = find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
     # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
@@ -37,8 +37,8 @@ def test_zeros_are_where_nothing_moves_any_more() -> None:
     assert not any(servo.has_torque for servo in board.rig.bus.servos.values())
 
 
-def test_a_tendon_that_came_off_has_no_zero() -> None:
-    """It is named, and all servos let go."""
+def test_a_loose_tendon_is_an_error() -> None:
+    """It is named, and all servos are released."""
     board = _board(_plan(0))
     assert board.rig is not None
     board.rig.break_servo("EIP", "snapped")
@@ -48,7 +48,7 @@ def test_a_tendon_that_came_off_has_no_zero() -> None:
 
 
 def test_a_car_has_no_tendons() -> None:
-    """Whoever asks is told."""
+    """It is an error."""
     plan = load_profile(find_profile("car")).guard_plan()
     with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
         find_zeros(plan, _board(_plan(0)).hardware, lambda: None)

@@ -1,4 +1,4 @@
-"""The systemd unit that a new robot gets."""
+"""systemd unit of a new robot."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from tests.robot.setup.test_doctor import CAR
 
 
 def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
-    """No place is left open, and nothing has to be edited."""
+    """All placeholders are replaced."""
     text = unit_text("car", tmp_path / "car.toml", "/opt/venv/bin/shapechanger", "pi", tmp_path)
     started = f"ExecStart=/opt/venv/bin/shapechanger robot serve {tmp_path}/car.toml"
     assert f"{started} --credentials {tmp_path}\n" in text
@@ -16,8 +16,8 @@ def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
     assert "@" not in text
 
 
-def test_the_doctor_is_content_with_the_unit(tmp_path: Path) -> None:
-    """What `init` writes is what `doctor` looks for."""
+def test_the_doctor_accepts_the_unit_of_init(tmp_path: Path) -> None:
+    """Both agree on the settings."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
     path, is_new = write_unit("car", folder / "car.toml")
@@ -35,8 +35,8 @@ def test_the_doctor_is_content_with_the_unit(tmp_path: Path) -> None:
     assert "is for another profile" in other.sentence
 
 
-def test_a_unit_that_somebody_changed_stays(tmp_path: Path) -> None:
-    """It may hold the settings of another robot."""
+def test_an_existing_unit_stays(tmp_path: Path) -> None:
+    """It may have other settings."""
     path, _ = write_unit("car", tmp_path / "car.toml")
     path.write_text("mine")
     assert write_unit("car", tmp_path / "car.toml") == (path, False)

@@ -88,8 +88,8 @@ def test_a_point_is_three_numbers(given: object) -> None:
     with pytest.raises(PathError) as caught:
         from_callable(function)
     assert str(caught.value) == (
-        "The function of a path must return three finite numbers (x, y, z) in m, and at 0 s it returned "
-        f"{given!r}."
+        "The function of a path must return three finite numbers (x, y, z) in m, and at 0 s it "
+        f"returned {given!r}."
     )
 
 

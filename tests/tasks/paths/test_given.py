@@ -112,8 +112,8 @@ def test_unknown_names_come_with_the_nearest(given: Any, said: str) -> None:
         (File("path.txt"), "A path file must end in .csv, got 'path.txt'."),
         (
             3,
-            "A path must be one of circle, figure-eight, line, curve, such a name with settings, a .csv "
-            "file or a function of time, got 3.",
+            "A path must be one of circle, figure-eight, line, curve, such a name with settings, a "
+            ".csv file or a function of time, got 3.",
         ),
     ],
 )

@@ -83,8 +83,8 @@ def lines(*rows: str) -> str:
         ("t,x,y\n0,0,0\n", "{file}, line 1 lacks z: the columns are t, x, y and z."),
         (
             "0,0,0,0\n1,0,0,0\n",
-            "{file}, line 1 lacks t, x, y, z and has the unknown columns '0', '0', '0', '0': the columns are "
-            "t, x, y and z.",
+            "{file}, line 1 lacks t, x, y, z and has the unknown columns '0', '0', '0', '0': "
+            "the columns are t, x, y and z.",
         ),
         (
             "t,x,y,z,grip\n",

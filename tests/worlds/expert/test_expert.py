@@ -109,11 +109,17 @@ def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
     assert _drive(vehicle, CourseExpert(course, name), course, 30.0) > 0.4 * 30.0 * TOP[name]
 
 
+def pose_on(expert: CourseExpert, i: int) -> Pose:
+    """Pose at a point of the expert's path."""
+    x, y = expert.path.points[i].tolist()
+    return Pose(x, y, float(expert.path.heading[i]))
+
+
 def test_it_backs_up_when_it_stands_still() -> None:
     """After 0.7 s of throttle without motion, and forward again later."""
     course = ring(0)
     expert = CourseExpert(course, "car")
-    pose = Pose(*expert.path.points[0], float(expert.path.heading[0]))
+    pose = pose_on(expert, 0)
     throttles = [float(expert.act(pose, 0.0)[1]) for _ in range(80)]
     assert min(throttles[:14]) > 0.25
     assert throttles[16] < 0
@@ -128,7 +134,7 @@ def test_the_same_seed_does_the_same() -> None:
 
     def track(seed: int) -> list[float]:
         expert = CourseExpert(course, "car", seed)
-        pose = Pose(*expert.path.points[0], float(expert.path.heading[0]))
+        pose = pose_on(expert, 0)
         return [float(value) for _ in range(120) for value in expert.act(pose, 0.0)]
 
     assert track(0) == track(0)
@@ -139,7 +145,7 @@ def test_a_reset_forgets_everything() -> None:
     """The next episode begins as the first did, its randomness aside."""
     course = ring(1)
     expert = CourseExpert(course, "boat")
-    pose = Pose(*expert.path.points[50], float(expert.path.heading[50]))
+    pose = pose_on(expert, 50)
     expert.reset(pose)
     first = [expert.act(pose, 0.5, 0.1) for _ in range(5)]
     for _ in range(40):

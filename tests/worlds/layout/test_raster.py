@@ -64,7 +64,7 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     course = lay_out(world, 5)
     blocked, (x0, y0) = occupancy(course, 0.05)
     rows, columns = np.nonzero(~blocked)
-    middles = np.stack([x0 + 0.05 * columns, y0 + 0.05 * rows], axis=1)
+    middles = np.array([x0 + 0.05 * columns, y0 + 0.05 * rows], np.float64).T
     near = distances_to_segments(
         middles[::50], np.hstack([course.route, np.roll(course.route, -1, 0)])
     )

@@ -1,8 +1,14 @@
-"""Driving policies that are learned from pictures and from what a driver did on seeing them.
+"""Behaviour cloning: driving policies learned from pictures, states and the actions of a driver.
 
-`train.clone` learns one from arrays, `policy.CameraPolicy` keeps, saves and loads it, and `sb3`
-hands it to a learner that goes on by reward. Nothing is imported here: settings are read where
-there is no torch.
+```
+train.clone          learn steering and throttle from arrays of pictures
+learn.learn          learn any actions from any demonstrations (`shapechanger demos train`)
+policy.CameraPolicy  predict, save and load
+judge.judge          compare a policy with a driver on held-out steps
+sb3, replay          continue with reinforcement learning in Stable-Baselines3
+```
+
+Nothing is imported here, so that settings can be read without PyTorch.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which examples are learned from together."""
+"""Batches of augmented training examples."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _BRIGHTEST: Final = 255.0
 
 
 def plain(pictures: Tensor, index: Tensor) -> Tensor:
-    """Pictures as they are.
+    """Return pictures without augmentation.
 
     Args:
         pictures: uint8, shape (n, height, width, 3).
-        index: Which of them, shape (batch,).
+        index: Indices of the pictures, shape (batch,).
 
     Returns:
         In [0, 1], shape (batch, 3, height, width).
@@ -35,17 +35,17 @@ def plain(pictures: Tensor, index: Tensor) -> Tensor:
 def augmented(
     pictures: Tensor, index: Tensor, augmentation: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
-    """Pictures as another day, another camera or the mirror would show them.
+    """Return pictures with random changes of light, colour, noise and position.
 
     Args:
         pictures: uint8, shape (n, height, width, 3).
-        index: Which of them, shape (batch,).
-        augmentation: What to change, and how far.
-        generator: The source of chance.
+        index: Indices of the pictures, shape (batch,).
+        augmentation: Kind and extent of the changes.
+        generator: Source of randomness.
 
     Returns:
-        Pictures in [0, 1], shape (batch, 3, height, width), and which of them are mirrored, so that
-        their actions have to be mirrored, too, shape (batch,).
+        Pictures in [0, 1], shape (batch, 3, height, width), and a mask of the mirrored ones, whose
+        actions must be mirrored too, shape (batch,).
     """
     mirrored = torch.rand(len(index), generator=generator) < augmentation.mirror
     seen = _moved(pictures, index, mirrored, augmentation.shift, generator)
@@ -58,7 +58,7 @@ def augmented(
 def _moved(
     pictures: Tensor, index: Tensor, mirrored: Tensor, shift: int, generator: torch.Generator
 ) -> Tensor:
-    """Mirror and shift while fetching: one look-up a pixel. Edges are repeated."""
+    """Mirror and shift while fetching, with one look-up per pixel; edge pixels are repeated."""
     height, width = pictures.shape[1], pictures.shape[2]
     moves = torch.randint(-shift, shift + 1, (2, len(index), 1), generator=generator)
     rows = (torch.arange(height) + moves[0]).clamp_(0, height - 1)
@@ -66,12 +66,12 @@ def _moved(
     columns = torch.where(mirrored[:, None], width - 1 - columns, columns)
     places = (index[:, None, None] * height + rows[:, :, None]) * width + columns[:, None, :]
     pixels = pictures.reshape(-1, pictures.shape[3]).index_select(0, places.reshape(-1))
-    # So permuted, the tensor has its colours last in memory, as the network likes it.
+    # Colours stay last in memory, which is fastest for the network.
     return pixels.reshape(*places.shape, -1).permute(0, 3, 1, 2).float().div_(_BRIGHTEST)
 
 
 def _relight(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
-    """More or less light, of another colour."""
+    """Change brightness and colour."""
     n, colours = seen.shape[0], seen.shape[1]
     gain = _factors((n, 1, 1, 1), augmentation.gain, generator)
     colour = _factors((n, colours, 1, 1), augmentation.colour, generator)
@@ -80,20 +80,20 @@ def _relight(seen: Tensor, augmentation: Augmentation, generator: torch.Generato
 
 
 def _factors(shape: tuple[int, ...], largest: float, generator: torch.Generator) -> Tensor:
-    """Factors between the inverse of the largest and the largest, even in their logarithm."""
+    """Return factors between 1 / largest and largest, uniform in their logarithm."""
     spread = 2.0 * torch.rand(shape, generator=generator) - 1.0
     return torch.exp(math.log(largest) * spread)
 
 
 def _blur(seen: Tensor, share: float, generator: torch.Generator) -> None:
-    """Blur the first few: a batch is in no order, so they are any few."""
+    """Blur the first few pictures; a batch is in random order."""
     count = _first_few(len(seen), share, generator)
     if count:
         seen[:count] = functional.avg_pool2d(seen[:count], 3, 1, 1, count_include_pad=False)
 
 
 def _sprinkle(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
-    """Add the noise of a camera in the dark to the last few, so that some are blurred and noisy."""
+    """Add noise as of a camera in the dark to the last few pictures; some are blurred and noisy."""
     count = _first_few(len(seen), augmentation.noisy, generator)
     if count:
         strength = augmentation.noise * torch.rand((count, 1, 1, 1), generator=generator)
@@ -102,12 +102,12 @@ def _sprinkle(seen: Tensor, augmentation: Augmentation, generator: torch.Generat
 
 
 def _first_few(n: int, share: float, generator: torch.Generator) -> int:
-    """How many of n, so that the share is right on average for the smallest batch, too."""
+    """Return a number of pictures that is right on average even for small batches."""
     return math.floor(n * share + float(torch.rand((), generator=generator)) * (share > 0.0))
 
 
 class Batch(NamedTuple):
-    """Examples that are learned from together.
+    """Examples of one training step.
 
     Attributes:
         pictures: In [0, 1], shape (batch, 3, height, width); None for none.
@@ -121,14 +121,14 @@ class Batch(NamedTuple):
 
 
 class Batches:
-    """Endless batches of augmented examples: every one once before any comes again.
+    """Infinite batches of augmented examples, each drawn once before any repeats.
 
     Args:
-        shown: What to learn from.
-        learned: Which of it, shape (n,).
-        rehearsal: What to mix in; None for nothing.
-        settings: Size of a batch, share of the rehearsal, augmentation.
-        seed: Seed of the order and of the augmentation.
+        shown: The examples.
+        learned: Mask of those to learn from, shape (n,).
+        rehearsal: Examples to mix in; None for none.
+        settings: Batch size, share of the rehearsal, and augmentation.
+        seed: Seed of order and augmentation.
     """
 
     def __init__(
@@ -148,11 +148,11 @@ class Batches:
 
     @property
     def size(self) -> int:
-        """How many different examples are learned from, without the rehearsed ones."""
+        """Number of different examples to learn from, without the rehearsal."""
         return self._sources[0].size
 
     def draw(self) -> Batch:
-        """The next batch."""
+        """Return the next batch."""
         parts = [source.draw(self._settings, self._generator) for source in self._sources]
         if len(parts) == 1:
             return parts[0]
@@ -164,10 +164,10 @@ class Batches:
 
 
 class _Source:
-    """Examples in an order that is shuffled whenever it ends."""
+    """Examples in an order that is shuffled again whenever it ends."""
 
     def __init__(self, shown: Examples, index: NDArray[np.intp], at_a_time: int) -> None:
-        # Torch does not take arrays that may not be written to, such as parts of a file.
+        # PyTorch does not accept read-only arrays, such as memory-mapped files.
         self.pictures = (
             None
             if shown.pictures is None
@@ -183,7 +183,7 @@ class _Source:
         self._waiting = self._index[:0]
 
     def draw(self, settings: CloneSettings, generator: torch.Generator) -> Batch:
-        """The next few, each a little different from how it was."""
+        """Return the next examples, augmented."""
         few = self._next(generator)
         if self.pictures is None:
             share = settings.augmentation.mirror
@@ -198,7 +198,7 @@ class _Source:
         return Batch(seen, states, targets)
 
     def _next(self, generator: torch.Generator) -> Tensor:
-        """The next few; where there are fewer examples than that, some come more than once."""
+        """Return the next indices; with too few examples, some repeat within a batch."""
         while len(self._waiting) < self._at_a_time:
             order = torch.randperm(self.size, generator=generator)
             self._waiting = torch.cat((self._waiting, self._index[order]))
@@ -208,7 +208,7 @@ class _Source:
 
 
 def _either(turned: Tensor, mirrored: Tensor, plain: Tensor) -> Tensor:
-    """Of each row the one or the other."""
+    """Select the mirrored or the plain value of each row."""
     return torch.where(turned if plain.ndim == 1 else turned[:, None], mirrored, plain)
 
 

@@ -1,4 +1,4 @@
-"""What a policy says of itself: its card, beside the weights in its file."""
+"""Card of a policy: metadata that is stored beside the weights."""
 
 from __future__ import annotations
 
@@ -14,42 +14,41 @@ from shapechanger.layout import Layout
 __all__ = ["FORMATS", "CloneCard", "Head"]
 
 FORMATS: Final = (1, 2)
-"""Versions of the file that are read: the first holds steering and throttle from a picture only."""
+"""Supported versions of the file; version 1 holds steering and throttle from pictures only."""
 
 Head = Literal["regression", "class"]
-"""Numbers of an action, or one of the actions that were shown."""
+"""Kind of output: continuous actions, or a choice among the actions that were demonstrated."""
 
-# So that a card that lies takes no time before it is found out.
-_MOST_MEMBERS: Final = 32
-_STEERS: Final = ("steering", "throttle")
+_MAX_MEMBERS: Final = 32  # Bounds the work that a forged card can cause.
+_STEERING: Final = ("steering", "throttle")
 
 
 class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a policy comes from.
+    """Architecture and origin of a policy.
 
     Attributes:
-        framing: What it sees.
-        channels: Filters of each of its layers.
-        features: Numbers between picture and actions.
-        seeds: Seeds of the trainings that made it, the last one last.
-        steps: Steps of the last training, up to the best policy.
+        framing: Part of the picture that the policy sees.
+        channels: Filters of each convolution.
+        features: Number of features between picture and actions.
+        seeds: Seeds of the trainings, last one last.
+        steps: Step of the last training at which the policy was best.
         settings: Settings of the last training.
-        data: What it was learned from, in the caller's words.
-        command: The command that made it.
+        data: Origin of the demonstrations, as given by the caller.
+        command: Command that trained the policy.
         version: Version of Shapechanger.
-        format: Of the file.
-        eyes: What its first layer sees of a picture; "none" for a policy without eyes.
-        nerves: Widths of the layers that its state goes through; () for a policy without a state.
-        members: Networks in it, whose answers are averaged.
-        head: What comes out.
-        classes: The actions that it chooses from, if it does.
-        class_names: What they are called.
-        action_layout: What the numbers of its actions mean; None for steering and throttle in
-            [-1, 1] of any vehicle.
-        state_layout: What the numbers of its state mean; None without a state.
-        unseen: Names of the numbers of the state that it does not look at.
-        low: Actions that an output of -1 stands for; () for -1 each.
-        high: Actions that an output of 1 stands for; () for 1 each.
+        format: Version of the file.
+        eyes: Input of the first layer: "colours" or "edges" of a picture; "none" without pictures.
+        nerves: Widths of the layers for the state; () without a state.
+        members: Number of networks whose outputs are averaged.
+        head: Kind of output.
+        classes: Actions to choose from; () for continuous actions.
+        class_names: Names of the classes.
+        action_layout: Meaning of the values of an action; None for steering and throttle in [-1, 1]
+            of any vehicle.
+        state_layout: Meaning of the values of a state; None without a state.
+        unseen: Names of state values that the policy ignores.
+        low: Action for an output of -1; () for -1 each.
+        high: Action for an output of 1; () for 1 each.
     """
 
     framing: Framing
@@ -75,60 +74,60 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     high: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what describes no network.
+        """Validate the architecture.
 
         Raises:
-            CloningError: If it has layers without filters, no features, or contradicts itself.
+            CloningError: If a size is not positive, or fields contradict each other.
         """
         if not self.channels or min(self.features, *self.channels, *self.nerves) < 1:
-            raise CloningError("A network has layers, and each has at least one number.")
-        if not 1 <= self.members <= _MOST_MEMBERS:
-            raise CloningError(f"A policy has 1 to {_MOST_MEMBERS} networks, got {self.members}.")
+            raise CloningError("channels, features and nerves must be positive.")
+        if not 1 <= self.members <= _MAX_MEMBERS:
+            raise CloningError(f"members must be from 1 to {_MAX_MEMBERS}, got {self.members}.")
         if bool(self.nerves) != (self.state_layout is not None):
-            raise CloningError("A policy has nerves where it has a state, and only there.")
+            raise CloningError("nerves and state_layout must be given together.")
         if self.eyes == "none" and not self.nerves:
-            raise CloningError("A policy that perceives nothing cannot act.")
+            raise CloningError("A policy needs pictures, a state, or both.")
         if (self.head == "class") != bool(self.classes):
-            raise CloningError("A policy that chooses has something to choose from.")
+            raise CloningError("The head class, and no other, needs classes.")
         if any(len(action) != self.action_size for action in self.classes):
-            raise CloningError(f"An action of this policy has {self.action_size} numbers.")
+            raise CloningError(f"Each class must have {self.action_size} values.")
         if len(self.class_names) != len(self.classes):
-            raise CloningError("Each class has a name.")
+            raise CloningError("Each class must have a name.")
         if any(bounds and len(bounds) != self.action_size for bounds in (self.low, self.high)):
-            raise CloningError(f"An action of this policy has {self.action_size} bounds.")
+            raise CloningError(f"low and high must have {self.action_size} values.")
 
     @property
     def action_size(self) -> int:
-        """Numbers of an action."""
+        """Number of values in an action."""
         return 2 if self.action_layout is None else self.action_layout.size
 
     @property
     def state_size(self) -> int:
-        """Numbers of a state; 0 without one."""
+        """Number of values in a state; 0 without one."""
         return 0 if self.state_layout is None else self.state_layout.size
 
     @property
     def outputs(self) -> int:
-        """Numbers that come out of the network."""
+        """Number of outputs of the network."""
         return len(self.classes) or self.action_size
 
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
-        """Refuse a robot, an env or data that speak otherwise than the policy.
+        """Refuse a robot, an env or data whose layouts differ from the policy's.
 
         Args:
-            actions: The other's layout of the actions.
-            state: The other's layout of the state; None if it has none.
+            actions: Layout of its actions.
+            state: Layout of its state; None without a state.
 
         Raises:
-            PolicyError: If the policy cannot act there; in one sentence.
+            PolicyError: If the layouts differ.
         """
-        mine = _STEERS if self.action_layout is None else _words(self.action_layout)
+        mine = _STEERING if self.action_layout is None else _words(self.action_layout)
         theirs = _words(actions)
         if self.action_layout is None:
             theirs = tuple(word.split(" ")[0] for word in theirs)
         if mine != theirs:
             raise PolicyError(
-                f"The policy decides {', '.join(mine)}, and what it is to drive takes "
+                f"The actions of the policy are {', '.join(mine)}, but those required here are "
                 f"{', '.join(theirs)}."
             )
         if self.state_layout is None:
@@ -136,11 +135,11 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         felt = () if state is None else _words(state)
         if _words(self.state_layout) != felt:
             raise PolicyError(
-                f"The policy feels {', '.join(_words(self.state_layout))}, and what it is to drive "
-                f"gives {', '.join(felt) or 'no state'}."
+                f"The policy needs the state {', '.join(_words(self.state_layout))}, but it gets "
+                f"{', '.join(felt) or 'none'}."
             )
 
 
 def _words(layout: Layout) -> tuple[str, ...]:
-    """Names with units, and the shape of what is a block."""
+    """Return the names with units, and the shapes of array features."""
     return tuple(f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout)

@@ -1,4 +1,4 @@
-"""What a driver saw and did, checked and split before anything is learned from it."""
+"""Demonstrations as training examples: mirroring, validation, and held-out splits."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ __all__ = [
     "stretch",
 ]
 
-# Parts of a name, between slashes. Seen in the mirror, the first change their sign and the second
-# stay as they are; yaw is to the left and y points to the left.
+# Parts of names, between slashes. In the mirror image, the first change their sign and the second
+# do not. Positive yaw is to the left, and y points to the left.
 _NEGATED: Final = frozenset({"steering", "yaw_rate", "acceleration_y"})
 _KEPT: Final = frozenset(
     {"throttle", "forward", "backward", "speed", "distance", "acceleration_x"}
@@ -39,12 +39,12 @@ _SIDE: Final = re.compile(r"(?<![a-z])(left|right)(?![a-z])")
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
-    """What becomes of the numbers of a layout when the world is mirrored.
+    """Effect of mirroring the world on the values of a layout.
 
     Attributes:
-        order: For each number the place that it comes from.
-        signs: For each number 1 or -1.
-        rightward: For each number 1 if more of it steers to the right, -1 to the left, 0 neither.
+        order: Index of the value that each value comes from.
+        signs: Sign of each value, 1 or -1.
+        rightward: 1 if a larger value steers to the right, -1 to the left, 0 neither.
     """
 
     order: tuple[int, ...]
@@ -52,14 +52,13 @@ class Mirror:
     rightward: tuple[float, ...]
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The mirrored numbers, shape (n, size) in and out."""
+        """Return the mirrored values, shape (n, size) in and out."""
         return values[:, list(self.order)] * np.asarray(self.signs, np.float32)
 
     def even(self, actions: NDArray[np.float32]) -> float:
-        """How evenly these actions steer to both sides: 0 for one only, 1 for as much to each.
+        """Return how evenly actions steer to both sides: 0 for one side only, 1 for equal shares.
 
-        A drive that turns to one side only tells which way to go where there are two, and in the
-        mirror it would tell the opposite.
+        In a drive that turns to one side only, the mirror image would teach the wrong turn.
         """
         aside = actions @ np.asarray(self.rightward, np.float32)
         right, left = float(aside.clip(min=0.0).sum()), float((-aside).clip(min=0.0).sum())
@@ -67,14 +66,14 @@ class Mirror:
 
 
 STEERING: Final = Mirror((0, 1), (-1.0, 1.0), (1.0, 0.0))
-"""Of steering and throttle."""
+"""Mirror of steering and throttle."""
 
 
 def mirror_of(layout: Layout) -> Mirror:
-    """The mirror of a layout: steering changes its sign, left and right change places.
+    """Return the mirror of a layout: steering changes its sign, left and right are swapped.
 
     Raises:
-        CloningError: If nothing is known of the mirror of one of its numbers.
+        CloningError: If the mirror image of a value is unknown; the message is part of a sentence.
     """
     order: list[int] = []
     signs: list[float] = []
@@ -84,7 +83,7 @@ def mirror_of(layout: Layout) -> Mirror:
         parts = set(feature.name.split("/"))
         other = _SIDE.sub(lambda found: _SIDES[found[0]], feature.name)
         if feature.shape:
-            raise CloningError(f"nothing is known of the mirror of the block {feature.name}")
+            raise CloningError(f"the mirror image of the array {feature.name} is unknown")
         if other != feature.name and other in names:
             order.append(names.index(other))
             signs.append(1.0)
@@ -98,24 +97,23 @@ def mirror_of(layout: Layout) -> Mirror:
             signs.append(1.0)
             rightward.append(0.0)
         else:
-            raise CloningError(f"nothing is known of the mirror of {feature.name}")
+            raise CloningError(f"the mirror image of {feature.name} is unknown")
     return Mirror(tuple(order), tuple(signs), tuple(rightward))
 
 
-# Actions in single precision may miss their bound by a rounding.
-_SLACK = 1e-5
+_ROUNDING: Final = 1e-5  # Of actions in single precision.
 
 
 @dataclass(frozen=True, slots=True)
 class Examples:
-    """What was perceived, and what is to come out of it, as it is and as the mirror shows it.
+    """Training examples, with their mirror images.
 
     Attributes:
-        pictures: As the policy sees them, shape (n, height, width, 3); None for none.
+        pictures: Prepared pictures, shape (n, height, width, 3); None for none.
         states: Shape (n, k); None for none.
-        targets: What is to come out: actions, shape (n, m), or numbers of classes, shape (n,).
-        turned_states: The states in the mirror.
-        turned_targets: The targets in the mirror.
+        targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
+        turned_states: The mirrored states.
+        turned_targets: The mirrored targets.
     """
 
     pictures: NDArray[np.uint8] | None
@@ -125,11 +123,11 @@ class Examples:
     turned_targets: NDArray[Any]
 
     def __len__(self) -> int:
-        """How many."""
+        """Return the number of examples."""
         return len(self.targets)
 
     def part(self, which: NDArray[np.bool_]) -> Examples:
-        """Some of them, by a mask of shape (n,)."""
+        """Return the examples selected by a mask of shape (n,)."""
         return replace(
             self,
             pictures=None if self.pictures is None else self.pictures[which],
@@ -143,28 +141,32 @@ class Examples:
 def steering_examples(
     pictures: NDArray[np.uint8], actions: NDArray[np.floating], framing: Framing
 ) -> Examples:
-    """Pictures with steering and throttle: prepared, and refused if nothing can be learned.
+    """Return examples of steering and throttle from pictures.
+
+    Args:
+        pictures: Shape (n, H, W, 3), raw or prepared.
+        actions: Shape (n, 2), in [-1, 1].
+        framing: Crop and resolution.
 
     Raises:
-        CloningError: If there is nothing, or it does not fit together.
+        CloningError: If there are no examples, or an array is invalid.
     """
     if actions.ndim != 2 or actions.shape[1] != 2:
         raise CloningError(
-            "Actions are steering and throttle, an array of shape (n, 2), got shape "
-            f"{actions.shape}."
+            f"Actions must be steering and throttle, shape (n, 2), got shape {actions.shape}."
         )
     if len(pictures) != len(actions):
         raise CloningError(
-            f"Each picture needs its action: there are {len(pictures)} pictures and "
+            f"Each picture needs an action: there are {len(pictures)} pictures and "
             f"{len(actions)} actions."
         )
     if not len(actions):
         raise CloningError("There is no picture to learn from.")
-    wrong = ~(np.abs(actions) <= 1.0 + _SLACK).all(axis=1)  # Also finds NaN.
+    wrong = ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)  # Also finds NaN.
     if wrong.any():
         first = int(wrong.argmax())
         raise CloningError(
-            f"Steering and throttle are numbers in [-1, 1], but action {first} is "
+            f"Steering and throttle must be in [-1, 1], but action {first} is "
             f"{actions[first].tolist()}."
         )
     wanted = actions.astype(np.float32)
@@ -172,23 +174,23 @@ def steering_examples(
 
 
 def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]:
-    """Which of n pictures are not learned from: the last ones of each episode.
+    """Return a mask of the examples to hold out: the last ones of each episode.
 
-    They are the last and not any, because neighbours in time look alike: a picture between two that
-    were learned from tests nothing.
+    The last ones are taken because neighbours in time look alike: a picture between two training
+    pictures would test nothing.
 
     Args:
-        n: How many pictures.
-        episodes: Length of each episode in order; none for a single one.
-        share: Of each episode, in [0, 1); rounded down.
+        n: Number of examples.
+        episodes: Length of each episode in order; () for a single one.
+        share: Share of each episode, in [0, 1); rounded down.
 
     Raises:
-        CloningError: If the lengths do not add up.
+        CloningError: If the lengths do not add up to n.
     """
     lengths = list(episodes) or [n]
     if min(lengths) < 0 or sum(lengths) != n:
         raise CloningError(
-            f"The episodes have {sum(lengths)} pictures together, but there are {n} pictures."
+            f"The episodes have {sum(lengths)} pictures in total, but there are {n} pictures."
         )
     mask = np.zeros(n, np.bool_)
     end = 0
@@ -199,28 +201,26 @@ def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]
 
 
 SplitBy = Literal["time", "episode"]
-"""Hold out the last stretch of time, or whole episodes."""
+"""Hold out the end of the recording by time, or whole episodes."""
 
 
 def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
-    """Which steps are not learned from but judge the policy: the last ones.
-
-    They are the last and not any, because neighbours in time look alike.
+    """Return a mask of the steps to hold out for judging a policy: the last ones.
 
     Args:
-        episodes: Steps of each episode, in order.
-        by: "time" takes the last share of all steps; "episode" as many whole episodes at the end
-            as it takes to have that share, at least one, and leaves at least one.
-        share: In [0, 1); 0 for none.
+        episodes: Number of steps of each episode, in order.
+        by: "time" takes the last share of all steps; "episode" takes whole episodes from the end
+            until they have that share, but at least one, and leaves at least one.
+        share: Share of the steps, in [0, 1).
 
     Returns:
-        A mask of shape (sum(episodes),).
+        Shape (sum(episodes),).
 
     Raises:
-        CloningError: If the share is none, or there is one episode only.
+        CloningError: If the share is out of range, or there is one episode only.
     """
     if not 0.0 <= share < 1.0:
-        raise CloningError(f"The held-out share is in [0, 1), got {share}.")
+        raise CloningError(f"The held-out share must be in [0, 1), got {share}.")
     n = sum(episodes)
     mask = np.zeros(n, np.bool_)
     if not share:
@@ -231,7 +231,7 @@ def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[
     lengths = [length for length in episodes if length]
     if len(lengths) < 2:
         raise CloningError(
-            "There is one episode only, so none can be held out: split by time in place of episode."
+            "There is one episode only, so none can be held out: split by time instead of episode."
         )
     last = 0
     for length in reversed(lengths[1:]):
@@ -243,16 +243,16 @@ def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[
 
 
 def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_]:
-    """Which of the learned steps choose when a member stops: a stretch of time of its own.
+    """Return a mask of the steps with which a member decides when to stop.
 
     Args:
-        n: How many steps there are to learn from.
-        member: Which one.
-        members: How many there are; the stretch of the last one is the end.
-        share: Length of the stretch, in [0, 1); of no more than n / (members + 1) steps.
+        n: Number of training steps.
+        member: Index of the member.
+        members: Number of members; the last one takes the end.
+        share: Length of the stretch as a share of n, in [0, 1); at most n / (members + 1) steps.
 
     Returns:
-        A mask of shape (n,).
+        Shape (n,).
     """
     length = min(math.floor(share * n), n // (members + 1))
     start = round((n - length) * (member + 1) / members)

@@ -1,4 +1,4 @@
-"""How good a policy is on demonstrations that it did not learn from."""
+"""Outputs of a policy, and its evaluation on demonstrations that it did not learn from."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ _PLACES: Final = ("low", "middle", "high")
 
 
 def in_thirds(actions: NDArray[np.float64], layout: Layout) -> tuple[list[str], NDArray[np.int64]]:
-    """In which third of its range each number is: one class for each combination that comes up.
+    """Return the third of its range that each value is in, one class per combination that occurs.
 
     Args:
         actions: Shape (n, m).
-        layout: What the numbers mean; where it has no bound, the farthest action is one.
+        layout: Meaning of the values; the extreme action replaces a missing bound.
 
     Returns:
-        The names of the classes, and the number of each action's class, shape (n,).
+        The names of the classes, and the class index of each action, shape (n,).
     """
     low = np.where(np.isfinite(layout.low), layout.low, actions.min(axis=0))
     high = np.where(np.isfinite(layout.high), layout.high, actions.max(axis=0))
@@ -68,27 +68,25 @@ def _word(name: str, third: int) -> str:
 
 
 AskedHead = Literal["auto", "class", "regression"]
-"""How it is asked for: "auto" chooses classes where few different actions were shown."""
+"""Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
 
 MOST_CLASSES: Final = 16
-"""More different actions than this are numbers and not keys."""
+"""Maximum number of classes; more different actions are continuous."""
 
-# Each different action comes at least so often on average, or it was no choice among a few.
-_LEAST_EACH: Final = 4
-# Actions in single precision may differ by a rounding.
-_SAME: Final = 1e-4
+_MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
+_ROUNDING: Final = 1e-4  # Of actions in single precision.
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is to come out.
+    """Output encoding of a policy.
 
     Attributes:
-        head: Numbers or classes.
-        classes: The different actions, most frequent first; () for numbers.
-        names: What they are called.
-        low: Smallest value of each number; () for classes.
-        high: Largest value of each number.
+        head: Kind of output.
+        classes: The different actions, most frequent first; () for continuous actions.
+        names: Names of the classes.
+        low: Minimum of each value; () for classes.
+        high: Maximum of each value; () for classes.
     """
 
     head: Head
@@ -98,11 +96,11 @@ class Goal:
     high: tuple[float, ...] = ()
 
     def targets(self, actions: NDArray[np.float32]) -> NDArray[Any]:
-        """What the network is to give for actions of shape (n, m).
+        """Return the target outputs for actions of shape (n, m).
 
         Returns:
-            Numbers of classes, shape (n,), -1 for an action that is none of them; or actions scaled
-            to [-1, 1], shape (n, m).
+            Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
+            (n, m).
         """
         if self.head == "class":
             return class_numbers(actions, self.classes)
@@ -116,29 +114,29 @@ def goal_of(
     asked: AskedHead,
     mirrored: NDArray[np.float32] | None = None,
 ) -> Goal:
-    """What is to come out, by what was shown.
+    """Choose the output encoding from the demonstrated actions.
 
     Args:
-        actions: What the driver did, shape (n, m).
-        layout: What the numbers mean.
-        asked: Which head.
-        mirrored: The same in the mirror, if pictures are mirrored; None if not.
+        actions: Actions of the driver, shape (n, m).
+        layout: Meaning of the values.
+        asked: Requested kind of output.
+        mirrored: The mirrored actions, if pictures are mirrored; None if not.
 
     Raises:
-        CloningError: If there are too many different actions for classes, or all are the same.
+        CloningError: If there are too many different actions for classes, or all are equal.
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
-    few = len(different) <= MOST_CLASSES and _LEAST_EACH * len(different) <= len(actions)
+    few = len(different) <= MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
     if asked == "class" and len(different) > MOST_CLASSES:
         raise CloningError(
-            f"There are {len(different)} different actions, and classes are at most "
-            f"{MOST_CLASSES}: choose the head regression."
+            f"There are {len(different)} different actions, but at most {MOST_CLASSES} classes are "
+            "supported: choose the head regression."
         )
     if len(np.unique(actions, axis=0)) < 2 and asked != "regression":
         raise CloningError(
-            f"The driver did the same in all of {len(actions)} steps "
-            f"({named(actions[0], layout)}), so there is nothing to learn."
+            f"All of {len(actions)} actions are equal ({named(actions[0], layout)}), so there is "
+            "nothing to learn."
         )
     if asked == "class" or (asked == "auto" and few):
         order = np.argsort(-counts, kind="stable")
@@ -146,21 +144,31 @@ def goal_of(
         return Goal("class", classes, tuple(named(np.asarray(c), layout) for c in classes))
     low = np.where(np.isfinite(layout.low), layout.low, both.min(axis=0))
     high = np.where(np.isfinite(layout.high), layout.high, both.max(axis=0))
-    high = np.where(high > low, high, low + 1.0)  # A number that never changes.
+    high = np.where(high > low, high, low + 1.0)  # For a constant value.
     return Goal("regression", low=tuple(map(float, low)), high=tuple(map(float, high)))
 
 
 def class_numbers(
     actions: NDArray[np.floating], classes: tuple[tuple[float, ...], ...]
 ) -> NDArray[np.int64]:
-    """Which class each action is, shape (n,); -1 for none of them."""
+    """Return the class index of each action, shape (n,); -1 for an unknown action.
+
+    Args:
+        actions: Shape (n, m).
+        classes: The actions of the classes.
+    """
     known = np.asarray(classes, np.float32)
     apart = np.abs(actions[:, None, :] - known).max(axis=2)
-    return np.where(apart.min(axis=1) < _SAME, apart.argmin(axis=1), -1).astype(np.int64)
+    return np.where(apart.min(axis=1) < _ROUNDING, apart.argmin(axis=1), -1).astype(np.int64)
 
 
 def named(action: NDArray[np.floating], layout: Layout) -> str:
-    """What an action is called: the keys that it holds down, or its numbers."""
+    """Return the name of an action: the keys that are held, or its values.
+
+    Args:
+        action: Shape (m,).
+        layout: Meaning of the values.
+    """
     parts = [name.split("/")[-1] for name in layout.names]
     if len(parts) != len(action):
         return " ".join(f"{value:g}" for value in action)
@@ -172,22 +180,20 @@ def named(action: NDArray[np.floating], layout: Layout) -> str:
 
 
 TOLERANCE: Final = 0.1
-"""An action is within the tolerance if each of its numbers is wrong by no more than this share of
-half its range."""
+"""Maximum error of a value within the tolerance, as a share of half its range."""
 
 _BINS: Final = 10
 _WORST: Final = 12
-# More points than this make no picture clearer.
-_MOST_POINTS: Final = 2000
+_MAX_POINTS: Final = 2000  # Enough for a chart.
 
 
 class Bin(msgspec.Struct, frozen=True):
-    """Steps on which the policy was about equally sure.
+    """Steps with similar confidence.
 
     Attributes:
-        sure: Mean probability that it gave to what it did.
-        right: Share of them on which it did what the driver did.
-        steps: How many.
+        sure: Mean probability of the chosen class.
+        right: Share of steps with the driver's class.
+        steps: Number of steps.
     """
 
     sure: float
@@ -196,29 +202,28 @@ class Bin(msgspec.Struct, frozen=True):
 
 
 class Judgement(msgspec.Struct, frozen=True, kw_only=True):
-    """How good a policy was.
+    """Evaluation of a policy.
 
     Attributes:
-        head: What comes out of the policy.
-        steps: Steps that it was judged on.
-        accuracy: Share of steps on which it did what the driver did. Where it gives numbers: on
-            which all of its numbers fall in the same third of their range as the driver's, such as
-            left, straight and right.
-        macro_f1: Mean over the classes of the harmonic mean of precision and recall; of every class
-            that the driver or the policy chose.
-        always: The accuracy of always doing what the driver did most, on these very steps.
-        classes: What can be chosen, or the thirds that came up.
-        confusion: Steps by what the driver did (rows) and the policy did (columns).
-        calibration: Steps by how sure the policy was; () where it gives numbers.
-        ece: Mean distance between how sure it was and how often it was right, weighted by steps
-            (expected calibration error); None where it gives numbers.
-        numbers: Names of the numbers of an action.
-        errors: Mean absolute error of each number, in its own unit.
-        within: Share of steps on which every number is within the tolerance.
-        tolerance: What that is, see `TOLERANCE`.
-        worst: Steps on which it was most wrong, worst first: surest of something else, or farthest.
-        done: What the policy did on some steps, in time; () for classes.
-        wanted: What the driver did on the same steps.
+        head: Kind of output.
+        steps: Number of steps.
+        accuracy: Share of steps with the driver's class. For continuous actions, the share in which
+            all values are in the same third of their range as the driver's, such as left, straight
+            and right.
+        macro_f1: Mean F1 score over all classes that the driver or the policy chose.
+        always: Accuracy of always choosing the driver's most frequent class on these steps.
+        classes: Names of the classes, or of the thirds that occur.
+        confusion: Number of steps by the driver's class (rows) and the policy's (columns).
+        calibration: Steps grouped by confidence; () for continuous actions.
+        ece: Expected calibration error: mean difference of confidence and accuracy, weighted by
+            steps; None for continuous actions.
+        numbers: Names of the values of an action.
+        errors: Mean absolute error of each value, in its unit.
+        within: Share of steps with every value within the tolerance.
+        tolerance: The tolerance, see `TOLERANCE`.
+        worst: Indices of the steps with the largest errors, worst first.
+        done: Actions of the policy at some steps, in time; () for classes.
+        wanted: Actions of the driver at the same steps.
     """
 
     head: Head
@@ -240,16 +245,16 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None = None) -> Judgement:
-    """Let a policy do what a driver did, and compare.
+    """Compare a policy with the driver of demonstrations.
 
     Args:
         policy: The policy.
-        data: What the driver perceived and did.
-        which: The steps to judge on, shape (n,); None for all.
+        data: The demonstrations.
+        which: Mask of the steps to use, shape (n,); None for all.
 
     Raises:
-        PolicyError: If the policy is for another layout.
-        CloningError: If there is no step, or the policy perceives what the data do not have.
+        PolicyError: If the layouts differ.
+        CloningError: If there is no step, or the data lack an input of the policy.
     """
     policy.card.require_layouts(data.action_layout, data.state_layout)
     chosen = np.flatnonzero(np.ones(len(data), np.bool_) if which is None else which)
@@ -271,7 +276,7 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         did, truth = out.argmax(axis=1), class_numbers(wanted, policy.card.classes)
         names, truth = _with_others(names, truth, wanted, data)
         calibration, ece = _calibration(out, did == truth)
-        # Of an action that it does not know it is as sure as can be of something else.
+        # The probability of an unknown action is 0.
         known = np.where(truth < out.shape[1], truth, 0)
         given = np.where(truth < out.shape[1], out[np.arange(len(out)), known], 0.0)
         wrongness = 1.0 - given + (did != truth)
@@ -304,11 +309,11 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
 
 
 def macro_f1(done: NDArray[np.int64], truth: NDArray[np.int64]) -> float:
-    """Mean F1 over every class that was chosen or would have been right, each counting the same.
+    """Return the mean F1 score over every class that occurs in either array.
 
     Args:
         done: Chosen classes, shape (n,).
-        truth: Right classes, shape (n,).
+        truth: Correct classes, shape (n,).
     """
     scores: list[float] = []
     for one in np.union1d(done, truth):
@@ -323,7 +328,7 @@ def _bound(
     done: NDArray[np.float64],
     sign: float,
 ) -> NDArray[np.float64]:
-    """The bound of a range, or the farthest number where the layout has none."""
+    """Return the bound of each range; the extreme value replaces a missing bound."""
     farthest = sign * np.maximum((sign * wanted).max(axis=0), (sign * done).max(axis=0))
     return np.where(np.isfinite(bound), bound, farthest)
 
@@ -331,7 +336,7 @@ def _bound(
 def _with_others(
     names: list[str], truth: NDArray[np.int64], wanted: NDArray[np.float64], data: Dataset
 ) -> tuple[list[str], NDArray[np.int64]]:
-    """Classes for what the driver did here and the policy was never shown."""
+    """Add classes for actions of the driver that are unknown to the policy."""
     names, truth = list(names), truth.copy()
     for step in np.flatnonzero(truth < 0):
         name = named(wanted[step], data.action_layout)
@@ -344,7 +349,7 @@ def _with_others(
 def _calibration(
     out: NDArray[np.float32], right: NDArray[np.bool_]
 ) -> tuple[tuple[Bin, ...], float]:
-    """The bins that hold anything, and the expected calibration error."""
+    """Return the non-empty bins, and the expected calibration error."""
     sure = out.max(axis=1)
     places = np.minimum((sure * _BINS).astype(np.int64), _BINS - 1)
     bins = tuple(
@@ -356,5 +361,5 @@ def _calibration(
 
 
 def _some(n: int) -> NDArray[np.int64]:
-    """Some steps in order, evenly."""
-    return np.unique(np.linspace(0, n - 1, min(n, _MOST_POINTS)).round().astype(np.int64))
+    """Return evenly spaced steps, in order."""
+    return np.unique(np.linspace(0, n - 1, min(n, _MAX_POINTS)).round().astype(np.int64))

@@ -1,4 +1,4 @@
-"""Learning from any demonstrations: pictures, states or both; keys or numbers."""
+"""Behaviour cloning from any demonstrations: pictures or states, keys or continuous actions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal, cast
 
 import msgspec
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
-from torch.nn import functional
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.demonstrations import Examples, Mirror, mirror_of, stretch
@@ -22,6 +19,17 @@ from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
 from shapechanger.errors import MissingExtra
+
+try:
+    import torch
+    from torch import Tensor
+    from torch.nn import functional
+
+    from shapechanger.demos.cloning.batches import Batch, Batches
+    from shapechanger.demos.cloning.network import CameraNetwork, joined
+    from shapechanger.demos.cloning.train import HUBER_BETA, fit
+except ImportError as error:
+    raise MissingExtra("torch", "learn") from error
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
@@ -37,23 +45,11 @@ __all__ = [
     "settings_for",
 ]
 
-try:
-    import torch
-    from torch import Tensor
-    from torch.nn import functional
-
-    from shapechanger.demos.cloning.batches import Batch, Batches
-    from shapechanger.demos.cloning.network import CameraNetwork, joined
-    from shapechanger.demos.cloning.train import HUBER_BETA, fit
-except ImportError as error:
-    raise MissingExtra("torch", "learn") from error
-
-
 Inputs = Literal["auto", "picture", "state", "both"]
-"""What a policy perceives: "auto" takes pictures where there are any, and states elsewhere."""
+"""Inputs of a policy; "auto" takes pictures if there are any, and states otherwise."""
 
-# Chosen on the first 430 frames of a real drive by the accuracy on five later stretches; what was
-# tried is told in benchmarks/cloning_real.py.
+# Chosen on the first 430 frames of a real drive by the accuracy on five later stretches;
+# benchmarks/cloning_real.py lists the alternatives.
 DEMOS: Final = CloneSettings(
     framing=Framing(height=48, width=64, top=0.0),
     channels=(24, 48),
@@ -74,37 +70,41 @@ DEMOS: Final = CloneSettings(
     smoothing=0.1,
     averaging=0.98,
 )
-"""How a policy is cloned from few demonstrations."""
+"""Settings for few demonstrations."""
 
 MANY: Final = 3000
-"""From so many steps on, two and a half minutes at 20 Hz, demonstrations are many: one network
-that sees colours and finer pictures learns from them. Few teach it the lamps of one corridor."""
+"""Number of steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network
+on colours and finer pictures learns from them; with fewer it would learn irrelevant details.
+"""
 
-_MOST_CERTAIN: Final = 0.95
-# What the robot did a moment ago nearly always tells what it does next: a clone that sees it learns
-# to repeat itself in place of looking.
+_MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
+# The previous action nearly always predicts the next one: a clone that sees it learns to repeat
+# itself instead of looking.
 _APPLIED: Final = "/applied"
-_LEAST_SPREAD: Final = 1e-6
+_MIN_SPREAD: Final = 1e-6
+# From twice as confident to a fifth as confident.
+_TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)
+_MIN_CALIBRATION_STEPS: Final = 20
 
 
 def settings_for(steps: int) -> CloneSettings:
-    """How a policy is cloned from so many steps.
+    """Return the settings for this many steps.
 
-    Where they are many nothing is held out, and the last network is kept: by a tenth of twenty
-    minutes the one after 140 of 1,400 steps was the best, by 0.3 %, and it drove badly; see
-    docs/cloning.md.
+    With many steps nothing is held out, and the last network is kept. When a tenth of twenty
+    minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
+    see docs/cloning.md.
     """
     return DEMOS if steps < MANY else CloneSettings(held_out=0.0)
 
 
 class MemberCheck(msgspec.Struct, frozen=True):
-    """How good one member was at some step.
+    """Validation of one member.
 
     Attributes:
-        member: Which one.
-        step: Steps of its training before it.
-        loss: Mean loss of the batches since the check before; NaN at the start.
-        error: The loss on the stretch of time that chooses when it stops; NaN without one.
+        member: Index of the member.
+        step: Number of its training steps so far.
+        loss: Mean loss of the batches since the last validation; NaN at the start.
+        error: Loss on the stretch of time held out for early stopping; NaN without one.
     """
 
     member: int
@@ -115,15 +115,15 @@ class MemberCheck(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """How a training went.
+    """Course of a training.
 
     Attributes:
-        checks: Of all members, in order.
-        steps: For each member the step at which it was best, which was kept.
-        learned: Steps of the demonstrations that were learned from.
-        mirrored: Share of pictures that were mirrored.
-        mirror_note: Why it is that share, in a sentence.
-        seconds: How long it took.
+        checks: Validations of all members, in order.
+        steps: Step of each member at which it was best, which was kept.
+        learned: Number of demonstrated steps learned from.
+        mirrored: Share of examples that were mirrored.
+        mirror_note: Reason for that share, in a sentence.
+        seconds: Duration, s.
     """
 
     checks: tuple[MemberCheck, ...]
@@ -144,23 +144,26 @@ def learn(
     seed: int = 0,
     on_check: Callable[[MemberCheck], None] = lambda check: None,
 ) -> tuple[CameraPolicy, Training]:
-    """Learn to do what a driver did.
+    """Learn the actions of a driver.
 
-    Several networks learn, each but for a stretch of time of its own, which says when it was best;
-    the policy is their mean. The same arguments give the same policy on the same machine with as
-    many threads.
+    The policy is the mean of several networks, each of which uses another stretch of time for early
+    stopping. Equal arguments give an equal policy on the same machine with the same number of
+    threads.
 
     Args:
-        data: What the driver perceived and did.
-        learned: Which of its steps to learn from, in the order of time, shape (n,); None for all.
-        settings: How; None for what `settings_for` says.
-        head: What comes out.
-        inputs: What goes in.
-        seed: Seed of everything random in it.
-        on_check: Called with each check as soon as it is there.
+        data: The demonstrations.
+        learned: Mask of the steps to learn from, shape (n,); None for all.
+        settings: Hyperparameters; None for those of `settings_for`.
+        head: Kind of output.
+        inputs: Inputs of the policy.
+        seed: Seed of all randomness.
+        on_check: Called after each validation.
+
+    Returns:
+        The policy, and the course of the training.
 
     Raises:
-        CloningError: If nothing can be learned from the data.
+        CloningError: If the data are unsuitable.
     """
     began = time.monotonic()
     which = np.ones(len(data.actions), np.bool_) if learned is None else learned
@@ -172,7 +175,7 @@ def learn(
     actions = data.actions[which]
     if not np.isfinite(actions).all():
         first = int(np.flatnonzero(~np.isfinite(data.actions).all(axis=1) & which)[0])
-        raise CloningError(f"Action {first} is {data.actions[first].tolist()}, which is no action.")
+        raise CloningError(f"Action {first} must be finite, got {data.actions[first].tolist()}.")
     sees, feels = _senses(pictures, states, inputs)
     mirror, felt_mirror, share, note = _mirrors(data, actions, feels)
     settings = msgspec.structs.replace(
@@ -192,16 +195,16 @@ def learn(
     members: list[CameraNetwork] = []
     checks: list[MemberCheck] = []
     steps: list[int] = []
-    sure: list[tuple[Tensor, Tensor]] = []
+    held_out: list[tuple[Tensor, Tensor]] = []
     for member in range(settings.members):
-        network, told, at, left_out = _one(shown, card, goal, settings, seed, member, on_check)
+        network, own, best, left_out = _one(shown, card, goal, settings, seed, member, on_check)
         members.append(network)
-        checks += told
-        steps.append(at)
-        sure.append(left_out)
+        checks += own
+        steps.append(best)
+        held_out.append(left_out)
     whole = joined(msgspec.structs.replace(card, members=len(members)), members)
     if goal.head == "class":
-        _calibrate(whole, sure)
+        _calibrate(whole, held_out)
     card = msgspec.structs.replace(
         card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
     )
@@ -214,7 +217,7 @@ def learn(
 def _senses(
     pictures: NDArray[np.uint8] | None, states: NDArray[np.float32] | None, inputs: Inputs
 ) -> tuple[bool, bool]:
-    """Whether it sees, and whether it feels."""
+    """Return whether the policy uses pictures, and whether it uses states."""
     if inputs == "auto":
         inputs = "picture" if pictures is not None else "state"
     sees, feels = inputs in {"picture", "both"}, inputs in {"state", "both"}
@@ -228,32 +231,31 @@ def _senses(
 def _mirrors(
     data: Dataset, actions: NDArray[np.float32], feels: bool
 ) -> tuple[Mirror | None, Mirror | None, float, str]:
-    """The mirror of actions and states, the share that is mirrored, and why it is that."""
+    """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
     try:
         mirror = mirror_of(data.action_layout)
         layout = data.state_layout
         felt = mirror_of(layout) if feels and layout is not None else None
     except CloningError as reason:
-        return None, None, 0.0, f"Nothing is mirrored: {reason}."
+        return None, None, 0.0, f"No picture is mirrored, because {reason}."
     even = mirror.even(actions)
     share = 0.5 * even
     note = (
-        f"{share:.1%} of the pictures are mirrored, because the driver went to one side "
-        f"{even:.1%} as much as to the other: in the mirror, a drive to one side would teach the "
-        "wrong one."
+        f"{share:.1%} of the pictures are mirrored, because the driver steered to one side "
+        f"{even:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
+        "the wrong side."
     )
     return mirror, felt, share, note
 
 
 def _unseen(data: Dataset) -> tuple[str, ...]:
-    """The numbers of the state that are not looked at."""
+    """Return the names of the state values to ignore."""
     layout = data.state_layout
     names = () if layout is None else layout.names
     unseen = tuple(name for name in names if name.endswith(_APPLIED))
     if len(unseen) == len(names):
         raise CloningError(
-            "The state tells only what the robot did the moment before, from which nobody can "
-            "learn what to do."
+            "The state contains only the previous action, from which nothing can be learned."
         )
     return unseen
 
@@ -261,7 +263,7 @@ def _unseen(data: Dataset) -> tuple[str, ...]:
 def _felt(
     states: NDArray[np.float32] | None, data: Dataset, unseen: tuple[str, ...]
 ) -> NDArray[np.float32] | None:
-    """The states without what is not looked at."""
+    """Return the states, with NaN for ignored values."""
     if states is None or data.state_layout is None:
         return None
     felt = states.astype(np.float32)
@@ -278,7 +280,7 @@ def _card(
     feels: bool,
     unseen: tuple[str, ...],
 ) -> CloneCard:
-    """The card of one member."""
+    """Return the card of one member."""
     return CloneCard(
         framing=settings.framing,
         channels=settings.channels,
@@ -309,8 +311,8 @@ def _one(
     """Train one member.
 
     Returns:
-        The network, its checks, the step at which it was best, and what it gave and should have
-        given on the stretch that it did not learn from.
+        The network, its validations, the step at which it was best, and its outputs and targets on
+        the stretch that it did not learn from.
     """
     seed = seed * settings.members + member
     kept_back = stretch(len(shown), member, settings.members, settings.held_out)
@@ -319,7 +321,7 @@ def _one(
     _begin_with(policy.network, shown.part(~kept_back), goal)
     batches = Batches(shown, ~kept_back, None, settings, seed)
     wanted = torch.as_tensor(exam.targets)
-    # Dropout draws from the global generator; what was drawn from it before must not matter.
+    # Dropout draws from the global generator; earlier draws must not matter.
     fork = cast(
         "AbstractContextManager[None]",
         torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
@@ -346,7 +348,7 @@ def _one(
 
 
 def _outputs(network: CameraNetwork, card: CloneCard, exam: Examples) -> Tensor:
-    """What comes out of a network, shape (n, outputs)."""
+    """Return the outputs of a network, shape (n, outputs)."""
     policy = CameraPolicy(network, card)
     found = torch.as_tensor(policy.features(exam.pictures, exam.states))
     with torch.inference_mode():
@@ -360,7 +362,7 @@ def _loss(out: Tensor, wanted: Tensor, goal: Goal, smoothing: float) -> Tensor:
 
 
 def _begin_with(network: CameraNetwork, shown: Examples, goal: Goal) -> None:
-    """Let an untrained network do what the driver does on average, and know usual states."""
+    """Initialise the output to the average action, and the normalisation of states."""
     with torch.no_grad():
         if goal.head == "class":
             counts = np.bincount(shown.targets, minlength=len(goal.classes)) + 1.0
@@ -368,7 +370,7 @@ def _begin_with(network: CameraNetwork, shown: Examples, goal: Goal) -> None:
             network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
         else:
             mean = torch.as_tensor(shown.targets.mean(axis=0))
-            network.hands.bias.copy_(torch.atanh(mean.clamp(-_MOST_CERTAIN, _MOST_CERTAIN)))
+            network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
         if network.nerves is not None and shown.states is not None:
             known = np.where(np.isfinite(shown.states), shown.states, np.nan)
             there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
@@ -379,37 +381,32 @@ def _begin_with(network: CameraNetwork, shown: Examples, goal: Goal) -> None:
                 found = np.nanmean(known[:, there], axis=0)
                 if name == "spread":
                     found = np.nanstd(known[:, there], axis=0)
-                    found = np.where(found > _LEAST_SPREAD, found, 1.0)
+                    found = np.where(found > _MIN_SPREAD, found, 1.0)
                 values[there] = found
                 getattr(network.nerves, name).copy_(torch.as_tensor(values))
 
 
-def _calibrate(network: CameraNetwork, sure: list[tuple[Tensor, Tensor]]) -> None:
-    """Let the policy be as sure as it is right, by what its members did not learn from."""
+def _calibrate(network: CameraNetwork, held_out: list[tuple[Tensor, Tensor]]) -> None:
+    """Scale the logits so that confidence matches accuracy on held-out steps."""
     temperature = best_temperature(
-        torch.cat([out for out, _ in sure]), torch.cat([wanted for _, wanted in sure])
+        torch.cat([out for out, _ in held_out]), torch.cat([wanted for _, wanted in held_out])
     )
     with torch.no_grad():
         network.hands.weight.div_(temperature)
         network.hands.bias.div_(temperature)
 
 
-# From twice as sure as the network was to a fifth.
-_TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)
-_FEWEST: Final = 20
-
-
 def best_temperature(logits: Tensor, wanted: Tensor) -> float:
-    """The temperature at which what was not learned from is the least surprise.
+    """Return the softmax temperature with the smallest cross-entropy on held-out steps.
 
     Args:
         logits: Shape (n, classes).
-        wanted: Numbers of the classes, shape (n,).
+        wanted: Class indices, shape (n,).
 
     Returns:
-        1 where fewer than 20 steps say anything.
+        1 with fewer than 20 steps.
     """
-    if len(wanted) < _FEWEST:
+    if len(wanted) < _MIN_CALIBRATION_STEPS:
         return 1.0
     losses = [float(functional.cross_entropy(logits / t, wanted)) for t in _TEMPERATURES]
     return float(_TEMPERATURES[int(torch.tensor(losses).argmin())])

@@ -1,4 +1,8 @@
-"""The network that drives: a few convolutions, a few layers for a state, and what comes out."""
+"""Networks of cloned policies: encoders for pictures and states, and a linear output layer.
+
+The names of the attributes (`eyes`, `nerves`, `hands`, ...) are those of the weights in the file of
+a policy, and must not change.
+"""
 
 from __future__ import annotations
 
@@ -24,23 +28,26 @@ __all__ = [
 ]
 
 DIRECTIONS: Final = 6
-"""Directions of edges that are told apart, over half a turn: 30 degrees each."""
+"""Number of edge directions over half a turn: 30 degrees each."""
 
-# Pixels of a cell, along each side.
-_CELL: Final = 4
+_CELL: Final = 4  # Side of a cell, pixels.
 # Added before the logarithm, as a share of full brightness: about a camera's noise in the dark.
 _DARK: Final = 8.0 / 255.0
-# Keeps an even picture from being blown up: the mean strength of an edge that is noise.
-_EVEN: Final = 1e-4
+# Mean strength of an edge that is only noise; keeps uniform pictures from being amplified.
+_MIN_EDGE: Final = 1e-4
+# About the noise of a camera, as a share of full brightness; keeps a uniform picture, such as that
+# of a covered lens, from being amplified into noise.
+_MIN_SPREAD: Final = 0.02
+_MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more information.
 
 
 class EdgeEyes(nn.Module):
-    """From a picture to features, by way of its edges.
+    """Encoder of a picture by its edges.
 
     Args:
         framing: Size of the pictures.
-        channels: Filters of each layer that follows the edges; each halves rows and columns.
-        features: How many features.
+        channels: Filters of each convolution after the edges; each one halves rows and columns.
+        features: Number of features.
     """
 
     def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
@@ -56,13 +63,17 @@ class EdgeEyes(nn.Module):
         self.boiled_down = nn.Linear(before * height * width, features)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Features, shape (n, features), of pictures in [0, 1], shape (n, 3, height, width)."""
+        """Return the features, shape (n, features).
+
+        Args:
+            pictures: In [0, 1], shape (n, 3, height, width).
+        """
         found = self.filters(edges(pictures, self._cells) - 1.0)
         return torch.relu(self.boiled_down(found.flatten(1)))
 
 
 def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
-    """How strong the edges of each direction are in each cell, 1 where they are as in the mean.
+    """Return the strength of the edges of each direction in each cell, relative to their mean.
 
     Args:
         pictures: In [0, 1], shape (n, 3, height, width).
@@ -75,34 +86,28 @@ def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
     across = functional.pad(light[..., 2:] - light[..., :-2], (1, 1, 0, 0))
     down = functional.pad(light[..., 2:, :] - light[..., :-2, :], (0, 0, 1, 1))
     strength = torch.hypot(across, down)
-    # A direction and its opposite are the same edge, seen from the other side.
+    # Opposite directions belong to the same edge.
     turn = torch.remainder(torch.atan2(down, across), math.pi) * (DIRECTIONS / math.pi)
     apart = (turn - torch.arange(DIRECTIONS, device=turn.device).view(1, -1, 1, 1)).abs()
     share = (1.0 - torch.minimum(apart, DIRECTIONS - apart)).clamp(min=0.0)
     pooled = functional.adaptive_avg_pool2d(strength * share, cells)
-    return torch.sqrt(pooled / (pooled.mean(dim=(1, 2, 3), keepdim=True) + _EVEN))
+    return torch.sqrt(pooled / (pooled.mean(dim=(1, 2, 3), keepdim=True) + _MIN_EDGE))
 
 
 ACTIONS: Final = 2
 """Steering and throttle."""
 
-# Keeps an even picture, such as a covered lens, from being blown up into its own noise: about the
-# noise of a camera, as a share of full brightness.
-_NETWORK_EVEN: Final = 0.02
-# A number of a state that lies farther out, in standard deviations, says no more than this.
-_FARTHEST: Final = 5.0
-
 
 class Eyes(nn.Module):
-    """From a picture to features.
+    """Encoder of a picture by its colours.
 
-    Each picture is first freed of its own mean and spread, so that neither the time of day nor the
-    exposure reaches the filters. Each layer halves rows and columns.
+    Each picture is normalised by its own mean and standard deviation, so that neither daylight nor
+    exposure matters. Each convolution halves rows and columns.
 
     Args:
         framing: Size of the pictures.
-        channels: Filters of each layer.
-        features: How many features.
+        channels: Filters of each convolution.
+        features: Number of features.
     """
 
     def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
@@ -111,7 +116,7 @@ class Eyes(nn.Module):
         height, width = framing.height, framing.width
         before = CHANNELS
         for i, after in enumerate(channels):
-            # The first filters are wider: they look for edges and not yet for shapes.
+            # The first filters are wider, to find edges.
             size = 3 if i else 5
             layers += [nn.Conv2d(before, after, size, stride=2, padding=size // 2), nn.ReLU()]
             height, width, before = (height + 1) // 2, (width + 1) // 2, after
@@ -119,25 +124,29 @@ class Eyes(nn.Module):
         self.boiled_down = nn.Linear(before * height * width, features)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Features, shape (n, features), of pictures in [0, 1], shape (n, 3, height, width)."""
-        # Colours are last in memory, so each picture is one row: several times faster than over
-        # three dimensions.
+        """Return the features, shape (n, features).
+
+        Args:
+            pictures: In [0, 1], shape (n, 3, height, width).
+        """
+        # Colours are last in memory, so that each picture is one row: several times faster than
+        # over three dimensions.
         rows = pictures.permute(0, 2, 3, 1).flatten(1)
         spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
-        found = self.filters((pictures - mean) / (spread + _NETWORK_EVEN))
+        found = self.filters((pictures - mean) / (spread + _MIN_SPREAD))
         return torch.relu(self.boiled_down(found.flatten(1)))
 
 
 class Nerves(nn.Module):
-    """From a state to features.
+    """Encoder of a state.
 
-    Each number is freed of the mean and spread that it had in the demonstrations. One that is
-    missing (NaN) counts as its mean, and a flag beside it says so; one that is far out counts as
-    five standard deviations.
+    Each value is normalised by the mean and standard deviation in the demonstrations. A missing
+    value (NaN) is replaced by the mean and flagged in a second input; outliers are clipped at five
+    standard deviations.
 
     Args:
-        size: Numbers of the state.
-        widths: Of the layers; the last one's are the features.
+        size: Number of values in a state.
+        widths: Widths of the layers; the last one is the number of features.
     """
 
     def __init__(self, size: int, widths: tuple[int, ...]) -> None:
@@ -152,25 +161,25 @@ class Nerves(nn.Module):
         self.layers = nn.Sequential(*layers)
 
     def forward(self, states: Tensor) -> Tensor:
-        """Features, shape (n, widths[-1]), of states, shape (n, size)."""
+        """Return the features, shape (n, widths[-1]), of states, shape (n, size)."""
         missing = states.isnan()
         known = (states - cast("Tensor", self.middle)) / cast("Tensor", self.spread)
-        known = torch.where(missing, 0.0, known.clamp(-_FARTHEST, _FARTHEST))
+        known = torch.where(missing, 0.0, known.clamp(-_MAX_DEVIATIONS, _MAX_DEVIATIONS))
         return self.layers(torch.cat((known, missing.float()), dim=1))
 
 
 class _Several(nn.ModuleList):
-    """Several of the same, side by side."""
+    """Modules side by side, with concatenated outputs."""
 
     def forward(self, x: Tensor) -> Tensor:
         return torch.cat([one(x) for one in self], dim=1)
 
 
 class CameraNetwork(nn.Module):
-    """From a picture, a state or both to what a policy decides by.
+    """Network of a policy: encoders and output layer.
 
     Args:
-        card: What the policy is like.
+        card: Architecture.
     """
 
     def __init__(self, card: CloneCard) -> None:
@@ -183,15 +192,15 @@ class CameraNetwork(nn.Module):
         self.nerves: nn.Module | None = _one_or_several(nerves)
         features = len(eyes) * card.features + (len(nerves) * card.nerves[-1] if nerves else 0)
         self.hands = nn.Linear(features, card.outputs)
-        # With colours last in memory the convolutions of a single picture are a third faster.
+        # With colours last in memory, convolutions of a single picture are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """Features of what is seen and felt, shape (n, features).
+        """Return the features of pictures and states, shape (n, features).
 
         Args:
-            pictures: In [0, 1], shape (n, 3, height, width); None without eyes.
-            states: Shape (n, state size); None without nerves.
+            pictures: In [0, 1], shape (n, 3, height, width); None for a policy without pictures.
+            states: Shape (n, state size); None for a policy without a state.
         """
         found: list[Tensor] = []
         if self.eyes is not None:
@@ -201,16 +210,21 @@ class CameraNetwork(nn.Module):
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
 
     def forward(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """What comes out, shape (n, outputs): before the tanh, or logits of the classes."""
+        """Return the outputs, shape (n, outputs): before the tanh, or logits of the classes.
+
+        Args:
+            pictures: As in `perceive`.
+            states: As in `perceive`.
+        """
         return self.hands(self.perceive(pictures, states))
 
 
 def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
-    """One network whose output is the mean of the outputs of several.
+    """Return one network whose output is the mean of the outputs of several networks.
 
     Args:
-        card: What the policy of all is like.
-        members: Networks of the same shape, each of a policy with one member.
+        card: Architecture of the joint network.
+        members: Networks of the same architecture, each with one member.
     """
     network = CameraNetwork(card)
     if len(members) == 1:

@@ -1,4 +1,4 @@
-"""Camera pictures as a policy sees them: cropped and small, the same in training and in driving."""
+"""Pictures as a policy sees them: cropped and reduced, the same in training and in driving."""
 
 from __future__ import annotations
 
@@ -14,29 +14,28 @@ __all__ = ["CHANNELS", "CloningError", "Framing", "PolicyError", "area_shares", 
 
 
 class CloningError(ShapechangerError, ValueError):
-    """Pictures, actions or settings that nothing can be learned from."""
+    """Invalid pictures, actions or settings."""
 
 
 class PolicyError(ShapechangerError, ValueError):
-    """A file that holds no policy, or a policy that does not fit the env it is to act in."""
+    """Invalid policy file, or a policy that does not fit an env."""
 
 
 CHANNELS: Final = 3
 """Red, green and blue."""
 
-# Pictures at a time, so that the sums in 16 bits need some megabytes and not gigabytes.
-_AT_A_TIME: Final = 256
-# Means in single precision may miss a half by a rounding: it still goes up.
+_CHUNK: Final = 256  # Pictures at a time, to bound the memory of the sums.
+# A mean in single precision may miss a half by a rounding error, and is still rounded up.
 _HALF: Final = 0.5 + 1e-4
 
 
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
-    """Which part of a picture a policy sees, and how finely.
+    """Crop and resolution of the pictures of a policy.
 
     Attributes:
-        height: Rows of what it sees.
-        width: Columns of what it sees.
-        top: Share of the picture's rows that is cut off at the top, in [0, 1).
+        height: Rows of the reduced picture.
+        width: Columns of the reduced picture.
+        top: Share of the rows that is cut off at the top, in [0, 1).
     """
 
     # A quarter of the pixels of a 160 x 120 picture, less the fifth in which a camera a few
@@ -46,69 +45,69 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
     top: float = 0.2
 
     def __post_init__(self) -> None:
-        """Refuse what is no framing.
+        """Validate the sizes.
 
         Raises:
             CloningError: If a size is not positive, or nothing is left below the cut.
         """
         if min(self.height, self.width) < 1 or not 0.0 <= self.top < 1.0:
             raise CloningError(
-                f"A policy cannot see {self.width} x {self.height} pixels below a cut of "
-                f"{self.top}: sizes are positive, and the cut is in [0, 1)."
+                f"Invalid framing of {self.width} x {self.height} pixels below a cut of "
+                f"{self.top}: sizes must be positive, and the cut in [0, 1)."
             )
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Rows, columns and colours of what the policy sees."""
+        """Rows, columns and colours of the reduced picture."""
         return self.height, self.width, CHANNELS
 
 
 def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Pictures as a policy sees them.
+    """Crop and reduce pictures.
 
-    Each pixel is the mean of the area that it covers, rounded half up: of a whole block of pixels
-    where the size divides, and with shares of the pixels at its edges elsewhere. Pictures that
-    already have the size of the framing come back as they are.
+    Each pixel is the mean of the area that it covers, rounded half up: of a block of pixels where
+    the size divides evenly, and weighted by the covered shares elsewhere. Pictures that already
+    have the target size are returned unchanged.
 
     Args:
         pictures: Red, green and blue, shape (n, H, W, 3).
-        framing: What the policy sees.
+        framing: Crop and resolution.
 
     Returns:
         Shape (n, height, width, 3).
 
     Raises:
-        CloningError: If they are no such pictures.
+        CloningError: If the pictures have another type or shape.
     """
     if pictures.ndim != 4 or pictures.shape[3] != CHANNELS or pictures.dtype != np.uint8:
         raise CloningError(
-            "Pictures are an array of uint8 with shape (n, height, width, 3), got "
+            "Pictures must be uint8 with shape (n, height, width, 3), got "
             f"{pictures.dtype} with shape {pictures.shape}."
         )
     if pictures.shape[1:] == framing.shape:
         return pictures
     if not pictures.shape[1] or not pictures.shape[2]:
-        raise CloningError(f"Pictures of shape {pictures.shape} hold no pixel.")
-    # One row is left of however low a picture.
+        raise CloningError(f"Pictures of shape {pictures.shape} have no pixels.")
+    # At least one row is left.
     first = min(round(pictures.shape[1] * framing.top), pictures.shape[1] - 1)
     rows, rest_of_rows = divmod(pictures.shape[1] - first, framing.height)
     columns, rest_of_columns = divmod(pictures.shape[2], framing.width)
     if rest_of_rows or rest_of_columns or not rows or not columns:
         return _by_area(pictures[:, first:], framing)
     small = np.empty((len(pictures), *framing.shape), np.uint8)
-    for start in range(0, len(pictures), _AT_A_TIME):
-        part = pictures[start : start + _AT_A_TIME, first:]
+    for start in range(0, len(pictures), _CHUNK):
+        part = pictures[start : start + _CHUNK, first:]
         # Adding strided views is several times faster than a mean over reshaped axes.
         total = np.full((len(part), *framing.shape), rows * columns // 2, np.uint32)
         for row in range(rows):
             for column in range(columns):
                 total += part[:, row::rows, column::columns]
-        small[start : start + _AT_A_TIME] = total // (rows * columns)
+        small[start : start + _CHUNK] = total // (rows * columns)
     return small
 
 
 def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Pictures whose size does not divide: rows first, then columns."""
+    """Reduce pictures whose size does not divide evenly: rows first, then columns."""
     n, height, width, _ = pictures.shape
     of_rows = area_shares(height, framing.height)
     of_columns = area_shares(width, framing.width)
@@ -121,7 +120,12 @@ def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]
 
 
 def area_shares(before: int, after: int) -> NDArray[np.float32]:
-    """What share of each new pixel each old one is, along one side, shape (after, before)."""
+    """Return the weight of each old pixel in each new one along one axis, shape (after, before).
+
+    Args:
+        before: Number of old pixels.
+        after: Number of new pixels.
+    """
     edges = np.linspace(0.0, before, after + 1)
     old = np.arange(before)
     overlap = np.minimum(edges[1:, None], old + 1) - np.maximum(edges[:-1, None], old)

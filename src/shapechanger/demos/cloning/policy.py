@@ -1,7 +1,8 @@
-"""A policy that drives by what it sees, feels or both, and the file that it is kept in.
+"""A policy that acts on a picture, a state or both, and the file that it is stored in.
 
-The file is a zip of two entries: a card in JSON, which says where the policy comes from, and the
-weights. Nothing in it is run: the weights are read as numbers only.
+The file is a zip with two entries: a card in JSON, which describes the policy, and the weights.
+Loading runs no code from the file, whatever its origin: it refuses weights whose pickle contains
+anything but tensors.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import copy
 import io
 import os
 import pickle
+import pickletools
 import zipfile
 from pathlib import Path
 from typing import Any, Final, cast
@@ -36,14 +38,21 @@ __all__ = ["WEIGHTS", "CameraPolicy", "CloneCard"]
 
 _CARD: Final = "card.json"
 WEIGHTS: Final = "weights.pt"
-"""The entry of a policy's file that no other policy's has."""
+"""Entry that identifies the file of a cloned policy."""
 
-# A network of the default settings is half a megabyte; more than this is something else.
-_LARGEST_ENTRY: Final = 64 * 2**20
-# So that the same policy is the same file. The earliest date that a zip can hold.
+_MAX_ENTRY_BYTES: Final = 64 * 2**20  # A network of the default settings has half a megabyte.
+# The earliest date that a zip can hold, so that equal policies give equal files.
 _NO_DATE: Final = (1980, 1, 1, 0, 0, 0)
-# What Torch and the zip reader say of files that are damaged, or made to do harm.
-_NOT_WHOLE: Final = (
+# All that a pickle of single-precision tensors refers to.
+_TENSOR_GLOBALS: Final = frozenset(
+    {"collections OrderedDict", "torch._utils _rebuild_tensor_v2", "torch FloatStorage"}
+)
+# Other opcodes that import or construct objects.
+_OBJECT_OPCODES: Final = frozenset(
+    {"STACK_GLOBAL", "INST", "OBJ", "NEWOBJ", "NEWOBJ_EX", "EXT1", "EXT2", "EXT4"}
+)
+# Raised by PyTorch, pickle and zipfile for damaged or malicious files.
+_DAMAGED: Final = (
     RuntimeError,
     LookupError,
     ValueError,
@@ -53,16 +62,15 @@ _NOT_WHOLE: Final = (
     EOFError,
     pickle.UnpicklingError,
 )
-# Pictures at a time where many are looked at.
-_AT_A_TIME: Final = 256
+_CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
 class CameraPolicy:
-    """What to do on seeing a picture, on feeling a state, or both.
+    """A policy for pictures, states or both.
 
     Attributes:
-        network: What computes it.
-        card: Where it comes from.
+        network: The network.
+        card: Architecture and origin.
     """
 
     def __init__(self, network: CameraNetwork, card: CloneCard) -> None:
@@ -71,7 +79,12 @@ class CameraPolicy:
 
     @classmethod
     def fresh(cls, settings: CloneSettings, seed: int) -> CameraPolicy:
-        """A policy for steering and throttle from a picture that has learned nothing."""
+        """Return an untrained policy for steering and throttle from a picture.
+
+        Args:
+            settings: Architecture of the network.
+            seed: Seed of the weights.
+        """
         return cls.blank(
             CloneCard(
                 framing=settings.framing,
@@ -85,32 +98,37 @@ class CameraPolicy:
 
     @classmethod
     def blank(cls, card: CloneCard, seed: int) -> CameraPolicy:
-        """The policy that a card describes, before it has learned anything."""
+        """Return an untrained policy as a card describes it.
+
+        Args:
+            card: Architecture of the network.
+            seed: Seed of the weights.
+        """
         with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
             torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
             return cls(CameraNetwork(card), card)
 
     @property
     def n_features(self) -> int:
-        """How many features it decides by."""
+        """Number of features in front of the last layer."""
         return self.network.hands.in_features
 
     def predict(
         self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """What to do on seeing a picture and feeling a state.
+        """Return the action for a picture and a state.
 
         Args:
-            picture: Red, green and blue, shape (H, W, 3), as recorded or prepared; None for a
-                policy without eyes.
-            state: Shape (k,), NaN for what is not known; None for a policy without a state.
+            picture: Red, green and blue, shape (H, W, 3), raw or prepared; None for a policy
+                without pictures.
+            state: Shape (k,), NaN for unknown values; None for a policy without a state.
 
         Returns:
-            An action in the order of its layout. For a vehicle: steering (-1 is left) and throttle
-            (1 is forward), each in [-1, 1], shape (2,).
+            Action in the order of its layout. For a vehicle: steering (-1 is left) and throttle (1
+            is forward), each in [-1, 1], shape (2,).
 
         Raises:
-            CloningError: If it is nothing that the policy can see or feel.
+            CloningError: If an input is missing or has another shape.
         """
         return self.predict_many(
             None if picture is None else picture[np.newaxis],
@@ -120,18 +138,18 @@ class CameraPolicy:
     def predict_many(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """What to do each time.
+        """Return an action for each picture and state.
 
         Args:
-            pictures: Red, green and blue, shape (n, H, W, 3), as recorded or prepared; None for a
-                policy without eyes.
-            states: Shape (n, k); None for a policy without a state.
+            pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared; None for a policy
+                without pictures.
+            states: Shape (n, k), NaN for unknown values; None for a policy without a state.
 
         Returns:
             Actions, shape (n, m).
 
         Raises:
-            CloningError: If it is nothing that the policy can see or feel.
+            CloningError: If an input is missing or has another shape.
         """
         out = self.outputs(pictures, states)
         if self.card.classes:
@@ -144,14 +162,14 @@ class CameraPolicy:
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """What the network says: probabilities of the classes, or actions scaled to [-1, 1].
+        """Return the outputs of the network: class probabilities, or actions scaled to [-1, 1].
 
         Args:
             pictures: As in `predict_many`.
             states: As in `predict_many`.
 
         Returns:
-            Shape (n, classes), each row of sum 1; or shape (n, m).
+            Shape (n, classes), each row with sum 1; or shape (n, m).
         """
         with torch.inference_mode():
             out = self.network.hands(self._perceived(pictures, states))
@@ -160,7 +178,7 @@ class CameraPolicy:
     def features(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """What it makes of what it sees and feels, before it decides.
+        """Return the features in front of the last layer.
 
         Args:
             pictures: As in `predict_many`.
@@ -170,7 +188,7 @@ class CameraPolicy:
             Features, each at least 0, shape (n, n_features).
 
         Raises:
-            CloningError: If it is nothing that the policy can see or feel.
+            CloningError: If an input is missing or has another shape.
         """
         with torch.inference_mode():
             return self._perceived(pictures, states).numpy()
@@ -182,8 +200,8 @@ class CameraPolicy:
         felt = self._felt(states)
         n = len(small) if small is not None else len(felt) if felt is not None else 0
         found = torch.empty(n, self.n_features)
-        for start in range(0, n, _AT_A_TIME):
-            some = slice(start, start + _AT_A_TIME)
+        for start in range(0, n, _CHUNK):
+            some = slice(start, start + _CHUNK)
             part = None if small is None else torch.as_tensor(small[some].copy())
             found[some] = self.network.perceive(
                 None if part is None else plain(part, torch.arange(len(part))),
@@ -195,7 +213,7 @@ class CameraPolicy:
         if self.card.eyes == "none":
             return None
         if pictures is None:
-            raise CloningError("This policy drives by pictures, and there is none.")
+            raise CloningError("This policy needs a picture, but there is none.")
         return prepare(pictures, self.card.framing)
 
     def _felt(self, states: NDArray[np.floating] | None) -> Tensor | None:
@@ -204,8 +222,8 @@ class CameraPolicy:
             return None
         if states is None or states.ndim != 2 or states.shape[1] != layout.size:
             raise CloningError(
-                f"This policy feels {', '.join(layout.names)}: states of shape (n, {layout.size}), "
-                f"got {'none' if states is None else states.shape}."
+                f"This policy needs the state {', '.join(layout.names)} with shape "
+                f"(n, {layout.size}), got {'none' if states is None else states.shape}."
             )
         felt = np.array(states, np.float32)
         for name in self.card.unseen:
@@ -213,11 +231,11 @@ class CameraPolicy:
         return torch.as_tensor(felt)
 
     def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
-        """The same policy with more on its card.
+        """Return the same policy with more information on its card.
 
         Args:
-            command: The command that made it; none leaves the one that is there.
-            **data: What it was learned from; values that JSON can hold.
+            command: Command that trained it; "" keeps the present one.
+            **data: Origin of the demonstrations; values that JSON can hold.
         """
         card = msgspec.structs.replace(
             self.card, command=command or self.card.command, data={**self.card.data, **data}
@@ -225,14 +243,14 @@ class CameraPolicy:
         return CameraPolicy(self.network, card)
 
     def copy(self) -> CameraPolicy:
-        """A policy that shares no weights with this one."""
+        """Return a policy that shares no weights with this one."""
         return CameraPolicy(copy.deepcopy(self.network), self.card)
 
     def save(self, path: Path) -> None:
-        """Write the policy to one file, which appears whole or not at all.
+        """Write the policy to a file, atomically.
 
         Raises:
-            OutputError: If it cannot be written.
+            OutputError: If the file cannot be written.
         """
         weights = io.BytesIO()
         torch.save(self.network.state_dict(), weights)
@@ -245,10 +263,10 @@ class CameraPolicy:
 
     @classmethod
     def load(cls, path: Path) -> CameraPolicy:
-        """Read what `save` wrote.
+        """Read a policy; no code in the file is run.
 
         Raises:
-            PolicyError: If the file is missing, damaged or something else.
+            PolicyError: If the file is missing or damaged, or contains anything but a policy.
         """
         try:
             with zipfile.ZipFile(path) as archive:
@@ -259,50 +277,64 @@ class CameraPolicy:
         except FileNotFoundError as error:
             raise PolicyError(f"There is no policy file {path}.") from error
         except (OSError, zipfile.BadZipFile, msgspec.MsgspecError, CloningError) as error:
-            raise PolicyError(f"{path} is not a policy that drives by pictures: {error}") from error
-        except _NOT_WHOLE as error:
-            # Torch's own messages fill a page; the first line says it.
+            raise PolicyError(f"{path} is not a cloned policy: {error}") from error
+        except _DAMAGED as error:
+            # Messages of PyTorch fill a page; the first line is enough.
             reason = str(error).strip().partition("\n")[0]
-            raise PolicyError(f"{path} is no whole policy: {reason}") from error
+            raise PolicyError(f"{path} is not an intact policy: {reason}") from error
 
 
 def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
-    """One entry of the file; what no policy could fill is not even unpacked."""
-    if archive.getinfo(name).file_size > _LARGEST_ENTRY:
-        raise ValueError(f"its {name} is larger than any policy's.")
+    """Read an entry of the file, unless it is larger than any policy."""
+    if archive.getinfo(name).file_size > _MAX_ENTRY_BYTES:
+        raise ValueError(f"its {name} is larger than {_MAX_ENTRY_BYTES} bytes.")
     return archive.read(name)
 
 
 def _require_format(card: CloneCard) -> None:
     if card.format not in FORMATS:
         raise ValueError(
-            f"it has format {card.format} of Shapechanger {card.version}; this one reads "
+            f"it has format {card.format} of Shapechanger {card.version}; this version reads "
             f"{' and '.join(map(str, FORMATS))}."
         )
 
 
+def _require_tensors(archive: zipfile.ZipFile) -> None:
+    """Refuse weights whose pickle contains anything but tensors, without unpickling it."""
+    for name in archive.namelist():
+        if not name.endswith(".pkl"):
+            continue
+        for opcode, argument, _ in pickletools.genops(_entry(archive, name)):
+            foreign = opcode.name == "GLOBAL" and argument not in _TENSOR_GLOBALS
+            if foreign or opcode.name in _OBJECT_OPCODES:
+                what = str(argument).replace(" ", ".") if foreign else opcode.name
+                raise ValueError(f"its weights contain {what}, but only tensors are allowed.")
+
+
 def _network(card: CloneCard, weights: bytes) -> CameraNetwork:
-    """The network that a card describes, with these weights."""
-    if not zipfile.is_zipfile(io.BytesIO(weights)):  # Torch would try older formats, and warn.
-        raise ValueError("its weights are cut off or something else.")
+    """Build the network that a card describes, with these weights."""
+    if not zipfile.is_zipfile(io.BytesIO(weights)):  # PyTorch would try older formats.
+        raise ValueError("its weights are truncated, or have another format.")
+    with zipfile.ZipFile(io.BytesIO(weights)) as archive:
+        _require_tensors(archive)
     loaded = torch.load(  # pyright: ignore[reportUnknownMemberType]
         io.BytesIO(weights), map_location="cpu", weights_only=True
     )
     if not isinstance(loaded, dict):
-        raise ValueError("its weights have no names.")
+        raise ValueError("its weights are not a dictionary.")
     state = cast("dict[str, Tensor]", loaded)
-    # On the meta device a card that lies about its sizes takes no memory before it is found out.
+    # On the meta device a forged card cannot allocate memory before the sizes are compared.
     with torch.device("meta"):
         network = CameraNetwork(card)
     network.load_state_dict(state, assign=True)
     for name, value in state.items():
         if value.dtype != torch.float32 or not bool(torch.isfinite(value).all()):
-            raise ValueError(f"its weights {name} are not all finite numbers in single precision.")
+            raise ValueError(f"its weights {name} must be finite and in single precision.")
     return network
 
 
 def _write_whole(path: Path, content: bytes) -> None:
-    """Write a file that appears whole, or leaves what was there."""
+    """Write a file atomically."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,7 @@
-"""Demonstrations in the replay of a learner that goes on by reward.
+"""Demonstrations in the replay buffer of a reinforcement learner.
 
-Half of each batch is drawn from them (P. Ball and others, Efficient online reinforcement learning
-with offline data, ICML 2023), so that what was shown is not forgotten.
+Half of each batch is demonstrations, so that they are not forgotten: P. Ball et al., "Efficient
+Online Reinforcement Learning with Offline Data", ICML 2023.
 """
 
 from __future__ import annotations
@@ -29,16 +29,21 @@ __all__ = ["MixedReplay", "keep_demonstrations"]
 
 
 class MixedReplay(ReplayBuffer):
-    """A replay whose batches are half of demonstrations.
+    """Replay buffer whose batches consist of demonstrations by half.
 
     Attributes:
-        demonstrations: Where that half comes from; None for none.
+        demonstrations: Buffer with the demonstrations; None for none.
     """
 
     demonstrations: ReplayBuffer | None = None
 
     def sample(self, batch_size: int, env: VecNormalize | None = None) -> ReplayBufferSamples:
-        """A batch, the demonstrated transitions last."""
+        """Return a batch, with the demonstrated transitions last.
+
+        Args:
+            batch_size: Number of transitions.
+            env: As in `ReplayBuffer.sample`.
+        """
         if self.demonstrations is None:
             return super().sample(batch_size, env)
         half = batch_size // 2
@@ -59,33 +64,36 @@ def keep_demonstrations(
     episodes: Sequence[int],
     ends: NDArray[np.bool_] | None = None,
 ) -> None:
-    """Let half of each batch that a learner draws be of demonstrations.
+    """Fill half of each batch of a learner with demonstrations.
 
     Args:
-        model: The learner, before it has collected anything: its replay is replaced.
-        observations: What was perceived, as its env shows it: pictures of shape (n, H, W, 3), or
-            states of shape (n, k).
-        actions: What was done, shape (n, m).
-        rewards: What each step was worth, shape (n,).
-        episodes: How many steps each episode has, in order.
-        ends: Which steps were the end, such as a collision, and not only the last that was
-            recorded, shape (n,); None for none. The step before the end of a recording leads to
-            its last; the last leads nowhere, and counts only where it was the end.
+        model: The learner, before it has collected data: its replay buffer is replaced.
+        observations: As the env returns them: pictures, shape (n, H, W, 3), or states, shape (n,
+            k).
+        actions: Shape (n, m).
+        rewards: Shape (n,).
+        episodes: Number of steps of each episode, in order.
+        ends: Mask of the steps that terminated, for example by a collision, shape (n,); None for
+            none. The last step of a recording has no next observation, and is used only if it
+            terminated.
 
     Raises:
-        CloningError: If it does not fit together, or the learner perceives several things at once.
+        CloningError: If the arrays do not match, or the observations of the learner are a
+            dictionary.
     """
     learner = cast("Any", model)
     if isinstance(learner.replay_buffer, DictReplayBuffer):
         raise CloningError(
-            "Demonstrations are kept for a learner that sees or feels, and not both."
+            "Demonstrations can be kept for a learner with pictures or a state, but not both."
         )
     lengths = {len(observations), len(actions), len(rewards), sum(episodes)}
     if len(lengths) > 1 or not np.isfinite(rewards).all():
-        raise CloningError("Each demonstrated step needs an observation, an action and a reward.")
+        raise CloningError(
+            "Each demonstrated step needs an observation, an action and a finite reward."
+        )
     space = learner.observation_space
     if cast("Any", preprocessing).is_image_space(space) and observations.shape[1:] != space.shape:
-        observations = observations.transpose(0, 3, 1, 2)  # As SB3 turns what it sees.
+        observations = observations.transpose(0, 3, 1, 2)  # SB3 puts the channels first.
     over = np.zeros(len(actions), np.bool_) if ends is None else ends
     shown = ReplayBuffer(len(actions), space, learner.action_space, device=model.device)
     scaled = learner.policy.scale_action(actions)

@@ -1,8 +1,7 @@
-"""A cloned policy as the beginning of reinforcement learning with Stable-Baselines3.
+"""Cloned policies as starting points for reinforcement learning with Stable-Baselines3.
 
-The eyes of the clone stay as they are and the learner sees their features: so it learns on a
-hundred numbers in place of a picture, which is many times faster, and its critics do not spoil what
-cloning has taught the eyes.
+The encoders of the clone are frozen, and the learner works on their features: this is many times
+faster than on pictures, and untrained critics cannot destroy what cloning has learned.
 """
 
 from __future__ import annotations
@@ -24,6 +23,13 @@ from shapechanger.demos.cloning.pictures import PolicyError, area_shares
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import MissingExtra
 
+try:
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+except ImportError as error:
+    raise MissingExtra("stable-baselines3", "learn") from error
+
 __all__ = [
     "IMAGE",
     "LOG_STD",
@@ -39,27 +45,29 @@ __all__ = [
     "to_sb3",
 ]
 
-try:
-    from stable_baselines3 import SAC
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
+IMAGE: Final = "image"
+STATE: Final = "state"
 
-
-# Logarithm of the first standard deviation of an action before it is squashed: a clone is sure of
-# what it does, and would otherwise begin by driving at random.
+# Logarithm of the initial standard deviation of an action before it is squashed. A larger one would
+# drown the actions of the clone in noise.
 LOG_STD: Final = -2.0
+
+_BRIGHTEST: Final = 255.0
+_HALF: Final = 0.5 + 1e-4  # As in `pictures`.
+# Raw pictures are large: SAC's default of a million would take 50 GB and more.
+_BUFFER: Final = 10_000
 
 
 class SeenByPolicy(gym.ObservationWrapper[NDArray[np.float32], Any, NDArray[np.uint8]]):
-    """An env that shows, in place of its pictures, what the eyes of a policy make of them.
+    """Env wrapper that replaces pictures by the features of a policy.
 
     Args:
         env: Its observations are pictures of shape (H, W, 3).
-        policy: Whose eyes.
+        policy: The policy.
 
     Raises:
-        PolicyError: If its observations are something else.
-        CloningError: If their size does not fit the policy.
+        PolicyError: If the observations are of another kind.
+        CloningError: If the pictures have an invalid size.
     """
 
     def __init__(self, env: gym.Env[NDArray[np.uint8], Any], policy: CameraPolicy) -> None:
@@ -67,26 +75,26 @@ class SeenByPolicy(gym.ObservationWrapper[NDArray[np.float32], Any, NDArray[np.u
         shape = space.shape or ()
         dtype = cast("Any", space).dtype
         if not isinstance(space, spaces.Box) or dtype != np.uint8 or len(shape) != 3:
-            raise PolicyError(f"A policy that drives by pictures cannot see {space}.")
+            raise PolicyError(f"The policy needs pictures, but the observations are {space}.")
         super().__init__(env)
         self._policy = policy
         self.observation_space = spaces.Box(0.0, np.inf, (policy.n_features,), np.float32)
         self.observation(np.zeros(shape, np.uint8))
 
     def observation(self, observation: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """The features of a picture, shape (features,)."""
+        """Return the features of a picture, shape (features,)."""
         return self._policy.features(observation[np.newaxis])[0]
 
 
 class NormedReLU(nn.Module):
-    """A ReLU of numbers that are freed of their mean and spread first.
+    """Layer normalisation followed by a ReLU.
 
-    Critics with it do not think ever better of actions that nobody has tried: P. Ball and others,
-    Efficient online reinforcement learning with offline data, ICML 2023.
+    It keeps critics from overestimating actions without data: P. Ball et al., "Efficient Online
+    Reinforcement Learning with Offline Data", ICML 2023.
     """
 
     def forward(self, x: Tensor) -> Tensor:
-        """Shape (n, k) in and out."""
+        """Apply the layer; shape (n, k) in and out."""
         return functional.relu(functional.layer_norm(x, x.shape[-1:]))
 
 
@@ -98,32 +106,31 @@ def to_sb3(
     learner: type[SAC] = SAC,
     **settings: Any,
 ) -> SAC:
-    """A learner that begins by driving as the policy does.
+    """Return a SAC learner on features, whose deterministic action is that of the policy.
 
-    Its deterministic action is the policy's. Its critics do not know yet what is good: let them
-    learn first, or the actor follows them astray. SAC's first `learning_starts` actions are random,
-    unless that is 0.
+    Its critics are untrained: train them first, or they lead the actor astray. The first
+    `learning_starts` actions of SAC are random, unless that is 0.
 
     Args:
-        policy: What to begin with; it stays as it is, and so do its eyes.
-        env: Pictures in; steering and throttle, both in [-1, 1], out. It is wrapped, so that the
-            learner sees features.
+        policy: The policy to start from; it is not changed.
+        env: Env with pictures, and steering and throttle in [-1, 1] as actions. It is wrapped, so
+            that the learner observes features.
         seed: Seed of the learner.
-        learner: Its class.
-        **settings: Of `stable_baselines3.SAC`, except for the shape of the actor.
+        learner: Class of the learner.
+        **settings: Arguments of `stable_baselines3.SAC`, except the shape of the actor.
 
     Raises:
-        PolicyError: If the policy cannot act in this env.
-        CloningError: If the size of its pictures does not fit.
+        PolicyError: If the policy does not fit the env.
+        CloningError: If the pictures have an invalid size.
     """
     actions = cast("Any", env).action_space
     if not isinstance(actions, spaces.Box) or actions.shape != (ACTIONS,):
-        raise PolicyError(f"A policy that steers and drives cannot act in {actions}.")
+        raise PolicyError(f"The actions of the policy have 2 values, but the env takes {actions}.")
     low, high = _bounds(actions)
     if not ((low == -1.0).all() and (high == 1.0).all()):
-        raise PolicyError(f"Steering and throttle lie in [-1, 1], but this env takes {actions}.")
+        raise PolicyError(f"Steering and throttle are in [-1, 1], but the env takes {actions}.")
     kwargs = {
-        # No layer lies between features and actions, as in the policy.
+        # No layer between features and actions, as in the policy.
         "net_arch": {"pi": [], "qf": [256, 256]},
         "activation_fn": NormedReLU,
         **settings.pop("policy_kwargs", {}),
@@ -140,11 +147,11 @@ def to_sb3(
 
 
 def from_sb3(model: SAC, policy: CameraPolicy) -> CameraPolicy:
-    """What a learner of `to_sb3` drives like now, without its noise.
+    """Return the deterministic policy of a learner made by `to_sb3`.
 
     Args:
         model: The learner.
-        policy: What it began with, which stays as it is.
+        policy: The policy it started from; it is not changed.
     """
     learned = policy.copy()
     learned.network.hands.load_state_dict(cast("nn.Linear", model.actor.mu).state_dict())
@@ -155,30 +162,12 @@ def _bounds(space: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     return space.low, space.high
 
 
-try:
-    from stable_baselines3 import PPO, SAC
-    from stable_baselines3.common.policies import ActorCriticPolicy
-    from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
-
-
-IMAGE: Final = "image"
-STATE: Final = "state"
-
-_BRIGHTEST: Final = 255.0
-# As in `pictures`: a half goes up, also after a rounding.
-_HALF: Final = 0.5 + 1e-4
-# Raw pictures are large: a replay of a million, which is SAC's default, would take 50 GB and more.
-_BUFFER: Final = 10_000
-
-
 class ClonedPerception(BaseFeaturesExtractor):
-    """The eyes and nerves of a clone, from raw observations to features; nothing in it learns.
+    """Frozen encoders of a clone, from raw observations to features.
 
     Args:
-        observation_space: Pictures, states, or a dict of both under "image" and "state".
-        card: The clone's card as JSON.
+        observation_space: Pictures, states, or a Dict of both under "image" and "state".
+        card: Card of the clone, as JSON.
     """
 
     def __init__(self, observation_space: Any, card: str) -> None:
@@ -192,7 +181,7 @@ class ClonedPerception(BaseFeaturesExtractor):
         if known.eyes != "none":
             space = observation_space
             image = space[IMAGE] if isinstance(space, spaces.Dict) else space
-            _, height, width = cast("tuple[int, int, int]", image.shape)  # SB3 has turned it.
+            _, height, width = cast("tuple[int, int, int]", image.shape)  # Channels first in SB3.
             self._first = min(round(height * known.framing.top), height - 1)
             rows = area_shares(height - self._first, known.framing.height)
             self.register_buffer("rows", torch.as_tensor(rows), persistent=False)
@@ -202,7 +191,7 @@ class ClonedPerception(BaseFeaturesExtractor):
         self.requires_grad_(False)
 
     def forward(self, observations: Tensor | dict[str, Tensor]) -> Tensor:
-        """Features, shape (n, features)."""
+        """Return the features, shape (n, features)."""
         if isinstance(observations, dict):
             pictures, states = observations[IMAGE], observations[STATE]
         else:
@@ -215,14 +204,14 @@ class ClonedPerception(BaseFeaturesExtractor):
         return self.network.perceive(None if pictures is None else self._small(pictures), states)
 
     def _small(self, pictures: Tensor) -> Tensor:
-        """What the clone sees of raw pictures, as `pictures.prepare` makes it."""
+        """Reduce raw pictures in the same way as `pictures.prepare`."""
         rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
         seen = rows @ pictures[:, :, self._first :] @ columns.T
         return torch.floor(seen + _HALF) / _BRIGHTEST
 
 
 class _Between(nn.Module):
-    """From [-1, 1] to the range of the actions."""
+    """Map from (-inf, inf) to the range of the actions."""
 
     def __init__(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> None:
         super().__init__()
@@ -234,7 +223,7 @@ class _Between(nn.Module):
 
 
 class ClonedPolicy(ActorCriticPolicy):
-    """PPO's actor and critic, whose mean action is squashed as a clone's is."""
+    """Actor and critic of PPO, with a squashed mean action as in a clone."""
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
@@ -246,11 +235,11 @@ class ClonedPolicy(ActorCriticPolicy):
 
 
 class ChosenActions(gym.ActionWrapper[Any, Any, Any]):
-    """An env in which the classes of a policy are chosen by their numbers.
+    """Env wrapper whose actions are the class indices of a policy.
 
     Args:
-        env: Takes the actions that the classes stand for.
-        policy: Whose classes.
+        env: Env that takes the actions of the classes.
+        policy: The policy.
     """
 
     def __init__(self, env: gym.Env[Any, Any], policy: CameraPolicy) -> None:
@@ -259,32 +248,32 @@ class ChosenActions(gym.ActionWrapper[Any, Any, Any]):
         self.action_space = spaces.Discrete(len(self._classes))
 
     def action(self, action: Any) -> NDArray[np.float32]:
-        """The action of a class."""
+        """Return the action of a class."""
         return self._classes[int(action)].copy()
 
 
 def as_sac(
     policy: CameraPolicy, size: tuple[int, int] | None, *, seed: int = 0, **settings: Any
 ) -> SAC:
-    """The policy as SAC, which does the same without its noise; `save` writes it to a file.
+    """Return the policy as a SAC model on raw observations; its `save` writes a file.
 
-    Its critics do not know yet what is good: let them learn from demonstrations first
-    (`replay.MixedReplay`), or its first steps lead it astray. Its first actions are its own
-    (`learning_starts` is 0), and its replay holds 10,000 raw observations.
+    Its deterministic action is that of the policy. Its critics are untrained: train them on
+    demonstrations first (`replay.keep_demonstrations`), or they lead the actor astray.
+    `learning_starts` is 0, and the replay buffer holds 10,000 raw observations.
 
     Args:
-        policy: What it begins with.
-        size: Rows and columns of the raw pictures; None for a policy without eyes.
+        policy: The policy.
+        size: Rows and columns of the raw pictures; None for a policy without pictures.
         seed: Seed of the learner.
-        **settings: Of `stable_baselines3.SAC`, but for the shape of the actor.
+        **settings: Arguments of `stable_baselines3.SAC`, except the shape of the actor.
 
     Raises:
-        PolicyError: If the policy chooses among classes, which SAC cannot.
+        PolicyError: If the policy has classes, which SAC does not support.
     """
     if policy.card.classes:
         raise PolicyError(
-            "This policy chooses among classes, and SAC learns numbers: write it for PPO, or train "
-            "it with the head regression."
+            "This policy has classes, which SAC does not support: use PPO, or train it with the "
+            "head regression."
         )
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
     kwargs = _perception(policy) | {
@@ -301,23 +290,23 @@ def as_sac(
         actor.log_std.weight.zero_()
         actor.log_std.bias.fill_(LOG_STD)
     for owner in (actor, model.critic, model.critic_target):
-        _teach(cast("Any", owner).features_extractor, policy)
+        _copy_encoders(cast("Any", owner).features_extractor, policy)
     return model
 
 
 def as_ppo(
     policy: CameraPolicy, size: tuple[int, int] | None, *, seed: int = 0, **settings: Any
 ) -> PPO:
-    """The policy as PPO, which does the same without its noise; `save` writes it to a file.
+    """Return the policy as a PPO model on raw observations; its `save` writes a file.
 
-    A policy that chooses among classes chooses their numbers: `ChosenActions` makes an env take
-    these.
+    Its deterministic action is that of the policy. The actions of a policy with classes are class
+    indices; wrap the env in `ChosenActions`.
 
     Args:
-        policy: What it begins with.
-        size: Rows and columns of the raw pictures; None for a policy without eyes.
+        policy: The policy.
+        size: Rows and columns of the raw pictures; None for a policy without pictures.
         seed: Seed of the learner.
-        **settings: Of `stable_baselines3.PPO`, but for the shape of the actor.
+        **settings: Arguments of `stable_baselines3.PPO`, except the shape of the actor.
     """
     settings = {"device": "cpu", **settings}
     kwargs = _perception(policy) | {"net_arch": {"pi": [], "vf": [64, 64]}, "ortho_init": False}
@@ -327,19 +316,19 @@ def as_ppo(
     acting = cast("Any", model.policy)
     net = acting.action_net if policy.card.classes else acting.action_net[0]
     net.load_state_dict(policy.network.hands.state_dict())
-    _teach(acting.features_extractor, policy)
+    _copy_encoders(acting.features_extractor, policy)
     return model
 
 
 class _Spaces(gym.Env[Any, Any]):
-    """What a policy takes and gives, without a world: it cannot be stepped."""
+    """Spaces of a policy as an env that cannot be stepped."""
 
     def __init__(self, policy: CameraPolicy, size: tuple[int, int] | None) -> None:
         card = policy.card
         parts: dict[str, gym.Space[Any]] = {}
         if card.eyes != "none":
             if size is None:
-                raise PolicyError("A policy that sees needs the size of the pictures.")
+                raise PolicyError("The size of the pictures is needed for this policy.")
             parts[IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
         if card.nerves:
             parts[STATE] = spaces.Box(-np.inf, np.inf, (card.state_size,), np.float32)
@@ -367,7 +356,7 @@ def _has_both(policy: CameraPolicy) -> bool:
     return policy.card.eyes != "none" and bool(policy.card.nerves)
 
 
-def _teach(perception: ClonedPerception, policy: CameraPolicy) -> None:
+def _copy_encoders(perception: ClonedPerception, policy: CameraPolicy) -> None:
     state = policy.network.state_dict()
     known = {name: value for name, value in state.items() if not name.startswith("hands.")}
     perception.network.load_state_dict(known)

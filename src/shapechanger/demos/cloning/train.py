@@ -1,4 +1,4 @@
-"""Learning to drive as somebody else drove."""
+"""Training of networks, and cloning of steering and throttle from pictures."""
 
 from __future__ import annotations
 
@@ -11,18 +11,12 @@ from typing import Final, Protocol, TypeVar
 
 import msgspec
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from shapechanger.demos.cloning.batches import Batch, Batches
 from shapechanger.demos.cloning.demonstrations import Examples, held_out, steering_examples
-from shapechanger.demos.cloning.network import CameraNetwork
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra
-
-__all__ = ["HUBER_BETA", "History", "Judged", "ValidationScore", "clone", "fit"]
 
 try:
     import torch
@@ -34,21 +28,25 @@ try:
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
+__all__ = ["HUBER_BETA", "History", "Judged", "ValidationScore", "clone", "fit"]
 
-# Where the loss turns from a square into a straight line: an error of a tenth of the steering's
-# range is a mistake, and one mistake of the driver should not count as much as ten small ones.
+# Error at which the loss changes from quadratic to linear. An error of a tenth of the steering's
+# range is a mistake, and one mistake of the driver should not outweigh ten small errors.
 HUBER_BETA: Final = 0.1
-_MOST_CERTAIN: Final = 0.95
+_MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
+_MAX_GRADIENT: Final = 1.0
+# The average of early steps forgets faster: step / (step + 10).
+_AVERAGE_FROM: Final = 10.0
 
 
 class ValidationScore(msgspec.Struct, frozen=True):
-    """How good the policy was at some step.
+    """Result of a validation.
 
     Attributes:
-        step: Steps of training before it.
-        loss: Mean loss of the batches since the check before.
+        step: Number of training steps so far.
+        loss: Mean loss of the batches since the last validation.
         steering: Mean absolute error of the steering on the held-out pictures; NaN without any.
-        throttle: The same of the throttle.
+        throttle: Mean absolute error of the throttle; NaN without held-out pictures.
     """
 
     step: int
@@ -58,23 +56,23 @@ class ValidationScore(msgspec.Struct, frozen=True):
 
     @property
     def error(self) -> float:
-        """Both errors together; the smaller the better."""
+        """Sum of both errors; smaller is better."""
         return self.steering + self.throttle
 
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """How a training went.
+    """Course of a training.
 
     Attributes:
-        checks: In order; the first is from before training.
-        best: The check of the policy that was kept.
-        steps: Steps that were taken.
-        learned: Pictures that were learned from.
-        held_out: Pictures that chose when to stop.
-        guess: Mean absolute errors, on the held-out pictures, of steering and throttle when always
-            the median of the learned actions is guessed; NaN without any.
-        seconds: How long it took.
+        checks: Validations in order; the first one is from before training.
+        best: Validation of the policy that was kept.
+        steps: Number of training steps.
+        learned: Number of pictures learned from.
+        held_out: Number of pictures used for early stopping.
+        guess: Mean absolute errors of steering and throttle on the held-out pictures for a constant
+            action, the median of the training actions; NaN without held-out pictures.
+        seconds: Duration, s.
     """
 
     checks: tuple[ValidationScore, ...]
@@ -97,28 +95,28 @@ def clone(
     rehearsal: tuple[NDArray[np.uint8], NDArray[np.floating]] | None = None,
     on_check: Callable[[ValidationScore], None] = lambda check: None,
 ) -> tuple[CameraPolicy, History]:
-    """Learn to do on seeing a picture what a driver did.
+    """Learn the steering and throttle of a driver from pictures.
 
-    The same arguments give the same policy on the same machine with as many threads.
+    Equal arguments give an equal policy on the same machine with the same number of threads.
 
     Args:
-        pictures: What the camera saw, shape (n, H, W, 3), as recorded or prepared.
-        actions: What the driver did, shape (n, 2): steering and throttle in [-1, 1].
-        settings: How to learn; None for the defaults.
-        seed: Seed of everything random in it.
-        episodes: How many pictures each episode has, in order; none for a single episode. The end
-            of each chooses when to stop.
-        start: A policy to go on from, which stays as it is; None to begin with nothing.
-        rehearsal: Pictures and actions that `start` was learned from, which are mixed in so that
-            it does not forget them.
-        on_check: Called with each check as soon as it is there.
+        pictures: Shape (n, H, W, 3), raw or prepared.
+        actions: Steering and throttle in [-1, 1], shape (n, 2).
+        settings: Hyperparameters; None for the defaults.
+        seed: Seed of all randomness.
+        episodes: Number of pictures of each episode, in order; () for a single episode. The end of
+            each one is used for early stopping.
+        start: Policy to train further, which is not changed; None to start from scratch.
+        rehearsal: Pictures and actions that `start` was trained on, mixed in so that they are not
+            forgotten.
+        on_check: Called after each validation.
 
     Returns:
-        The policy that did best on the held-out pictures, or the last one without such pictures,
-        and how the training went.
+        The policy that was best on the held-out pictures, or the last one without them, and the
+        course of the training.
 
     Raises:
-        CloningError: If there is nothing to learn from, or it does not fit together.
+        CloningError: If there are no examples, or an array is invalid.
     """
     began = time.monotonic()
     settings = CloneSettings() if settings is None else settings
@@ -163,10 +161,10 @@ def clone(
 
 
 def _begin_with(policy: CameraPolicy, mean: NDArray[np.float32]) -> None:
-    """Let an untrained policy do what the driver does on average."""
-    certain = torch.as_tensor(mean).clamp(-_MOST_CERTAIN, _MOST_CERTAIN)
+    """Initialise the output of an untrained policy to the mean action."""
+    initial = torch.as_tensor(mean).clamp(-_MAX_INITIAL, _MAX_INITIAL)
     with torch.no_grad():
-        policy.network.hands.bias.copy_(torch.atanh(certain))
+        policy.network.hands.bias.copy_(torch.atanh(initial))
 
 
 def _check(policy: CameraPolicy, exam: Examples, step: int, loss: float) -> ValidationScore:
@@ -174,24 +172,19 @@ def _check(policy: CameraPolicy, exam: Examples, step: int, loss: float) -> Vali
 
 
 def _errors(done: NDArray[np.floating], wanted: NDArray[np.float32]) -> tuple[float, float]:
-    """Mean absolute errors of steering and throttle; NaN where nothing was wanted."""
+    """Return the mean absolute errors of steering and throttle; NaN without examples."""
     if not len(wanted):
         return math.nan, math.nan
     steering, throttle = np.abs(done - wanted).mean(axis=0).tolist()
     return steering, throttle
 
 
-_LARGEST_GRADIENT: Final = 1.0
-# Early steps are averaged over fewer of them: this many more at least than there have been.
-_AVERAGE_FROM: Final = 10.0
-
-
 class Judged(Protocol):
-    """How good a network is at some step."""
+    """Result of a validation of any kind."""
 
     @property
     def error(self) -> float:
-        """The smaller the better; NaN where nothing can be said."""
+        """Validation error; smaller is better, NaN if unknown."""
         ...
 
 
@@ -207,24 +200,24 @@ def fit(
     rate: float,
     on_check: Callable[[_Check], None],
 ) -> tuple[list[_Check], int, int]:
-    """Train a network in place, and leave it as it was at its best.
+    """Train a network in place, and restore its best weights at the end.
 
     Args:
-        network: What learns.
-        batches: What it learns from.
-        loss: What is made small.
-        judge: Says how good a network is, given the step and the mean loss since the last time.
-        settings: How many steps, how often to judge, when to give up.
-        rate: Largest learning rate.
-        on_check: Called with each judgement as soon as it is there.
+        network: The network.
+        batches: The training data.
+        loss: Returns the loss of a batch.
+        judge: Validates a network, given the step and the mean loss since the last validation.
+        settings: Number of steps, validations, and patience.
+        rate: Maximum learning rate.
+        on_check: Called after each validation.
 
     Returns:
-        The judgements in order, the place of the best one, and the steps that were taken.
+        The validations in order, the index of the best one, and the number of steps.
     """
     optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
     total = settings.steps(batches.size)
     every = max(total // settings.checks, 1)
-    # What is judged and kept: the network itself, or the average of what it was.
+    # Validated and kept: the network itself, or the average of its weights.
     kept = copy.deepcopy(network) if settings.averaging else network
 
     checks = [judge(kept.eval(), 0, math.nan)]
@@ -239,7 +232,7 @@ def fit(
         now = loss(network, batches.draw())
         optimizer.zero_grad()
         now.backward()  # pyright: ignore[reportUnknownMemberType]
-        torch.nn.utils.clip_grad_norm_(network.parameters(), _LARGEST_GRADIENT)
+        torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
         optimizer.step()  # pyright: ignore[reportUnknownMemberType]
         losses.append(now.item())
         step += 1
@@ -252,7 +245,7 @@ def fit(
         checks.append(check)
         losses.clear()
         worse += 1
-        if not check.error >= checks[best].error:  # Without held-out data the last is the best.
+        if not check.error >= checks[best].error:  # NaN without held-out data: keep the last.
             best, worse, best_state = len(checks) - 1, 0, _copied(kept)
     network.load_state_dict(best_state)
     network.eval()
@@ -260,14 +253,14 @@ def fit(
 
 
 def _average(average: CameraNetwork, network: CameraNetwork, share: float) -> None:
-    """Take in the newest weights, and keep a share of what was there."""
+    """Update a moving average of the weights."""
     with torch.no_grad():
         for old, new in zip(average.parameters(), network.parameters(), strict=True):
             old.lerp_(new, 1.0 - share)
 
 
 def _share_of_rate(step: int, total: int, warm_up: int) -> float:
-    """Up along a line, down along half a cosine."""
+    """Return the learning rate schedule: a linear warm-up, and half a cosine down to 0."""
     rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
     return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
 

@@ -27,8 +27,8 @@ from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName
-from shapechanger.headless import choose_gl, require_screen
 from shapechanger.layout import Element, Feature, Layout
+from shapechanger.rendering import choose_gl, require_screen
 from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of_senses
 
 if TYPE_CHECKING:

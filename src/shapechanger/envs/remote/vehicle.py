@@ -212,10 +212,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             LinkError: If the robot cannot be reached in time.
         """
         super().reset(seed=seed)
-        called = self._robot.name if isinstance(self._robot, KnownRobot) else ""
-        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock, called)
+        known_as = self._robot.name if isinstance(self._robot, KnownRobot) else ""
+        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock, known_as)
         if not self._client.alive:
             self._client = ready.connect(self._connect)
+            self._spaces.reconnect()
         robot = self._client
         if self._on_reset == "routine":
             ready.require_routine(robot)

@@ -180,7 +180,7 @@ class BatchStep:
                 bound = self._bounds[number]
             if bound is not None:
                 moving.append(number)
-        tasks = [(number, self._move) for number in moving]
+        tasks: list[_Task] = [(number, self._move) for number in moving]
         # Resets mostly run Python, so threads that reset at the same time would wait for one
         # another; spread out, they run while the other threads step physics.
         place = len(tasks) * (2 * thread + 1) // (2 * len(self._tasks))

@@ -41,7 +41,7 @@ class Writer {
   }
 
   byte(value) {
-    const at = this.#room(1); // First: there may be another buffer after it.
+    const at = this.#room(1); // First, because it may replace the buffer.
     this.#buffer[at] = value;
   }
 
@@ -172,7 +172,7 @@ function array(from, count, depth) {
 }
 
 function map(from, count, depth) {
-  const found = Object.create(null); // So that no key can mean anything.
+  const found = Object.create(null); // Without inherited properties.
   for (let i = 0; i < count; i += 1) {
     const key = read(from, depth + 1);
     if (typeof key !== "string") throw new RangeError("A key must be text.");

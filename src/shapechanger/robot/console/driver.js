@@ -1,9 +1,9 @@
 // Driving: one answer to each observation, and stops at once.
 
-const TAKEN_WITHIN_MS = 2_000; // A program that waits takes a robot that is free within a moment.
+const TAKEN_WITHIN_MS = 2_000; // Time in which a waiting program takes control.
 const LEASE_MS = 2_000;
-const PAUSE_MS = 1_000; // After a pause as long as this, what was held before it is not meant any more.
-const LEAST_MS = 15; // Between commands that nobody asked for but a moving stick.
+const PAUSE_MS = 1_000; // A held input does not count after a longer pause.
+const LEAST_MS = 15; // Between extra commands while the stick moves.
 
 /** Fires `note` (detail: a sentence) when a request failed. */
 export class Driver extends EventTarget {

@@ -16,7 +16,7 @@ export class Episode {
 
   constructor(id, actions) {
     this.id = id;
-    this.actions = actions; // Names of the actions; those of its own header once that is known.
+    this.actions = actions; // Names of the actions, until the header has arrived.
   }
 
   /** Return the next range to fetch, first around a step; null when all is fetched. */

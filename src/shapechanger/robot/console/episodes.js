@@ -185,7 +185,7 @@ export class Episodes {
     if (!isOn) return;
     if (this.#scrub.value === this.#scrub.max) this.#scrub.value = 0;
     this.#timer = setInterval(() => {
-      if (!this.#episode?.steps[this.#scrub.valueAsNumber]) return; // It waits for what is on its way.
+      if (!this.#episode?.steps[this.#scrub.valueAsNumber]) return; // Wait for the pieces under way.
       if (this.#scrub.value === this.#scrub.max) this.#play(false);
       this.#scrub.value = this.#scrub.valueAsNumber + 1;
       this.#look();

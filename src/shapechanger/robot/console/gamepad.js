@@ -1,6 +1,6 @@
 // Gamepad: the left stick steers; the triggers or either stick drive.
 
-const DEAD = 0.12; // Share of a stick's travel that is no wish: sticks do not rest at 0.
+const DEAD = 0.12; // Dead zone as a share of the travel: sticks do not rest at 0.
 const POLL_MS = 20;
 const ARM = 0; // Of the standard mapping: A.
 const STOP = 1; // B.

@@ -44,7 +44,7 @@ export class Keys {
     if (document.querySelector("dialog[open]")) return;
     // The arrows move a focused slider, and not the robot.
     if (code.startsWith("Arrow") && target instanceof HTMLInputElement) return;
-    event.preventDefault(); // Neither scroll the page.
+    event.preventDefault(); // Do not scroll the page.
     if (event.repeat || this.#held.has(code)) return;
     this.#held.add(code);
     this.#changed();

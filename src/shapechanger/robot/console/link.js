@@ -9,7 +9,7 @@ export const VERSION = 1;
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5_000;
 const PING_MS = 1_000;
-const SILENCE_MS = 6_000; // After which a connection that is open and silent counts as lost.
+const SILENCE_MS = 6_000; // A longer silence means that the connection is lost.
 const GREETING_MS = 8_000;
 
 /** Fetch the description of the robot before authentication; throws if it does not answer. */
@@ -154,7 +154,7 @@ export class Link extends EventTarget {
   }
 
   #wait(text) {
-    const waitMs = this.#waitMs * (0.75 + 0.5 * Math.random()); // So that pages do not come at once.
+    const waitMs = this.#waitMs * (0.75 + 0.5 * Math.random()); // Spread the pages over time.
     this.#waitMs = Math.min(2 * this.#waitMs, LONGEST_WAIT_MS);
     this.#timer = setTimeout(() => this.#connect(), waitMs);
     this.#tell("waiting", text, { waitMs });

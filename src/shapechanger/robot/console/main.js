@@ -21,7 +21,7 @@ import { Tilt } from "./tilt.js";
 import { ageOnArrivalMs, RoundTrips } from "./timing.js";
 
 const CAP_STEP = 10; // %
-const PRESS_MS = 1_000; // The click that follows a press is not a second one.
+const PRESS_MS = 1_000; // The click after a press is the same press.
 const OLD_MS = 500; // An older picture is marked as old.
 
 const link = new Link();

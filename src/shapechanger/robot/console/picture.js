@@ -59,7 +59,7 @@ export class Picture {
         this.newest = { ageMs, atMs };
         this.#drawnMs.push(performance.now());
       } catch {
-        this.dropped += 1; // The robot's camera gave something broken; the age tells it.
+        this.dropped += 1; // An invalid JPEG; the age of the picture shows it.
       }
     }
     this.#busy = false;

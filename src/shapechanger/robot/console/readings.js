@@ -12,7 +12,7 @@ export class Readings {
     const list = find("readings");
     list.replaceChildren();
     features.forEach(({ name }, index) => {
-      if (name.endsWith("/applied")) return; // The actions show it.
+      if (name.endsWith("/applied")) return; // Shown with the actions.
       const value = make("dd");
       list.append(make("div", {}, make("dt", {}, inWords(name)), value));
       this.#cells.set(index, value);

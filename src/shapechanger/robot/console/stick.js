@@ -35,7 +35,7 @@ export class Stick {
     event.preventDefault();
     this.#pointer = event.pointerId;
     this.#pad.setPointerCapture(event.pointerId);
-    document.documentElement.classList.add("held"); // No other finger zooms or scrolls meanwhile.
+    document.documentElement.classList.add("held"); // Keep other fingers from zooming or scrolling.
     this.#follow(event);
   }
 

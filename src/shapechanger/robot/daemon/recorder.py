@@ -416,19 +416,11 @@ class Recorder:
 
     def mark(self, text: str, post: _Post) -> str:
         """Mark the newest step. Return the reason for a refusal, or ""."""
-        if self._thread is None or self._builder is None:
-            return _NOT_RECORDING
-        self._write(self._builder.complete())
-        self._thread.mark(text, self._then(post))
-        return ""
+        return self._edit(lambda thread: thread.mark(text, self._then(post)))
 
     def undo(self, seconds: float, post: _Post) -> str:
         """Drop the newest steps. Return the reason for a refusal, or ""."""
-        if self._thread is None or self._builder is None:
-            return _NOT_RECORDING
-        self._write(self._builder.complete())
-        self._thread.undo(seconds, self._then(post))
-        return ""
+        return self._edit(lambda thread: thread.undo(seconds, self._then(post)))
 
     def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
         """Note an observation that is sent to a client; see `StepBuilder.observed`."""
@@ -462,6 +454,14 @@ class Recorder:
         self.end()
         if self._thread is not None:
             self._thread.join(_CLOSE_S)
+
+    def _edit(self, edit: Callable[[EpisodeThread], None]) -> str:
+        """Edit the episode after the pending step. Return the reason for a refusal, or ""."""
+        if self._thread is None or self._builder is None:
+            return _NOT_RECORDING
+        self._write(self._builder.complete())
+        edit(self._thread)
+        return ""
 
     def _write(self, step: StepWithFrame | None) -> None:
         if step is None or self._thread is None or self._thread.add(step):

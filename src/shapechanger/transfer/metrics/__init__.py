@@ -1,11 +1,11 @@
-"""What a transfer study measures: pure functions on learning curves.
+"""Measures of transfer: pure functions on learning curves.
 
-Read in this order: `LearningCurves` is what a study hands over, `Reference` turns returns into
-scores, the functions named after Taylor & Stone's measures and `forward_transfer` compare an arm
-with scratch, and `summarise` does all of it, counted in target steps and in total steps.
+`LearningCurves` holds the curves of one arm, `Reference` turns returns into scores, the functions
+named after Taylor & Stone's measures and `forward_transfer` compare an arm with scratch, and
+`summarise` computes all of them, in target steps and in total steps.
 
-The unit of everything statistical here is the seed, that is one training run. Episodes of one run
-share a policy, and counting them as independent would make every interval too narrow.
+The unit of all statistics is the seed, that is one training run. Episodes of one run share a
+policy, and counting them as independent would make every interval too narrow.
 """
 
 from shapechanger.transfer.metrics.curves import LearningCurves, Reference, in_total_steps

@@ -1,7 +1,7 @@
-"""Learning curves: what several training runs of one arm were worth, and when.
+"""Learning curves and scores.
 
-A curve is a straight line between two evaluations. Every measure reads it that way, so an area, a
-crossing and a value between two evaluations never contradict each other.
+A curve is linear between two evaluations. Every measure uses that, so areas, crossings and values
+between evaluations are consistent. A score of 0 is the random policy and 1 the end of scratch.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from shapechanger.errors import StudyError
 
 __all__ = ["LearningCurves", "Reference", "check_comparable", "in_total_steps"]
 
-# Beyond this a number is no return but an overflow, and the statistics would overflow with it.
+# Larger numbers are overflows, and the statistics would overflow too.
 _LARGEST_RETURN: Final = 1e30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearningCurves:
-    """What the training runs of one arm were worth at each evaluation, one row for each seed.
+    """Returns of the training runs of one arm at each evaluation, one row for each seed.
 
-    The arrays are copied when the curves are built, and the copies are read-only.
+    The arrays are copied, and the copies are read-only.
 
     Attributes:
         steps: Environment steps of the target at each evaluation, shape (n_evals,), strictly
             increasing from 0. The last one is the horizon H.
         returns: Mean undiscounted return of each seed at each evaluation, shape (n_seeds, n_evals),
             finite; in units of return, or of score after `Reference.scores`.
-        source_steps: Environment steps of the source that count before the first evaluation, so
-            that the curves at step T are worth what `returns` say at T - source_steps. 0 where only
-            target steps count. Set it with `in_total_steps`.
-        floor: What the curves are worth until `source_steps` have passed, in units of `returns`.
+        source_steps: Environment steps of the source that count before the first evaluation: the
+            curves at step T are `returns` at T - source_steps. 0 where only target steps count. Set
+            it with `in_total_steps`.
+        floor: Value of the curves until `source_steps` have passed, in units of `returns`.
 
     Raises:
         StudyError: If the arrays do not have these shapes or these values.
@@ -49,7 +49,7 @@ class LearningCurves:
     floor: float = 0.0
 
     def __post_init__(self) -> None:
-        """Copy the arrays and refuse what is not a learning curve."""
+        """Copy the arrays and check them."""
         steps = _frozen_copy("steps", self.steps)
         returns = _frozen_copy("returns", self.returns)
         if steps.ndim != 1 or steps.size == 0:
@@ -69,35 +69,35 @@ class LearningCurves:
         object.__setattr__(self, "returns", returns)
 
     def __reduce__(self) -> tuple[type[LearningCurves], tuple[object, ...]]:
-        """Build copies and pickles anew, because a pickled array forgets that it is read-only."""
+        """Rebuild copies and pickles, because a pickled array loses its read-only flag."""
         return type(self), (self.steps, self.returns, self.source_steps, self.floor)
 
     @property
     def n_seeds(self) -> int:
-        """How many training runs there are."""
+        """Number of training runs."""
         return self.returns.shape[0]
 
     @property
     def n_evals(self) -> int:
-        """How often each run was evaluated; 1 for an arm that is not trained on the target."""
+        """Number of evaluations per run; 1 for an arm that is not trained on the target."""
         return self.steps.size
 
     @property
     def horizon(self) -> float:
-        """The last step that counts, H; source steps are paid out of it, not added to it."""
+        """The last step that counts, H; it includes source steps."""
         return float(self.steps[-1])
 
     def at(self, steps: ArrayLike) -> NDArray[np.float64]:
-        """What each seed is worth at `steps`, shape (n_seeds, n_steps).
+        """Interpolate the curves at `steps`; returns shape (n_seeds, n_steps).
 
-        `floor` until `source_steps` have passed, a straight line between two evaluations, and the
-        last evaluation from there on.
+        The value is `floor` until `source_steps` have passed, linear between two evaluations, and
+        the last evaluation after that.
 
         Args:
-            steps: Steps of whatever these curves count, shape (n_steps,), >= 0.
+            steps: Steps, counted as these curves count them, shape (n_steps,), >= 0.
         """
         learning = np.atleast_1d(np.asarray(steps, dtype=np.float64)) - self.source_steps
-        return np.where(learning < 0.0, self.floor, self._learnt(learning))
+        return np.where(learning < 0.0, self.floor, self._after_training(learning))
 
     def last_steps(self, last_k: int) -> NDArray[np.float64]:
         """The steps of the last `last_k` evaluations, shape (last_k,).
@@ -124,11 +124,11 @@ class LearningCurves:
         waiting = min(self.source_steps, self.horizon)
         learning = self.horizon - waiting
         knots = np.append(self.steps[self.steps < learning], learning)
-        area = np.asarray(np.trapezoid(self._learnt(knots), knots, axis=1))
+        area = np.asarray(np.trapezoid(self._after_training(knots), knots, axis=1))
         return (self.floor * waiting + area) / self.horizon
 
-    def _learnt(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What each seed is worth after `steps` of learning on the target."""
+    def _after_training(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Interpolate the curves after `steps` of training on the target."""
         rows: list[NDArray[np.float64]] = list(self.returns)
         return np.stack([np.interp(steps, self.steps, row) for row in rows])
 
@@ -137,17 +137,17 @@ def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) ->
     """The same runs with the steps they spent on the source counted too.
 
     Taylor & Stone (JMLR 10, 2009, section 2) call this the total time scenario. The budget stays
-    H = `curves.horizon`: whoever first spends S steps on the source has H - S left for the target.
+    H = `curves.horizon`: with S steps on the source, H - S are left for the target.
     With p the arm's curve in target steps, the curve is `floor` for T < S and p(T - S) from there.
 
     Args:
         curves: The arm's curves in target steps.
         source_steps: S, environment steps spent on the source, >= 0.
-        floor: What the arm is worth on the target while it still learns on the source: the return
-            of a random policy, or 0 if the curves are scores.
+        floor: Value of the arm on the target while it still trains on the source: the return of
+            a random policy, or 0 if the curves are scores.
 
     Returns:
-        Curves on the same grid of evaluations, which every measure here accepts.
+        Curves on the same grid of evaluations.
 
     Raises:
         StudyError: If the source steps are counted already, or are not a count.
@@ -177,7 +177,7 @@ def check_comparable(arm: LearningCurves, scratch: LearningCurves) -> None:
 
 
 def _frozen_copy(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
-    """A read-only float copy of `numbers`, all of them finite."""
+    """Return a read-only float copy of finite numbers."""
     try:
         copy = np.array(numbers, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -188,18 +188,18 @@ def _frozen_copy(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
     return copy
 
 
-# Two returns closer than this, relative to the larger of them and 1, are one number with rounding.
+# Two returns closer than this, relative to the larger of them and 1, are equal up to rounding.
 _SAME: Final = 1e-9
 
 
 class Reference(msgspec.Struct, frozen=True):
-    """The two returns that fix the scale of scores, both measured on the target itself.
+    """The two returns that define the scale of scores, both measured on the target.
 
     score = (J - random) / (final - random)
 
     The formula is that of D4RL (arXiv 2004.07219). Both ends belong to the target, because the
-    return of an expert on the source says nothing about a body of another shape. The reference is
-    taken as given: intervals of scores do not contain its own uncertainty.
+    return of an expert on the source is no reference for another body. The reference is taken as
+    given: intervals of scores do not include its uncertainty.
 
     Attributes:
         random: Mean return of the random policy.
@@ -213,7 +213,7 @@ class Reference(msgspec.Struct, frozen=True):
     final: float
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be the end of a scale."""
+        """Check that both are finite."""
         if not (math.isfinite(self.random) and math.isfinite(self.final)):
             raise StudyError(
                 f"A reference needs finite returns, got {self.random} and {self.final}."
@@ -226,10 +226,10 @@ class Reference(msgspec.Struct, frozen=True):
         Args:
             scratch: Curves of the runs from scratch, in units of return.
             random_returns: Returns of the random policy, any shape.
-            last_k: How many of the last evaluations count as final, >= 1.
+            last_k: Number of final evaluations that are averaged, >= 1.
 
         Raises:
-            StudyError: If there are not that many evaluations, or no finite random returns.
+            StudyError: If there are fewer evaluations, or no finite random returns.
         """
         final = scratch.at(scratch.last_steps(last_k)).mean()
         returns = np.asarray(random_returns, dtype=np.float64)
@@ -239,21 +239,21 @@ class Reference(msgspec.Struct, frozen=True):
 
     @property
     def defined(self) -> bool:
-        """Whether scores exist: scratch ended above the random policy, by more than rounding."""
+        """Whether scores exist: scratch ended above the random policy by more than rounding."""
         size = max(1.0, abs(self.random), abs(self.final))
         return self.final - self.random > _SAME * size
 
     def scores(self, curves: LearningCurves, *, clip: bool = False) -> LearningCurves:
-        """The same curves as scores; their floor too.
+        """Convert curves and their floor to scores.
 
         Args:
             curves: Curves in units of return.
-            clip: Cut scores off at 0 and 1, as `forward_transfer` needs, whose formula takes 1 for
-                the most that can be reached. Each evaluation is clipped, then the line is drawn.
-                Everything else wants scores as they are: beating scratch is the point of transfer.
+            clip: Clip each evaluation to 0 and 1, as `forward_transfer` needs, whose formula takes
+                1 as the maximum. The other measures need unclipped scores, since an arm can beat
+                scratch.
 
         Raises:
-            StudyError: If scratch did not learn, so that there is no scale.
+            StudyError: If scratch did not learn, so that scores are undefined.
         """
         if not self.defined:
             raise StudyError(

@@ -1,8 +1,8 @@
-"""Estimates with intervals over seeds, and the honest absence of one.
+"""Estimates with confidence intervals over seeds.
 
-Each arm is one sample of independent seeds, of a size of its own; arms are not paired. Both
-functions take one number for each seed. How often such intervals hold the truth with few seeds, and
-what else was tried, is measured in docs/statistics.md.
+Each arm is one sample of independent seeds; sizes may differ, and arms are not paired. Both
+functions take one number for each seed. docs/statistics.md measures the coverage of such intervals
+with few seeds, and compares alternatives.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ __all__ = ["Estimate", "Method", "estimate_difference", "estimate_ratio", "undef
 
 Method = Literal["Welch's t", "studentised bootstrap", "none"]
 
-# Numbers that differ by less than this share of their size differ by rounding only.
+# Numbers that differ by a smaller share of their size are equal up to rounding.
 _ROUNDING: Final = 1e-12
-# The square of a smaller spread, divided by another one, would come near to what floats can hold.
+# The square of a smaller spread, divided by another one, would underflow.
 _LEAST_SPREAD: Final = 1e-60
 
 _TOO_FEW: Final = "No interval: it takes at least two seeds in each arm."
@@ -32,14 +32,14 @@ _NO_TAILS: Final = "No interval: too many resamples have no ratio, or no spread 
 
 
 class Estimate(msgspec.Struct, frozen=True):
-    """A measured number and how far it can be trusted.
+    """An estimate with a confidence interval.
 
     Attributes:
-        value: The number, or None where the measure is undefined; `note` says why.
-        low: Lower end of the interval, or None where there is none; `note` says why.
+        value: The estimate; None where the measure is undefined, with the reason in `note`.
+        low: Lower end of the interval; None where there is none, with the reason in `note`.
         high: Upper end of the interval.
-        method: How the interval was made, in words.
-        note: What a reader must know; empty if nothing.
+        method: Kind of interval.
+        note: A remark; may be empty.
     """
 
     value: float | None
@@ -50,7 +50,7 @@ class Estimate(msgspec.Struct, frozen=True):
 
 
 def undefined(note: str) -> Estimate:
-    """A measure that does not exist here, and why."""
+    """Return an undefined measure with the reason."""
     return Estimate(value=None, note=note)
 
 
@@ -103,9 +103,9 @@ def estimate_ratio(
 
     A resample may have no t_b: because it drew equal seeds only, so that its error is zero, or a
     mean of scratch below `least`. Dropping it would make the interval narrower, and so would a
-    floor under the error that is chosen too high. It counts as infinitely far out instead, in both
-    tails. Once such resamples fill a tail there is no interval, and the note says so; of two seeds
-    in each arm a quarter of the resamples is like that.
+    floor under the error that is chosen too high. It counts as infinite in both tails instead. Once
+    such resamples fill a tail there is no interval, and the note states it; with two seeds in each
+    arm a quarter of the resamples is like that.
 
     Args:
         arm: One number for each seed, shape (n_arm,).
@@ -169,7 +169,7 @@ def _squared_error(sample: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> str:
-    """Why these samples carry no interval; empty if they do."""
+    """Why these samples have no interval; empty if they have one."""
     if min(arm.size, scratch.size) < 2:
         return _TOO_FEW
     if not (_spread(arm) | _spread(scratch)):
@@ -184,6 +184,6 @@ def _spread(sample: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _check_confidence(confidence: float) -> None:
-    """Refuse a confidence that no interval can have."""
+    """Refuse a confidence outside (0, 1)."""
     if not 0.0 < confidence < 1.0:  # Also refuses NaN.
         raise StudyError(f"confidence must be between 0 and 1, such as 0.95, got {confidence}.")

@@ -1,9 +1,9 @@
-"""Four of the five measures of Taylor & Stone; the fifth, time to threshold, has its own file.
+"""Measures of one arm against scratch: the five of Taylor & Stone, and forward transfer.
 
-Source of all of them: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcement Learning
+Source of the five: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcement Learning
 Domains: A Survey", JMLR 10 (2009) 1633-1685, section 2.
 
-With p the mean curve over seeds and H the horizon. Every function takes the arm in target steps or,
+p is the mean curve over seeds and H the horizon. Every function takes the arm in target steps or,
 through `in_total_steps`, in total steps. Positive differences mean that transfer helped.
 """
 
@@ -53,23 +53,23 @@ NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evalua
 
 _NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."
 
-# An area of scores below this is zero with rounding.
+# An area of scores below this is zero up to rounding.
 _ZERO_AREA: Final = 1e-9
 
 
 def jumpstart(
     arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
 ) -> Estimate:
-    """How much better the arm starts on the target, in units of the curves.
+    """Initial advantage of the arm on the target, in units of the curves.
 
-    p_arm(0) - p_scratch(0) in target steps. In total steps p_arm(0) - p_scratch(source_steps): what
-    scratch has learnt by the time the arm has finished its source. If that is after the horizon,
-    scratch's last evaluation stands for it.
+    p_arm(0) - p_scratch(0) in target steps; in total steps p_arm(0) - p_scratch(source_steps),
+    where scratch has trained as long as the arm on its source. If that is after the horizon,
+    scratch's last evaluation is used.
 
     Args:
-        arm: Curves of the arm; one evaluation will do.
+        arm: Curves of the arm; one evaluation is enough.
         scratch: Curves of the baseline, evaluated at the same steps.
-        confidence: Of Welch's interval.
+        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -83,18 +83,17 @@ def jumpstart(
 def asymptotic_gain(
     arm: LearningCurves, scratch: LearningCurves, *, last_k: int, confidence: float = 0.95
 ) -> Estimate:
-    """How much better the arm ends, in units of the curves.
+    """Final advantage of the arm, in units of the curves.
 
     Mean of p_arm over the last k evaluations minus that of p_scratch. In total steps the arm is
-    read at the same k steps, of which its source steps are a part. The one evaluation of an arm
-    that is not trained on the target stands for its end, because the policy does not change.
+    read at the same k steps, which include its source steps. The one evaluation of an arm that is
+    not trained on the target counts as its end, because the policy does not change.
 
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
-        last_k: k, how many evaluations count as the end, >= 1. One is the definition by the letter;
-            more of them take out noise.
-        confidence: Of Welch's interval.
+        last_k: k, number of final evaluations, >= 1. The definition uses one; more reduce noise.
+        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared or have fewer than k evaluations.
@@ -114,16 +113,16 @@ def asymptotic_gain(
 def total_reward_gain(
     arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
 ) -> Estimate:
-    """How much more the arm is worth over its whole life, in units of the curves.
+    """Advantage of the arm averaged over the budget, in units of the curves.
 
     (∫ p_arm - ∫ p_scratch) / H by the trapezoid rule. Taylor & Stone's total reward is the area;
-    divided by the horizon it is the mean height of the curve, which keeps the unit and does not
-    grow with the budget.
+    divided by the horizon it is the mean height of the curve, which has the unit of the curve and
+    does not grow with the budget.
 
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
-        confidence: Of Welch's interval.
+        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -142,18 +141,18 @@ def auc_ratio(
     confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Estimate:
-    """Area under the arm's curve over area under scratch's, a pure number; 1 if they are equal.
+    """Area under the arm's curve over that of scratch, a pure number; 1 if they are equal.
 
-    ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It moves with any constant
-    added to the reward, so it has a meaning for scores only, where 0 is the random policy.
+    ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It depends on constants
+    added to the reward, so it is meaningful for scores only, where 0 is the random policy.
     Undefined unless scratch's area is above zero.
 
     Args:
         arm: Scores of the arm.
         scratch: Scores of the baseline, evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Of the studentised bootstrap interval.
-        n_resamples: Resamples of the studentised bootstrap.
+        confidence: Confidence of the studentised bootstrap interval.
+        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -173,7 +172,7 @@ def auc_ratio(
 
 
 # The measure divides by the headroom 1 - AUC_b: below one hundredth of the scale, a difference of
-# 0.01 in the areas, less than runs differ by chance, would already count as a transfer of 1.
+# 0.01 in the areas, less than the variation between runs, would count as a transfer of 1.
 MIN_HEADROOM: Final = 0.01
 
 
@@ -188,16 +187,16 @@ def forward_transfer(
     """Forward transfer of Continual World, a pure number of at most 1; 0 means no effect.
 
     (AUC - AUC_b) / (1 - AUC_b), with AUC of the arm and AUC_b of scratch, both areas divided by the
-    horizon (Wołczyk et al., "Continual World", NeurIPS 2021). 1 is the most that can be reached
-    only if no score passes 1; there the scores are success rates, here they are clipped. Undefined
-    where scratch leaves less than `MIN_HEADROOM`.
+    horizon (Wołczyk et al., "Continual World", NeurIPS 2021). 1 is the maximum only if no
+    score exceeds 1; there the scores are success rates, here they are clipped. Undefined where
+    scratch leaves a headroom below `MIN_HEADROOM`.
 
     Args:
         arm: Scores of the arm from `Reference.scores(..., clip=True)`.
         scratch: Scores of the baseline, clipped too and evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Of the studentised bootstrap interval.
-        n_resamples: Resamples of the studentised bootstrap.
+        confidence: Confidence of the studentised bootstrap interval.
+        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If the curves cannot be compared or leave [0, 1].
@@ -211,12 +210,12 @@ def forward_transfer(
             )
     if arm.n_evals == 1:
         return undefined(NO_CURVE)
-    # Gain over headroom is one minus the ratio of what the two arms leave to be won.
+    # Gain over headroom is one minus the ratio of the two headrooms.
     left = estimate_ratio(
         1.0 - arm.auc(),
         1.0 - scratch.auc(),
         least=MIN_HEADROOM,
-        too_small=f"Undefined: scratch leaves less than {MIN_HEADROOM:g} to be won.",
+        too_small=f"Undefined: scratch leaves a headroom of less than {MIN_HEADROOM:g}.",
         rng=rng,
         confidence=confidence,
         n_resamples=n_resamples,
@@ -224,7 +223,7 @@ def forward_transfer(
     return Estimate(
         _rest(left.value),
         _rest(left.high),
-        # No arm leaves less than nothing, though the interval does not know.
+        # A headroom is never negative, but the interval can be.
         None if left.low is None else _rest(max(left.low, 0.0)),
         left.method,
         left.note,
@@ -239,8 +238,8 @@ def _rest(share: float | None) -> float | None:
 class ReachTimes(msgspec.Struct, frozen=True):
     """When the seeds of one arm reached a threshold.
 
-    All seeds count. One that did not reach it is right-censored at the horizon H, the same for all
-    seeds, so that the Kaplan-Meier estimate is the plain empirical one.
+    All seeds count. A seed that did not reach it is right-censored at the horizon H, which all
+    seeds share, so the Kaplan-Meier estimate equals the empirical one.
 
     Attributes:
         fraction: Share of the seeds that reached it by H, from 0 to 1.
@@ -255,14 +254,14 @@ class ReachTimes(msgspec.Struct, frozen=True):
 
 
 class TimeToThreshold(msgspec.Struct, frozen=True):
-    """How much sooner an arm reaches a threshold than scratch.
+    """Time to a threshold, of an arm and of scratch.
 
     Attributes:
-        threshold: The declared height, in units of the curves.
+        threshold: The threshold, in units of the curves.
         arm: Times of the arm; None where they are undefined.
         scratch: Times of scratch; None where they are undefined.
-        steps_saved: Restricted mean of scratch minus that of the arm, in steps; positive if the
-            arm is sooner.
+        steps_saved: Restricted mean of scratch minus that of the arm, in steps; positive if the arm
+            is faster.
     """
 
     threshold: float
@@ -274,9 +273,9 @@ class TimeToThreshold(msgspec.Struct, frozen=True):
 def steps_to_reach(curves: LearningCurves, threshold: float) -> NDArray[np.float64]:
     """First step at which each seed is at or above `threshold`, shape (n_seeds,).
 
-    The first step at which the straight line between two evaluations is there; infinity if it is
-    not until the horizon. The grid of evaluations would do as well in target steps, but source
-    steps need not fall on it, and it would round the times of all seeds to a few values.
+    Linear between two evaluations; infinity if the threshold is not reached by the horizon. The
+    grid of evaluations would suffice in target steps, but source steps need not fall on it, and it
+    would round the times of all seeds to a few values.
 
     Args:
         curves: Curves in target steps or in total steps.
@@ -295,13 +294,13 @@ def time_to_threshold(
     """Taylor & Stone's time to threshold (JMLR 10, 2009, section 2), without dropping seeds.
 
     The times are compared by their restricted means, because a mean over the seeds that reached the
-    threshold would favour the arm with the fewest of them.
+    threshold would favour the arm with the fewest such seeds.
 
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
         threshold: Declared before the study, in units of the curves.
-        confidence: Of Welch's interval.
+        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared or the threshold is not finite.
@@ -314,7 +313,7 @@ def time_to_threshold(
     arm_steps = steps_to_reach(arm, threshold)
     scratch_steps = steps_to_reach(scratch, threshold)
     saved = estimate_difference(
-        # Swapped, because later means more steps and sooner is the gain.
+        # Swapped: fewer steps are the gain.
         np.minimum(scratch_steps, scratch.horizon),
         np.minimum(arm_steps, arm.horizon),
         confidence=confidence,
@@ -328,14 +327,14 @@ def time_to_threshold(
 
 
 def _first_step(steps: NDArray[np.float64], row: NDArray[np.float64], threshold: float) -> float:
-    """First crossing of one curve in its own steps, infinity if there is none."""
+    """First crossing of one curve in its own steps; infinity if there is none."""
     above = np.flatnonzero(row >= threshold)
     if above.size == 0:
         return math.inf
     after = int(above[0])
     if after == 0:
         return 0.0
-    # The curve rises from below the threshold, so it may be read the other way round.
+    # The curve rises from below the threshold, so its inverse is defined here.
     around = slice(after - 1, after + 1)
     return float(np.interp(threshold, row[around], steps[around]))
 
@@ -350,22 +349,22 @@ def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
     )
 
 
-# A grid instead of one height, because one height can be chosen to please. In units of score.
+# A grid, because a single threshold could be chosen in hindsight. In units of score.
 DEFAULT_THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
 
 _NO_SCORES: Final = "Undefined: scratch did not end above the random policy, so there is no score."
 
 
 class Measures(msgspec.Struct, frozen=True):
-    """The measures of one arm against scratch, in one way of counting steps.
+    """Measures of one arm against scratch, in target steps or in total steps.
 
     Attributes:
-        jumpstart: How much better the arm starts, in the unit of the summary.
-        asymptotic_gain: How much better it ends, in the unit of the summary.
-        total_reward_gain: How much more it is worth on the way, in the unit of the summary.
+        jumpstart: Initial advantage, in the unit of the summary.
+        asymptotic_gain: Final advantage, in the unit of the summary.
+        total_reward_gain: Mean advantage, in the unit of the summary.
         auc_ratio: Area of the arm over area of scratch, a pure number.
-        forward_transfer: Share of scratch's headroom that the arm wins, a pure number.
-        times_to_threshold: One for each declared threshold, in the order of declaration.
+        forward_transfer: Share of scratch's headroom that the arm gains, a pure number.
+        times_to_threshold: One for each threshold, in order.
     """
 
     jumpstart: Estimate
@@ -377,20 +376,20 @@ class Measures(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """All measures of one arm against scratch, and what they rest on.
+    """All measures of one arm against scratch, with their basis.
 
     Attributes:
         unit: Unit of the gains: "score", or "return" where scratch did not learn, so that there
             are no scores and only jumpstart, asymptotic gain and total reward gain exist.
         reference: The scale of scores. A gain in returns is one in scores times final - random.
-        horizon: H, the budget in steps that both ways of counting share.
-        source_steps: Steps the arm spent on the source.
+        horizon: H, the budget in steps, for both ways of counting.
+        source_steps: Training steps of the arm on the source.
         n_seeds_arm: Training runs of the arm.
         n_seeds_scratch: Training runs from scratch.
-        last_k: How many evaluations count as the end.
-        confidence: Of every interval.
-        in_target_steps: Only steps on the target count.
-        in_total_steps: Steps on the source count too.
+        last_k: Number of final evaluations that are averaged.
+        confidence: Confidence of every interval.
+        in_target_steps: Measures in target steps.
+        in_total_steps: Measures in total steps.
     """
 
     unit: Literal["score", "return"]
@@ -417,19 +416,19 @@ def summarise(
     confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Summary:
-    """Measure one arm against scratch, in target steps and in total steps.
+    """Compute all measures of one arm against scratch, in target steps and in total steps.
 
     Args:
         scratch: Curves of the baseline, in units of return and target steps.
         arm: Curves of the arm, evaluated at the same steps; or once at step 0 for an arm that is
             not trained on the target, of which jumpstart and asymptotic gain are defined.
         reference: The target's own scale.
-        source_steps: Steps the arm spent on the source, >= 0.
-        rng: Draws the resamples. Both ways of counting use the same ones, so that with no source
-            steps they agree to the last digit.
-        thresholds: Declared heights, in units of score.
-        last_k: How many of the last evaluations count as the end.
-        confidence: Of every interval, between 0 and 1.
+        source_steps: Training steps of the arm on the source, >= 0.
+        rng: Draws the resamples. Both ways of counting use the same ones, so that without source
+            steps they are equal.
+        thresholds: Thresholds, in units of score.
+        last_k: Number of final evaluations that are averaged.
+        confidence: Confidence of every interval, between 0 and 1.
         n_resamples: Resamples of each bootstrap interval.
 
     Raises:
@@ -467,7 +466,7 @@ def _measure(
     confidence: float,
     n_resamples: int,
 ) -> Measures:
-    """All measures in one way of counting; the curves are in units of return."""
+    """Compute all measures in one way of counting; the curves are in units of return."""
     ratio, transfer = undefined(_NO_SCORES), undefined(_NO_SCORES)
     times = tuple(TimeToThreshold(height, None, None, ratio) for height in thresholds)
     if reference.defined:

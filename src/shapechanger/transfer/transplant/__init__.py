@@ -1,12 +1,12 @@
-"""A trained policy in the shapes of another body, so that it can go on learning there.
+"""Transplant a trained policy into the shapes of another body, to continue training there.
 
-A body map is affine, and so are the first and the last layer of a network: what the target senses
-is mapped inside the first layer, and what the source does inside the last. The transplanted policy
-then does in the target what the source policy does through the map, to rounding, from its first
-step; new inputs begin with weights of zero and are open to training.
+A body map is affine, and so are the first and the last layer of a network: the first layer absorbs
+the map of observations, and the last that of actions. Before any training the transplanted policy
+does in the target what the source policy does through the map, up to rounding; new inputs start
+with weights of zero and are trainable.
 
-A `BodyMap` says how the bodies correspond, `transplant` moves a model of Stable-Baselines3, and
-`transplant_normalisation` moves the statistics that its observations are normalised by.
+`transplant` moves a model of Stable-Baselines3, and `transplant_normalisation` the statistics that
+its observations are normalised by.
 """
 
 try:

@@ -1,4 +1,4 @@
-"""Observation statistics of the target, and the first layer's view of them."""
+"""The first and last layers of a transplanted network, and its observation statistics."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Vector = NDArray[np.float64]
 
 
 class Affine(NamedTuple):
-    """The source's numbers from the target's: x_source = matrix x_target + offset.
+    """Affine map from the target's numbers to the source's: x_source = matrix x_target + offset.
 
     Attributes:
         matrix: Shape (n_source, n_target).
@@ -50,7 +50,7 @@ class Affine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """How observations are normalised, as by SB3's `VecNormalize`: z = clip((o - mean) / sigma).
+    """Normalisation of observations as in SB3's `VecNormalize`: z = clip((o - mean) / sigma).
 
     Attributes:
         mean: Shape (n,).
@@ -64,24 +64,35 @@ class Scaling:
 
     @classmethod
     def none(cls, size: int) -> Scaling:
-        """Observations as they are."""
+        """Return the identity."""
         return cls(np.zeros(size), np.ones(size))
 
     @classmethod
     def of(cls, statistics: RunningMeanStd, epsilon: float, clip: float) -> Scaling:
-        """By statistics that were gathered in training."""
+        """Return the normalisation by statistics of a training.
+
+        Args:
+            statistics: Mean and variance.
+            epsilon: Added to the variance.
+            clip: Largest magnitude of z.
+        """
         return cls(np.asarray(statistics.mean, np.float64), np.sqrt(statistics.var + epsilon), clip)
 
 
 def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> Affine:
-    """The source network's inputs from the target network's.
+    """Map the target network's inputs to the source network's.
 
     With o_s = M o_t + c, o_t = mean_t + sigma_t z_t and z_s = (o_s - mean_s) / sigma_s:
 
         z_s = diag(1 / sigma_s) M diag(sigma_t) z_t + (M mean_t + c - mean_s) / sigma_s
 
-    The clipping of z_t stands for that of z_s, which is the same where a number keeps its
-    statistics. A number that is constant is clipped here.
+    The clipping of z_t replaces that of z_s, which is the same where a number keeps its statistics.
+    A constant number is clipped here.
+
+    Args:
+        body_map: Map between the bodies.
+        source: Normalisation of the source.
+        target: Normalisation of the target.
     """
     matrix = body_map.observation_matrix * target.sigma / source.sigma[:, np.newaxis]
     seen = body_map.observation_matrix @ target.mean + body_map.observation_offset
@@ -92,16 +103,16 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 
 
 def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> RunningMeanStd:
-    """The target's observation statistics, from those of the source.
+    """Transplant observation statistics from the source to the target.
 
-    A target number that the source takes carries its mean and variance over, through the scale; if
-    several take it, the one of the same name, or else the first, does. A number that is new is
-    taken to be uniform in its range, or to have the mean nearest to 0 and the variance 1 where it
-    has no range. The count is kept: the source's experience weighs as much as it did.
+    A target number that a source number copies gets its mean and variance, through the scale; of
+    several copies, the one of the same name counts, or else the first. A new number is assumed
+    uniform in its range, or to have the mean nearest to 0 and the variance 1 where it has no range.
+    The count is kept, so the source's experience keeps its weight.
 
     Args:
         source: Mean and variance of the source's observations, shape (source_observation.size,).
-        body_map: How the bodies correspond.
+        body_map: Map between the bodies.
 
     Returns:
         Mean and variance of the target's observations, shape (target_observation.size,).
@@ -109,16 +120,16 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
     layout = body_map.target_observation
     carried = RunningMeanStd(shape=(layout.size,))
     carried.count = source.count
-    takers: dict[str, tuple[str, float]] = {}
+    copies: dict[str, tuple[str, float]] = {}
     for entry in body_map.observation:
         if isinstance(entry.rule, Copy):
             taken = entry.rule.feature
-            if taken not in takers or entry.feature == taken:
-                takers[taken] = (entry.feature, entry.rule.scale)
+            if taken not in copies or entry.feature == taken:
+                copies[taken] = (entry.feature, entry.rule.scale)
     ours = body_map.source_observation.slices
     for feature, place in zip(layout, layout.slices.values(), strict=True):
-        if feature.name in takers:
-            name, scale = takers[feature.name]
+        if feature.name in copies:
+            name, scale = copies[feature.name]
             carried.mean[place] = source.mean[ours[name]] / scale
             carried.var[place] = source.var[ours[name]] / scale**2
         else:
@@ -127,12 +138,12 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
 
 
 def _guessed_variance(feature: Feature) -> float:
-    """The variance of a uniform distribution over the range, or 1 where there is none."""
+    """Variance of a uniform distribution over the range, or 1 where there is none."""
     width = feature.high - feature.low
     return width**2 / 12.0 if 0.0 < width < math.inf else 1.0
 
 
-# tanh reaches 1 only at infinity; a constant at a bound is a millionth within it.
+# tanh reaches 1 only at infinity; a constant at a bound is placed a millionth inside.
 _CLOSEST_TO_BOUND: Final = 1.0 - 1e-6
 # Bounds of a Box are in single precision.
 _SAME: Final = 1e-6
@@ -146,8 +157,8 @@ class OutputMap(NamedTuple):
     Attributes:
         matrix: Shape (n_target, n_source).
         offset: Shape (n_target,).
-        fresh: Which outputs are to be learned, and keep the weights of a new policy instead,
-            shape (n_target,).
+        fresh: Which outputs are to be learned and get the weights of a new policy, shape
+            (n_target,).
     """
 
     matrix: Array
@@ -157,12 +168,12 @@ class OutputMap(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PolicyOutputs:
-    """The two layers, or the layer and the parameters, that a Gaussian policy ends in.
+    """The output layers of a Gaussian policy.
 
     Attributes:
-        mean: The mean of each action, before any squashing.
-        log_std: The logarithm of its standard deviation. Where the mean is constant it is the mean
-            of those of the source.
+        mean: Mean of each action, before squashing.
+        log_std: Logarithm of its standard deviation. Where the mean is constant it is the mean of
+            those of the source.
     """
 
     mean: OutputMap
@@ -170,7 +181,7 @@ class PolicyOutputs:
 
 
 def gaussian_outputs(body_map: BodyMap) -> PolicyOutputs:
-    """For a policy whose actions are in the env's units, as PPO's: a_t = N a_s + d."""
+    """Outputs of a policy whose actions are in the env's units, as PPO's: a_t = N a_s + d."""
     matrix = body_map.action_matrix
     scale = np.abs(matrix).sum(axis=1)
     log_scale = np.log(np.where(scale > 0.0, scale, 1.0))
@@ -182,18 +193,18 @@ def gaussian_outputs(body_map: BodyMap) -> PolicyOutputs:
 
 
 def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
-    """For a policy whose actions go through tanh to the bounds of the space, as SAC's.
+    """Outputs of a policy whose actions are squashed by tanh to the bounds of the space, as SAC's.
 
     With u = tanh(mean) in [-1, 1] the action is middle + half u. Since tanh is odd, a sign can move
-    inside of it, and no other scale can.
+    inside, but no other scale.
 
     Args:
-        body_map: How the bodies correspond.
+        body_map: Map between the bodies.
         source: The source's action space, bounded.
         target: The target's action space, bounded.
 
     Raises:
-        TransplantError: If an action is taken at another scale than its range has.
+        TransplantError: If an action is copied at another scale than that of the ranges.
     """
     matrix = body_map.action_matrix
     signs, squashed = np.zeros_like(matrix), np.zeros(len(matrix))
@@ -225,15 +236,15 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 
 
 def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) -> Affine:
-    """The squashed source actions from the squashed target actions, for SAC's critics.
+    """Map squashed target actions to squashed source actions, for SAC's critics.
 
-    This is the way back through the outputs. Where several target actions copy one source action,
-    the one of the same name stands for it, and if there is none, their mean does: both are exact
-    on what the policy does. A target action that came from nowhere counts for nothing until it is
-    trained, and a source action that went nowhere is judged as the action 0.
+    This is the inverse of the outputs. Where several target actions copy one source action, the one
+    of the same name represents it, or else their mean: both are exact for the policy's actions. A
+    target action without an origin has no weight until trained, and a source action without a copy
+    counts as the action 0.
 
     Args:
-        body_map: How the bodies correspond.
+        body_map: Map between the bodies.
         outputs: The squashed outputs of the same map.
         source: The source's action space, bounded.
     """
@@ -241,8 +252,8 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
     source_names, target_names = _names(body_map.source_action), _names(body_map.target_action)
     matrix = np.zeros(signs.T.shape)
     for origin, name in enumerate(source_names):
-        takers = [int(place) for place in np.flatnonzero(signs[:, origin])]
-        chosen = [place for place in takers if target_names[place] == name] or takers
+        copies = [int(place) for place in np.flatnonzero(signs[:, origin])]
+        chosen = [place for place in copies if target_names[place] == name] or copies
         matrix[origin, chosen] = signs[chosen, origin] / max(1, len(chosen))
     middle, half = _middle_and_half(source)
     still = np.clip(-middle / half, -1.0, 1.0)
@@ -250,7 +261,7 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
 
 
 def _names(layout: Layout) -> list[tuple[str, int]]:
-    """For each number the name of its feature and the place in it."""
+    """For each number the name of its feature and its index in it."""
     return [(feature.name, place) for feature in layout for place in range(feature.size)]
 
 
@@ -263,7 +274,7 @@ def _fresh(body_map: BodyMap) -> NDArray[np.bool_]:
 
 
 def _spread(matrix: Array) -> Array:
-    """Which log standard deviation each action gets: that of its origin, or the mean of all."""
+    """Weights of the source's log standard deviations for each action: its origin, or the mean."""
     taken = matrix != 0.0
     mean = np.full_like(matrix, 1.0 / matrix.shape[1])
     return np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
@@ -277,12 +288,12 @@ def _middle_and_half(space: Box[Any]) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Which parts of a network meet the body.
+    """The layers of a network that depend on the body.
 
     Attributes:
-        inputs: For the name of a linear layer what its inputs become.
-        outputs: For the name of a linear layer, or of a vector of parameters, what its outputs
-            become. A layer may be both: a network without hidden layers is one.
+        inputs: Map of the inputs of a linear layer, by its name.
+        outputs: Map of the outputs of a linear layer, or of a vector of parameters, by its name. A
+            layer may have both, in a network without hidden layers.
     """
 
     inputs: dict[str, Affine] = field(default_factory=dict[str, Affine])
@@ -290,7 +301,13 @@ class Edges:
 
 
 def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -> list[str]:
-    """The name of the first linear layer of a network, or other names if it has none."""
+    """Return the name of the first linear layer of a network, or other names if it has none.
+
+    Args:
+        network: The network.
+        name: Its name.
+        otherwise: The other names.
+    """
     for child, module in network.named_children():
         if isinstance(module, nn.Linear):
             return [f"{name}.{child}"]
@@ -298,18 +315,18 @@ def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -
 
 
 def move_parameters(source: nn.Module, target: nn.Module, edges: Edges) -> dict[str, torch.Tensor]:
-    """The parameters of `target` that make it compute what `source` computes.
+    """Compute the parameters with which `target` computes what `source` computes.
 
     Everything is computed in float64 and stored as the source stores it.
 
     Args:
-        source: The network that was trained.
-        target: A new network of the same make, in the shapes of the target; what is to be learned
-            keeps its parameters.
-        edges: What changes at the inputs and outputs. All else is copied.
+        source: The trained network.
+        target: A new network of the same architecture, in the shapes of the target; outputs to be
+            learned keep its parameters.
+        edges: The layers that change. All others are copied.
 
     Raises:
-        TransplantError: If there are parameters at the edges that nobody says how to move.
+        TransplantError: If other parameters differ in shape.
     """
     trained, new = source.state_dict(), target.state_dict()
     moved = {name: tensor.detach().clone() for name, tensor in trained.items()}
@@ -318,7 +335,7 @@ def move_parameters(source: nn.Module, target: nn.Module, edges: Edges) -> dict[
         moved[name] = torch.as_tensor(values).to(trained[name])
 
     for layer in dict.fromkeys((*edges.inputs, *edges.outputs)):
-        if layer in trained:  # A vector of parameters and no layer.
+        if layer in trained:  # A vector of parameters.
             replace(layer, _biases(_array(trained, layer), edges.outputs[layer], new, layer))
             continue
         at_weight, at_bias = f"{layer}.weight", f"{layer}.bias"

@@ -1,4 +1,4 @@
-"""A model of Stable-Baselines3 for another body."""
+"""Transplant a model of Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ __all__ = ["check_supported", "new_model", "transplant"]
 Model = TypeVar("Model", PPO, SAC)
 
 _GIVEN_ANEW: Final = frozenset({"self", "policy", "env", "seed", "device", "_init_setup_model"})
-# Arguments that a model keeps under another name.
+# Arguments that a model stores under another name.
 _KEPT_AS: Final = {"stats_window_size": "_stats_window_size"}
 
 
@@ -55,17 +55,17 @@ def new_model(
     device: torch.device | str,
     changes: dict[str, Any],
 ) -> Model:
-    """An untrained model of the class and the settings of `source`.
+    """Build an untrained model with the class and settings of `source`.
 
     Args:
-        source: The model whose settings are wanted.
-        env: What the new one is to learn on.
+        source: The source model.
+        env: The env of the new model.
         seed: Its seed.
-        device: Where it lives.
-        changes: Arguments of the class that are to differ.
+        device: Its device.
+        changes: Arguments of the class that differ.
 
     Raises:
-        TransplantError: If the source explores by action noise and nobody says what becomes of it.
+        TransplantError: If the source uses action noise and `changes` does not replace it.
     """
     kept: dict[str, Any] = {}
     for name in inspect.signature(type(source).__init__).parameters:
@@ -74,8 +74,8 @@ def new_model(
             kept[name] = getattr(source, attribute)
     if kept.get("action_noise") is not None and "action_noise" not in changes:
         raise TransplantError(
-            "The source model adds action noise, which is made for the shape of its actions: say "
-            "what the target is to have, as in transplant(..., action_noise=None)."
+            "The source model adds action noise in the shape of its actions: state the noise of "
+            "the target, as in transplant(..., action_noise=None)."
         )
     kept["policy_kwargs"] = copy.deepcopy(source.policy_kwargs)
     if isinstance(source, SAC):
@@ -85,7 +85,7 @@ def new_model(
 
 
 def _undo_set_up(source: SAC, kept: dict[str, Any]) -> None:
-    """What "auto" has become in a model turns back into "auto", since it depends on the body."""
+    """Turn resolved "auto" settings back into "auto", because they depend on the body."""
     if source.target_entropy == -float(cast("Any", source).action_space.shape[0]):
         kept["target_entropy"] = "auto"
     if source.replay_buffer_class is NStepReplayBuffer:
@@ -96,7 +96,7 @@ def _undo_set_up(source: SAC, kept: dict[str, Any]) -> None:
 
 
 def check_supported(model: object) -> None:
-    """Refuse a model whose weights cannot be moved.
+    """Refuse a model whose weights cannot be transplanted.
 
     Raises:
         TransplantError: If it is not PPO or SAC with an `MlpPolicy` on flat observations and plain
@@ -105,13 +105,13 @@ def check_supported(model: object) -> None:
     problem = _problem(model)
     if problem:
         raise TransplantError(
-            f"{problem} What can be transplanted is PPO or SAC with an MlpPolicy, on flat "
+            f"{problem} Only PPO and SAC with an MlpPolicy can be transplanted, on flat "
             "observations and continuous actions, without gSDE."
         )
 
 
 def _problem(model: object) -> str:
-    """What stands in the way, as a sentence; empty if nothing does."""
+    """Why the model is not supported, as a sentence; empty if it is."""
     if not isinstance(model, PPO | SAC):
         return f"This model is {type(model).__name__}."
     extractors = [m for m in model.policy.modules() if isinstance(m, BaseFeaturesExtractor)]
@@ -135,7 +135,7 @@ def _problem(model: object) -> str:
     return ""
 
 
-# What VecNormalize does unless it is told otherwise.
+# Defaults of VecNormalize.
 _EPSILON = 1e-8
 _CLIP = 10.0
 
@@ -150,12 +150,12 @@ def transplant(
     device: torch.device | str | None = None,
     **settings: Any,
 ) -> Model:
-    """A model that does in the target what the source model does through the map.
+    """Return a model that does in the target what the source model does through the map.
 
     The actor, PPO's value network, SAC's critics and their targets, log standard deviations and the
-    entropy coefficient are moved; optimisers, buffers and step counts begin anew. An action that is
-    to be learned gets the weights, and with PPO the log standard deviation, of an untrained policy.
-    A constant action gets the mean log standard deviation of the source's, so that it is explored.
+    entropy coefficient are moved; optimisers, buffers and step counts are new. An action to be
+    learned gets the weights, and with PPO the log standard deviation, of an untrained policy. A
+    constant action gets the mean log standard deviation of the source, so that it is explored.
 
     Observations: where the target env normalises them with `VecNormalize`, its statistics become
     those of the source, see `transplant_normalisation`. Where it does not, the source's statistics
@@ -167,22 +167,22 @@ def transplant(
 
     Args:
         source_model: PPO or SAC with an `MlpPolicy` of any `net_arch`, trained on the source.
-        body_map: How the bodies correspond.
-        target_env: What the model is to go on learning on; flat spaces of the map's target sizes.
-        normalisation: What the source's observations were normalised by: by default that of the
-            model's own env. A model that was loaded without its env needs it said.
-        seed: Seed of the new model, and so of the weights that are to be learned. As any model of
+        body_map: Map between the bodies.
+        target_env: The env to continue training in; flat spaces of the map's target sizes.
+        normalisation: Normalisation of the source's observations; by default that of the model's
+            own env. Needed for a model that was loaded without its env.
+        seed: Seed of the new model, and so of the weights to be learned. As any model of
             Stable-Baselines3, it seeds Python, NumPy and PyTorch.
-        device: Where the new model lives; by default where the source model does.
-        **settings: Arguments of the model's class that are to differ from the source model's.
+        device: Device of the new model; by default that of the source model.
+        **settings: Arguments of the model's class that differ from the source model's.
 
     Returns:
         A new model of the same class and settings; the source model is untouched.
 
     Raises:
         TransplantError: If the policy is of another kind, SAC would have to scale an action, or
-            only the target normalises its observations and goes on changing how.
-        SpaceMismatch: If a space has not the size of its layout.
+            only the target normalises its observations, with statistics that keep changing.
+        SpaceMismatch: If a space does not have the size of its layout.
     """
     check_supported(source_model)
     source, target = cast("Any", source_model), cast("Any", target_env)
@@ -218,15 +218,14 @@ def _sensed(
     source: RunningMeanStd | VecNormalize | None,
     target: VecNormalize | None,
 ) -> Affine:
-    """The source network's inputs from the target's, which gets its statistics here."""
+    """Map the target network's inputs to the source's; set the target's statistics."""
     statistics = _statistics(source)
     normaliser = target if target is not None and target.norm_obs else None
     if normaliser is not None and normaliser.training and statistics is None:
         raise TransplantError(
-            "The source saw its observations as they are, and the target env normalises them by "
-            "statistics that go on changing, which would undo what was learned: build its "
-            "VecNormalize with norm_obs=False or training=False, or say what the source's "
-            "statistics are."
+            "The source's observations were not normalised, and the target env normalises them by "
+            "statistics that keep changing, which would undo the training: build its VecNormalize "
+            "with norm_obs=False or training=False, or give the source's statistics."
         )
     if isinstance(source, VecNormalize) and target is not None:
         if source.norm_reward and target.norm_reward:
@@ -249,14 +248,14 @@ def _sensed(
 
 
 def _statistics(source: RunningMeanStd | VecNormalize | None) -> RunningMeanStd | None:
-    """What the source's observations were normalised by, if they were."""
+    """Statistics of the source's observations, if they were normalised."""
     if isinstance(source, VecNormalize):
         return cast("RunningMeanStd", source.obs_rms) if source.norm_obs else None
     return source
 
 
 def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs) -> Edges:
-    """Where the policy and the value network of PPO meet the body."""
+    """Layers of PPO's policy and value network that depend on the body."""
     extractor = policy.mlp_extractor
     edges = Edges(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
     for layer in (
@@ -268,7 +267,7 @@ def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs
 
 
 def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine) -> Edges:
-    """Where the actor and the critics of SAC meet the body; a critic senses and judges."""
+    """Layers of SAC's actor and critics that depend on the body."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
     edges = Edges(outputs=dict(heads))
     for layer in first_linear(policy.actor.latent_pi, "actor.latent_pi", heads):
@@ -290,7 +289,7 @@ def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged
 
 
 def _move_entropy_coefficient(source: SAC, target: SAC) -> None:
-    """Copy what was learned about how much to explore; a constant is a setting."""
+    """Copy a learned entropy coefficient; a constant one is a setting."""
     if source.log_ent_coef is not None and target.log_ent_coef is not None:
         with torch.no_grad():
             target.log_ent_coef.copy_(source.log_ent_coef)

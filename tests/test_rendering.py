@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(
 
 _CHOOSE = """
 import os
-from shapechanger.headless import choose_gl
+from shapechanger.rendering import choose_gl
 choose_gl()
 print(os.environ.get("MUJOCO_GL"))
 """
