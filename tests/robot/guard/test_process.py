@@ -312,7 +312,7 @@ def test_an_order_without_sense_ends_the_command_before(make: _Make) -> None:
     bench.clock.at(57, lambda: duties.append(bench.duty(22)))
     assert bench.run(60).armed
     assert duties == [0.5, 0.0]
-    assert any("no finite number" in state.refused for state in bench.states)
+    assert any("must be a finite number" in state.refused for state in bench.states)
 
 
 def test_a_controller_that_does_not_obey_yet_is_told_of(
@@ -372,7 +372,7 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
         "",
         "Not forward: the bumper touched something.",
         f"{fails}No answer.",
-        f"{fails}It says what is no number.",
+        f"{fails}It returned a value that is not finite.",
         f"{fails}No bus.",
     ]
     assert bench.states[-1].bumps == 1

@@ -246,7 +246,7 @@ def _supervisor(told: str) -> Iterator[Supervisor]:
         yield one
 
 
-@pytest.mark.parametrize("told", ["", "told to by SIGTERM"])
+@pytest.mark.parametrize("told", ["", "ended by SIGTERM"])
 def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
     monkeypatch: pytest.MonkeyPatch, told: str
 ) -> None:
@@ -273,7 +273,7 @@ def test_a_guard_that_never_ends_is_given_up_when_told_to_end(
     monkeypatch.setattr(supervisor, "_safe", lambda plan: [])
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
     monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
-    with _supervisor("told to by SIGTERM") as one:
+    with _supervisor("ended by SIGTERM") as one:
         one._stop(_Stuck(looks=10**9), _Daemon(looks=9))
     assert not one._is_safe
 

@@ -53,7 +53,7 @@ def test_orders_and_states_come_back_as_they_were() -> None:
 def test_what_is_no_order_is_refused(field: str, value: object) -> None:
     """Each field has its type, and numbers are finite, so that limits can be compared."""
     data = json.dumps(asdict(_ORDER) | {field: value}).encode()
-    with pytest.raises(ValueError, match=r"no order|no whole number|no finite number|no words"):
+    with pytest.raises(ValueError, match=r"^Invalid order: "):
         decode_order(data)
 
 

@@ -110,18 +110,18 @@ def decode_order(data: bytes) -> Order:
         fields["values"] = tuple(fields.get("values", ()))
         order = Order(**fields)
     except TypeError as error:
-        raise ValueError(f"This is no order: {error}.") from error
+        raise ValueError(f"Invalid order: {error}.") from error
     numbers = (order.session, order.seq, order.issued_ns, order.ttl_ms, order.emergency)
     if order.kind not in _KINDS or not all(type(number) is int for number in numbers):
-        raise ValueError("This is no order.")
+        raise ValueError("Invalid order: unknown kind, or a field that must be an integer.")
     if not (order.frame_ns is None or type(order.frame_ns) is int):
-        raise ValueError("frame_ns is no whole number.")
+        raise ValueError("Invalid order: frame_ns must be an integer.")
     if type(order.reason) is not str:
-        raise ValueError("The reason is no words.")
+        raise ValueError("Invalid order: reason must be a string.")
     if type(order.person) is not bool:
-        raise ValueError("This is no order: person is neither true nor false.")
+        raise ValueError("Invalid order: person must be true or false.")
     if not all(_is_finite(value) for value in order.values):
-        raise ValueError("A value is no finite number.")
+        raise ValueError("Invalid order: every value must be a finite number.")
     return order
 
 
@@ -136,7 +136,7 @@ def decode_state(data: bytes) -> GuardState:
         fields["applied"] = tuple(fields["applied"])
         return GuardState(**fields)
     except (KeyError, TypeError) as error:
-        raise ValueError(f"This is no state: {error}.") from error
+        raise ValueError(f"Invalid state: {error}.") from error
 
 
 def _is_finite(value: object) -> bool:
@@ -152,7 +152,7 @@ def _fields(data: bytes) -> dict[str, Any]:
     try:
         fields: object = json.loads(data)
     except (UnicodeDecodeError, RecursionError) as error:
-        raise ValueError(f"This is no JSON: {error}.") from error
+        raise ValueError(f"Invalid JSON: {error}.") from error
     if not isinstance(fields, dict):
-        raise ValueError("This is no JSON object.")
+        raise ValueError("The message must be a JSON object.")
     return cast("dict[str, Any]", fields)

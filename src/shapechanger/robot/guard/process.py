@@ -269,7 +269,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
     guard: Guard | None = None
 
     def end(number: int, _: object) -> None:
-        told.append(f"told to by {signal.Signals(number).name}")
+        told.append(f"ended by {signal.Signals(number).name}")
         if guard is not None:
             guard.ended = told[0]
 

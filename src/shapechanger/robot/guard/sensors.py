@@ -179,7 +179,7 @@ class Sensors:
                 words = f"It took more than {MOST_READ_NS // 1_000_000} ms to answer."
                 failures[name] = f"{failures.get(name, '')} {words}".lstrip()
             if not all(map(math.isfinite, measured.values())):
-                failures.setdefault(name, "It says what is no number.")
+                failures.setdefault(name, "It returned a value that is not finite.")
                 continue
             if name in self._ranging and name not in failures and "distance" not in measured:
                 silent.add(name)

@@ -284,7 +284,7 @@ class Supervisor:
             after_failure = (AFTER_FAILURE,)
 
     def _end(self, number: int, _: object) -> None:
-        self._told = self._told or f"told to by {signal.Signals(number).name}"
+        self._told = self._told or f"ended by {signal.Signals(number).name}"
 
     def _pause(self, seconds: float) -> None:
         """Wait; the first signal ends the wait early."""
@@ -344,7 +344,7 @@ class Supervisor:
         if not guard.killed and guard.is_gone(time.monotonic_ns()):
             guard.kill(_REAP_S)
             if guard.code == 0:
-                self._told = self._told or "the guard was told to"
+                self._told = self._told or "the guard was ended"
         elif not guard.killed:
             # A guard that does not exit may hold the outputs anywhere, so the time is short.
             guard.end(self._plan.guard_silence_ms / 1e3, _REAP_S)
