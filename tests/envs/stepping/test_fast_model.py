@@ -301,7 +301,7 @@ def test_fast_models_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatc
     twin.forget_fast_models()
     for friction in (0.3, 0.4, 0.5, 0.4):
         assert _fast_model_of(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
-    assert len(twin._twins) == 2
+    assert len(twin._fast_models) == 2
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
