@@ -369,6 +369,12 @@ def test_a_layout_that_does_not_fit_its_space_is_refused(
         del gym.registry["tests/Misnamed-v0"]
 
 
+def test_an_argument_that_an_env_of_others_refuses_is_named() -> None:
+    """Gymnasium raises a TypeError where a constructor refuses an argument."""
+    with pytest.raises(StudyError, match=r"CartPole-v1 cannot be made with these opt.*'colour'"):
+        EnvRef("CartPole-v1", {"colour": "red"}).make()
+
+
 class Failing(Misnamed):
     """An env whose certificate fails in a rollout."""
 
@@ -386,9 +392,9 @@ def test_an_env_that_fails_in_the_rollout_is_refused_in_a_sentence() -> None:
 
 
 def test_an_argument_that_does_not_exist_is_refused() -> None:
-    """With the name of the env."""
+    """By our envs themselves."""
     task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
-    with pytest.raises(StudyError, match="SmallInvertedPendulum-v1 cannot be made with these opt"):
+    with pytest.raises(UnknownName, match="No argument of InvertedPendulum matches 'colour'"):
         tiny_plan(task=task)
 
 
