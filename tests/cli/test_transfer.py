@@ -217,7 +217,12 @@ def test_play_makes_a_film_where_there_is_no_screen(
         (["transfer", "Ant", "ExtendedAnt", "--rule", "toot_1/motor=zero"], "Did you mean"),
         (["transfer", "Ant", "ExtendedAnt", "--map", "none.toml"], "cannot be read"),
         (["transfer", "Ant", "BigAnt", "--workers", "0"], "at least one worker"),
-        (["transfer", "Ant", "BigAnt", "--arms", "scratch", "identified"], "does not tell how"),
+        (["transfer", "Ant", "BigAnt", "--arms", "scratch", "identified"], "cannot adapt"),
+        (
+            ["transfer", "Ant", "ExtendedAnt", "--source-options", '{"ctrl_cost_weight": "x"}'],
+            "ctrl_cost_weight must be a number",
+        ),
+        (["train", "Ant", "--learner", "sac"], "Ant-v1 has no camera and no demonstrator"),
         (["transfer", "Finger", "Finger", "--target-options", "{"], "no JSON"),
         (["transfer", "Finger", "Finger", "--target-options", '{"gab": 1}'], "argument 'gab'"),
         (

@@ -25,7 +25,7 @@ from shapechanger.errors import (
     UnknownName,
 )
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.env_ref import EnvRef, certify_shift
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
@@ -369,18 +369,32 @@ def test_a_layout_that_does_not_fit_its_space_is_refused(
         del gym.registry["tests/Misnamed-v0"]
 
 
-def test_arguments_that_break_an_env_are_refused_in_a_sentence(tmp_path: Path) -> None:
-    """The constructor of Ant accepts a weight that is a text."""
-    broken = EnvRef("shapechanger/Ant-v1", {"ctrl_cost_weight": "x"})
-    task = TransferTask(broken, EnvRef("shapechanger/ExtendedAnt-v1"))
-    with pytest.raises(StudyError, match=r"Ant-v1 .*fails in a short rollout .*check the arg"):
-        run_study(tiny_plan(task=task), tmp_path / "study", executor=Serial())
+def test_an_argument_that_an_env_of_others_refuses_is_named() -> None:
+    """Gymnasium raises a TypeError where a constructor refuses an argument."""
+    with pytest.raises(StudyError, match=r"CartPole-v1 cannot be made with these opt.*'colour'"):
+        EnvRef("CartPole-v1", {"colour": "red"}).make()
+
+
+class Failing(Misnamed):
+    """An env whose certificate fails in a rollout."""
+
+    def certify_shift(self, source: Any, target: Any) -> str:
+        """Fail as an env does with an argument of another type."""
+        raise TypeError("can't multiply sequence by non-int")
+
+
+def test_an_env_that_fails_in_the_rollout_is_refused_in_a_sentence() -> None:
+    """Both envs are named, because either can fail."""
+    with pytest.raises(
+        StudyError, match=r"Failing.* or .*Misnamed.* fails in a short rollout \(can"
+    ):
+        certify_shift(Failing(), Misnamed())
 
 
 def test_an_argument_that_does_not_exist_is_refused() -> None:
-    """With the name of the env."""
+    """By our envs themselves."""
     task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
-    with pytest.raises(StudyError, match="SmallInvertedPendulum-v1 cannot be made with these opt"):
+    with pytest.raises(UnknownName, match="No argument of InvertedPendulum matches 'colour'"):
         tiny_plan(task=task)
 
 

@@ -45,11 +45,12 @@ class Train:
 
     def run(self) -> None:
         """Train and print evaluations as they complete."""
-        from shapechanger.transfer.env_ref import layouts_of
+        from shapechanger.transfer.env_ref import env_traits
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
         from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
+        from shapechanger.transfer.methods import learner_of
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
@@ -60,7 +61,7 @@ class Train:
         out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
         # The policy is written last; check first that it can be.
         with opened(env) as made:
-            layouts_of(made)
+            learner_of(learner, settings).require(env, env_traits(made))
         if out.is_dir():
             raise OutputError(f"Cannot write {out}: it is a folder.")
         if self.tensorboard is not None:

@@ -111,6 +111,7 @@ class Transfer:
         task = self._task()
         traits = inspect_task(task)
         plan = self._plan(task, traits)
+        _ = traits.shift  # An empty shift is refused before anything is written.
         executor = Processes(1 if plan.exclusive else self.workers)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
