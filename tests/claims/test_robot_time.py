@@ -10,7 +10,7 @@ import shapechanger
 
 PACKAGE: Final = Path(shapechanger.__file__).parent
 # The validity of a certificate is a calendar date.
-MAY: Final = {PACKAGE / "robot" / "daemon" / part for part in ("credentials.py", "pairing.py")}
+MAY: Final = {PACKAGE / "robot" / "daemon" / part for part in ("credentials.py", "recorder.py")}
 WALL: Final = {
     "time.time",
     "time.time_ns",

@@ -5,11 +5,13 @@ from __future__ import annotations
 import gc
 import weakref
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.wrappers import RecordVideo
 
 from shapechanger.envs import CATALOGUE
 from tests.drawing import run_python
@@ -340,3 +342,17 @@ def test_a_window_opens(display: str) -> None:
     run = run_python(_WINDOW, DISPLAY=display)
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines() == ["(80, 60)", "True", "True", "True", "closed"]
+
+
+def test_gymnasium_records_videos(tmp_path: Path) -> None:
+    """`RecordVideo` has its encoder from the extra `sim`."""
+    env = RecordVideo(
+        gym.make("shapechanger/InvertedPendulum-v1", render_mode="rgb_array"),
+        str(tmp_path / "videos"),
+        disable_logger=True,
+    )
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    env.close()
+    (video,) = (tmp_path / "videos").glob("*.mp4")
+    assert video.stat().st_size > 1000
