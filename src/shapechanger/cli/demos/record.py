@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 if TYPE_CHECKING:
     import gymnasium as gym
 
-    from shapechanger.demos.recording import RecordDemonstrations
+    from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["EXPERT", "RecordDemonstrations", "pilot_of"]
@@ -197,7 +197,7 @@ class RecordDemonstrations:
         from gymnasium.wrappers import TimeLimit
 
         from shapechanger.demos.drivers import record_steps
-        from shapechanger.demos.recording import RecordDemonstrations
+        from shapechanger.demos.recording import RecordEpisodes
 
         require_seed(self.seed)
         for name, value in (("minutes", self.minutes), ("episode-s", self.episode_s)):
@@ -211,7 +211,7 @@ class RecordDemonstrations:
             longest = max(1, round(self.episode_s * hz))
             steps = max(1, round(self.minutes * 60.0 * hz))
             pilot = pilot_of(made, self.driver, self.corrected_by, self.seed, trust=self.trust)
-            env = RecordDemonstrations(
+            env = RecordEpisodes(
                 TimeLimit(made, longest), self.out, driver="program", about=self._about(made)
             )
             with StudyProgress({ref.id: steps}) as progress:
@@ -274,7 +274,7 @@ def _made(ref: EnvRef) -> gym.Env[Any, Any]:
         raise DemosError(f"{ref.id} cannot be made with these --options: {reason}.") from error
 
 
-def _told(env: RecordDemonstrations, out: Path) -> str:
+def _told(env: RecordEpisodes, out: Path) -> str:
     """Describe the recording and the next commands."""
     seconds = env.steps / env.control_hz
     episodes = f"{env.episodes} episode{'' if env.episodes == 1 else 's'}"

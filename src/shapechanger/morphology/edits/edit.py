@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -84,7 +84,7 @@ class Edit(
 def _as_python(value: Any) -> Any:
     """Return a NumPy scalar as a Python number, and an array as a tuple of them."""
     plain = value.tolist()
-    return tuple(plain) if isinstance(plain, list) else plain
+    return tuple(cast("list[Any]", plain)) if isinstance(plain, list) else plain
 
 
 def part_of_the_way(old: float, new: float, amount: float) -> float:

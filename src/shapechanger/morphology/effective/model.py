@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import msgspec
 import mujoco
@@ -28,11 +28,6 @@ from shapechanger.morphology.effective.contacts import (
     geoms_of_pairs,
 )
 from shapechanger.morphology.effective.elements import Section, Value, is_any, names_of
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from shapechanger.morphology.effective.elements import Value
 
 __all__ = ["EffectiveModel", "effective_model", "fingerprint"]
 
