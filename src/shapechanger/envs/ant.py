@@ -271,6 +271,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             contact_cost,
             healthy,
         )
+        infos["reward_survive"] = infos["reward_survive"].tolist()  # Python numbers, as in step().
         terminated = ~healthy & bool(self._terminate_when_unhealthy)
         diverged: Sequence[int] = ()
         if warnings.any():
