@@ -12,7 +12,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import env_ref, options_of, require_seed
-from shapechanger.errors import FingerError, OutputError
+from shapechanger.errors import FingerError, OutputError, UnknownName
 
 if TYPE_CHECKING:
     from shapechanger.identify import IdentifiedFinger
@@ -110,9 +110,9 @@ class RecordFinger:
         ref = EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
         try:
             env = ref.make(max_episode_steps=-1)
-        except TypeError as error:
-            reason = str(error).partition(" was raised from")[0]
-            raise FingerError(f"{ref.id} is no env of a finger: {reason}.") from error
+        except (TypeError, UnknownName) as error:
+            reason = str(error).partition(" was raised from")[0].rstrip(".")
+            raise FingerError(f"{ref.id} is not a finger env: {reason}.") from error
         try:
             log = record_babble(env, self.seconds, self.seed, self.actions)
         finally:
@@ -120,7 +120,7 @@ class RecordFinger:
         save_log(log, self.out)
         plain_console().print(
             f"wrote {len(log)} rows, {log.seconds:g} s, to {self.out}\n"
-            f"find out what it is like: shapechanger finger identify {shlex.quote(str(self.out))}",
+            f"identify the finger: shapechanger finger identify {shlex.quote(str(self.out))}",
             soft_wrap=True,
         )
 

@@ -66,7 +66,7 @@ def test_what_feels_or_sees_something_else_is_refused(tmp_path: Path) -> None:
     policy = clone(tmp_path / "other.zip", state_layout=other)
     with pytest.raises(PolicyError, match=r"heat.*battery"):
         pilot_of(CorridorEnv("both"), policy, "", 0)
-    with pytest.raises(PolicyError, match=r"battery.*no state"):
+    with pytest.raises(PolicyError, match=r"battery.*gets none"):
         pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.zip"), "", 0)
     from shapechanger.envs.vehicle.drivers import CLONES
 

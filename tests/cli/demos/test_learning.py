@@ -100,5 +100,5 @@ def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
     """In one sentence."""
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.save(tmp_path / "p.zip")
-    with pytest.raises(PolicyError, match=r"decides steering, throttle, and .* takes forward"):
+    with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):
         Evaluate(tmp_path / "p.zip", _record(tmp_path / "drive", 10, 0)).run()

@@ -45,7 +45,7 @@ def test_what_cannot_be_recorded_is_refused(
 ) -> None:
     """Another body, another name, no time, no options, and a goal."""
     out = ("--out", tmp_path / "log.npz")
-    assert "no env of a finger" in refused(capsys, "record", "Ant", *out)
+    assert "is not a finger env" in refused(capsys, "record", "Ant", *out)
     assert "Did you mean" in refused(capsys, "record", "Fingr", *out)
     assert "--seconds is more than 0" in refused(capsys, "record", "Finger", *out, "--seconds", "0")
     assert "--options are no JSON" in refused(capsys, "record", "Finger", *out, "--options", "a")
