@@ -10,7 +10,7 @@ import gymnasium as gym
 import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
-from shapechanger.envs.finger import env as finger_env
+from shapechanger.envs.finger import identification
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import StudyError
 from shapechanger.reports.verdict import arm_rows, caveats, verdict
@@ -39,7 +39,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     out = tmp_path_factory.mktemp("gap") / "study"
     task = TransferTask(FINGER, REAL_LIKE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finger_env, "identified", identified)
+        patch.setattr(identification, "identify_env", identified)
         plan = tiny_plan(task=task, arms=EVERY_ARM, source_steps=64)
         return run_study(plan, out, executor=Serial()), out, moved
 

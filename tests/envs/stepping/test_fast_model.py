@@ -319,3 +319,14 @@ def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
         assert one.cfrc_ext.tobytes() == two.cfrc_ext.tobytes()
         contacts += one.ncon
     assert contacts > 50
+
+
+def test_a_spec_of_another_model_gives_no_pairs() -> None:
+    """The recompiled model must equal the public one, or the search for contacts stays."""
+    spec = _scene()
+    model = spec.compile()
+    heavier = spec.copy()
+    heavier.geoms[-1].density = 2.0 * heavier.geoms[-1].density
+    watch = ModelWatch(model)
+    fast = find_fast_model(watch, lambda: heavier)
+    assert fast is None or not _knows_its_pairs(fast)

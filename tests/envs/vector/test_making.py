@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from collections import deque
 from typing import Any
 
 import gymnasium as gym
@@ -16,6 +17,9 @@ from gymnasium.wrappers import vector as wrappers
 import shapechanger
 from shapechanger.envs import CATALOGUE
 from shapechanger.envs.vector import ThreadVectorEnv, entry_points
+from shapechanger.envs.vector.batch import _work_off
+from shapechanger.envs.vector.checks import require_same_spaces
+from shapechanger.errors import SpaceMismatch, VectorEnvError
 from shapechanger.morphology import Stretch
 from tests.envs.vector.sameness import require_same
 
@@ -193,3 +197,35 @@ def test_exporting_it_loads_no_simulator() -> None:
     script = "import sys\nfrom shapechanger import make_vec\nprint('mujoco' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout == "False\n"
+
+
+def test_no_envs_are_refused() -> None:
+    """A vector env has at least one env."""
+    with pytest.raises(VectorEnvError, match="at least one env, got 0"):
+        ThreadVectorEnv([])
+
+
+class _Bounded(gym.Env[Any, Any]):
+    """Env without a body, a layout or a spec."""
+
+    def __init__(self, high: float) -> None:
+        self.observation_space = gym.spaces.Box(-high, high, (2,))
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (1,))
+
+
+def test_other_bounds_are_refused() -> None:
+    """Envs of one vector env share their bounds; the message names an env without a body."""
+    require_same_spaces([_Bounded(1.0), _Bounded(1.0)])
+    with pytest.raises(SpaceMismatch, match=r"env 1 \(_Bounded\) has other bounds than .* env 0"):
+        require_same_spaces([_Bounded(1.0), _Bounded(2.0)])
+
+
+def test_a_thread_without_tasks_ends() -> None:
+    """Another thread may take the last task between the look and the take."""
+
+    def take() -> Any:
+        raise IndexError
+
+    failures: list[tuple[int, Exception]] = []
+    _work_off(deque([(0, failures.append)]), take, failures)  # type: ignore[list-item]
+    assert failures == []

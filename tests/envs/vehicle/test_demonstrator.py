@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.transfer.learners.cloning import TaskDemonstrator
+from shapechanger.transfer.env_ref import TaskDemonstrator
 from shapechanger.worlds.course import HOME
 
 

@@ -69,7 +69,7 @@ def paused_timer() -> AbstractContextManager[None]:
         # The bindings are linked to the library, wherever it is installed.
         bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
         return PausedTimer(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
-    except (AttributeError, OSError, ValueError):
+    except (AttributeError, OSError, ValueError):  # pragma: no cover  # Another MuJoCo build.
         return nullcontext()
 
 

@@ -95,7 +95,7 @@ def _cores() -> int:
     """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return os.cpu_count() or 1  # pragma: no cover  # Not Linux.
 
 
 def _at_least_one(what: str, number: int) -> int:

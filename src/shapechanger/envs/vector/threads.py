@@ -110,7 +110,7 @@ class ThreadPool:
     def _awake(self) -> list[_Worker]:
         """Return the threads, started if they are not alive."""
         if not all(worker.thread.is_alive() for worker in self._workers):
-            self._workers = []
+            self._workers = []  # pragma: no cover  # After a fork; tested in a subprocess.
         while len(self._workers) < self.threads - 1:
             self._workers.append(_Worker())
         return self._workers
