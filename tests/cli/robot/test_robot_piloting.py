@@ -128,4 +128,4 @@ def test_a_policy_for_another_robot_is_refused(
             main(["robot", "drive", "plough", "--policy", str(CLONES["car"])])
     assert stop.value.code == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "decides steering, throttle, and what it is to drive takes throttle, blade" in said
+    assert "steering, throttle, but those required here are throttle, blade" in said

@@ -20,11 +20,10 @@ from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
-if TYPE_CHECKING:
     import gymnasium as gym
 
+    from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 

@@ -23,12 +23,10 @@ from shapechanger.layout import Layout
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Episode, Step
     from shapechanger.demos.recording import Seen
-    from shapechanger.transfer.env_ref import EnvRef
-if TYPE_CHECKING:
-    from shapechanger.demos.episodes import Episode
     from shapechanger.link.messages import Welcome
     from shapechanger.remote.client import RobotClient
     from shapechanger.teleop import Terminal
+    from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["Replay", "film", "play_in_env", "play_on_robot"]
 

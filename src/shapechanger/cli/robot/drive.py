@@ -20,13 +20,10 @@ from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
-    from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-    from shapechanger.remote.client import RobotClient
-    from shapechanger.remote.known_robots import KnownRobot
-if TYPE_CHECKING:
-    from shapechanger.link.messages import Observation
-if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+    from shapechanger.link.messages import Observation
+    from shapechanger.remote.client import RobotClient
 
 __all__ = ["Drive", "Driving", "PolicyDriver", "load_pilot"]
 

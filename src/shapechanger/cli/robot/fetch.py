@@ -30,7 +30,6 @@ from shapechanger.errors import DemosError, RobotRefused, UnknownName
 from shapechanger.link.messages import EpisodeSummary, Piece
 
 if TYPE_CHECKING:
-    from shapechanger.link.messages import EpisodeSummary
     from shapechanger.remote.client import RobotClient
 
 __all__ = ["FetchEpisodes", "episodes_there", "fetch_episode", "recorded"]

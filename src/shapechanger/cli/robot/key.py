@@ -21,9 +21,8 @@ from shapechanger.link.address import parse_address
 from shapechanger.remote.known_robots import INSECURE
 
 if TYPE_CHECKING:
-    from shapechanger.robot.daemon.credentials import Credentials
-if TYPE_CHECKING:
     from shapechanger.remote.known_robots import KnownRobot
+    from shapechanger.robot.daemon.credentials import Credentials
 
 __all__ = [
     "Key",

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from shapechanger.cli.robot.trial.faults import Fault
     from shapechanger.cli.robot.trial.trial import Trial, TrialResult
     from shapechanger.remote.client import RobotClient
-    from shapechanger.robot.profile.profile import Profile
     from shapechanger.twin.robot import RunningRobot
 
 __all__ = ["Selftest", "SelftestResult", "check_jumper", "check_robot"]
