@@ -172,7 +172,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _egl_works() -> bool:
-    """Whether some EGL device opens; a library without a driver does not."""
+    """Return whether some EGL device opens; a library without a driver does not."""
     name = ctypes.util.find_library("EGL")
     if name is None:
         return False

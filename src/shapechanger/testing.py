@@ -193,7 +193,7 @@ def _layouts(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
 
 
 def _same(first: _Rollout, second: _Rollout) -> bool:
-    """Whether two rollouts are the same to the last bit, and equally long."""
+    """Return whether two rollouts are the same to the last bit, and equally long."""
     return len(first) == len(second) and all(
         all(map(np.array_equal, _arrays(x), _arrays(y))) and reward_x == reward_y
         for (x, reward_x), (y, reward_y) in zip(first, second, strict=True)

@@ -244,7 +244,7 @@ class Reshapable(MujocoEnv):
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo has found the state huge or not finite since the last reset.
+        """Return whether MuJoCo has found the state huge or not finite since the last reset.
 
         MuJoCo then restarts from the model's own pose, unless the model forbids it.
         """

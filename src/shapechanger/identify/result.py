@@ -82,7 +82,7 @@ class ParameterEstimate:
 
     @property
     def differs(self) -> bool:
-        """Whether the nominal value lies outside the interval."""
+        """Return whether the nominal value lies outside the interval."""
         return not self.low <= self.nominal <= self.high
 
 

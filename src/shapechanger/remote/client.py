@@ -159,7 +159,7 @@ class RobotClient:
 
     @property
     def pace(self) -> messages.Pace:
-        """Whether the clocks or the client set the pace."""
+        """Return whether the clocks or the client set the pace."""
         return self._access.pace
 
     @property

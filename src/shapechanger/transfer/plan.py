@@ -127,7 +127,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         return self.task.target.having({self.individual: run.index})
 
     def extends(self, other: Plan) -> bool:
-        """Whether this is the other study with more seeds, so that its runs count here."""
+        """Return whether this is the other study with more seeds, so that its runs count here."""
         return self.seeds > other.seeds and msgspec.structs.replace(other, seeds=self.seeds) == self
 
     def difference(self, other: Plan) -> str:

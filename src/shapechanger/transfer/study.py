@@ -322,7 +322,7 @@ def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
 
 
 def is_folder_of(plan: Plan, out: Path) -> bool:
-    """Whether `out` is the folder of this study, with as many seeds or fewer.
+    """Return whether `out` is the folder of this study, with as many seeds or fewer.
 
     Args:
         plan: The plan.

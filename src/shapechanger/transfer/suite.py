@@ -55,7 +55,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
     @property
     def halves(self) -> bool:
-        """Whether fine-tuning needs less than half as many steps as scratch."""
+        """Return whether fine-tuning needs less than half as many steps as scratch."""
         return self.fine_tune_steps is not None and self.fine_tune_steps < self.scratch_steps / 2
 
 

@@ -90,7 +90,7 @@ class Obstacle:
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a cylinder."""
+        """Return whether it is a cylinder."""
         return self.kind in ("plant", "cone", "post", "tree", "buoy", "bin")
 
 

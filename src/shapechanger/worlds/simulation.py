@@ -97,7 +97,7 @@ class MujocoWorld:
 
     @property
     def touches(self) -> bool:
-        """Whether the vehicle is in contact with a wall or an obstacle."""
+        """Return whether the vehicle is in contact with a wall or an obstacle."""
         return self._contacts.touches
 
     @property

@@ -120,7 +120,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     @property
     def gives(self) -> bool:
-        """Whether the tendons stretch."""
+        """Return whether the tendons stretch."""
         return self.tendon_stiffness is not None
 
     def replace(self, **changes: Any) -> FingerParameters:

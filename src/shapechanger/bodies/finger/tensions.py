@@ -175,7 +175,7 @@ def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
 
 
 def spans_all_torques(arms: ArrayLike) -> bool:
-    """Whether non-negative tensions can give every torque.
+    """Return whether non-negative tensions can give every torque.
 
     Args:
         arms: Moment arms, m, (tendons, joints).

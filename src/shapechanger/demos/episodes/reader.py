@@ -330,7 +330,7 @@ class Repair:
 
     @property
     def changed(self) -> bool:
-        """Whether the repair changed anything."""
+        """Return whether the repair changed anything."""
         return bool(self.lost or self.pictures or not self.was_closed)
 
 

@@ -223,7 +223,7 @@ class _Leaf:
 
     @property
     def is_picture(self) -> bool:
-        """Whether the space is one of pictures, with the colours last or first."""
+        """Return whether the space is one of pictures, with the colours last or first."""
         space = cast("Any", self.space)
         if not isinstance(space, spaces.Box) or cast("Any", space).dtype != np.uint8:
             return False

@@ -95,7 +95,7 @@ class FingerPlant:
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo has found the state huge or not finite since the last `place`."""
+        """Return whether MuJoCo has found the state huge or not finite since the last `place`."""
         return bool(self._warnings.any())
 
     def mark(self, place: NDArray[np.float64]) -> None:

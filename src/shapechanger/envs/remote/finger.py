@@ -236,7 +236,7 @@ class RemoteFingerEnv(FingerReachEnv):
 
     @property
     def exclusive(self) -> bool:
-        """Whether it blocks others from using the same robot; its own twin does not."""
+        """Return whether it blocks others from using the same robot; its own twin does not."""
         return self._own is None
 
     @property

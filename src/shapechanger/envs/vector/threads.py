@@ -156,7 +156,7 @@ class EnvThreads:
 
     @property
     def lost(self) -> bool:
-        """Whether an interruption left threads running; do not touch their envs."""
+        """Return whether an interruption left threads running; do not touch their envs."""
         return self._pool.lost
 
     def do(

@@ -322,7 +322,7 @@ def _is_segment(
     before: dict[str, tuple[Value, ...]],
     after: dict[str, tuple[Value, ...]],
 ) -> bool:
-    """Whether `_lengths` tells of this difference."""
+    """Return whether `_lengths` tells of this difference."""
     types = {*before.get("type", ()), *after.get("type", ())}
     return section == "geoms" and field == "size" and len(types) == 1 and types <= set(_ROUND)
 

@@ -128,7 +128,7 @@ class Rollout(msgspec.Struct, frozen=True):
 
     @property
     def identical(self) -> bool:
-        """Whether both gave the same numbers, the same rewards and the same end."""
+        """Return whether both gave the same numbers, the same rewards and the same end."""
         return (
             self.first_step is None
             and not self.only_in_source

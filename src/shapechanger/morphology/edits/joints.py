@@ -145,7 +145,7 @@ def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
 
 
 def _in_degrees(joint: mujoco.MjsJoint) -> bool:
-    """Whether the model writes this joint's angles in degrees."""
+    """Return whether the model writes this joint's angles in degrees."""
     return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
 
 

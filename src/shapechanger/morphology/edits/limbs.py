@@ -270,7 +270,7 @@ def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | 
 
 
 def _beyond(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> Callable[[np.ndarray], bool]:
-    """Whether a point lies farther out along the segment than `part` of its length."""
+    """Return whether a point lies farther out along the segment than `part` of its length."""
     held = anchor(body)
     along = far_end(spec, body) - held
     # A point exactly at the cut counts as within; rounding must not decide it.

@@ -75,7 +75,7 @@ class ValueEdit(Edit, frozen=True, tag=None):
 
     @staticmethod
     def _possible(value: float) -> bool:
-        """Whether the number can be set to this."""
+        """Return whether the number can be set to this."""
         return math.isfinite(value) and value >= 0.0
 
     def changed(self, old: float) -> float:

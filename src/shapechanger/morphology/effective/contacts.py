@@ -53,7 +53,7 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 
 
 def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
-    """Whether the type of one geom is among the affinities of the other.
+    """Return whether the type of one geom is among the affinities of the other.
 
     Their bodies, which carry the bits of all their geoms as they were compiled, must agree: bits
     that are set in a compiled model later have no effect.
@@ -64,12 +64,12 @@ def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
 
 
 def _meet(types: NDArray[np.int32], affinities: NDArray[np.int32]) -> _Bools:
-    """Whether the type of one of two is among the affinities of the other, shape (n,)."""
+    """Return whether the type of one of two is among the affinities of the other, shape (n,)."""
     return ((types[:, 0] & affinities[:, 1]) | (types[:, 1] & affinities[:, 0])) != 0
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
-    """Whether MuJoCo can collide the two shapes, and one of the two can move."""
+    """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
     flat = is_any(model.geom_type[pairs], mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
     return ~(flat[:, 0] & flat[:, 1]) & (moving[:, 0] | moving[:, 1])
@@ -87,7 +87,7 @@ def _not_related(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
 
 
 def _not_listed(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
-    """Whether the pair is neither excluded nor described by an explicit pair."""
+    """Return whether the pair is neither excluded nor described by an explicit pair."""
     bodies = np.sort(model.geom_bodyid[pairs], axis=1)
     excluded = np.isin((bodies[:, 0] << 16) + bodies[:, 1], model.exclude_signature)
     listed = np.sort(np.stack([model.pair_geom1, model.pair_geom2], axis=1), axis=1)

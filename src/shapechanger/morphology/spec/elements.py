@@ -183,7 +183,7 @@ def _joints_of(tendon: mujoco.MjsTendon) -> set[str]:
 
 
 def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
-    """Whether a tendon acts on its joints or is read: the humanoid's do neither."""
+    """Return whether a tendon acts on its joints or is read: the humanoid's do neither."""
     lower, upper = tendon.range
     automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss

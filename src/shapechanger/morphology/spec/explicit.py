@@ -71,7 +71,7 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
 
 
 def _is_trivial(frame: mujoco.MjsFrame) -> bool:
-    """Whether a frame changes nothing."""
+    """Return whether a frame changes nothing."""
     return (
         not np.any(frame.pos)
         and tuple(frame.quat) == _UPRIGHT

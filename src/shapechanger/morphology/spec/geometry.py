@@ -242,7 +242,7 @@ def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
 
 
 def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
-    """Whether mass and inertia are the body's own numbers instead of those of its geoms."""
+    """Return whether mass and inertia are the body's own numbers instead of those of its geoms."""
     from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     return bool(body.explicitinertial) and not from_geoms
 

@@ -138,7 +138,7 @@ class Session:
 
     @property
     def pace(self) -> Pace:
-        """Whether the robot's clock or the client sets the pace."""
+        """Return whether the robot's clock or the client sets the pace."""
         return "realtime" if self._hello is None else self._hello.pace
 
     @property

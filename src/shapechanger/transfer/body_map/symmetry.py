@@ -104,7 +104,7 @@ class Symmetry(msgspec.Struct, frozen=True):
         )
 
     def fits(self, observation: Layout, action: Layout) -> bool:
-        """Whether the symmetry fits the layouts of a body.
+        """Return whether the symmetry fits the layouts of a body.
 
         Args:
             observation: Layout of the body's observations.
@@ -158,7 +158,7 @@ def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
 
 
 def _close(a: float, b: float) -> bool:
-    """Whether two bounds are equal up to rounding, such as that of degrees to radians."""
+    """Return whether two bounds are equal up to rounding, such as that of degrees to radians."""
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
 
 

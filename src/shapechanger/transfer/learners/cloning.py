@@ -261,7 +261,7 @@ def require_camera_env(
 
 
 def is_clone(path: Path) -> bool:
-    """Whether a file holds a clone, rather than another policy or something else."""
+    """Return whether a file holds a clone, rather than another policy or something else."""
     try:
         with zipfile.ZipFile(path) as archive:
             return WEIGHTS in archive.namelist()

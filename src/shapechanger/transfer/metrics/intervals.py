@@ -178,7 +178,7 @@ def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> 
 
 
 def _spread(sample: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether the numbers along the last axis differ by more than rounding."""
+    """Return whether the numbers along the last axis differ by more than rounding."""
     size = np.abs(sample).max(axis=-1)
     return np.asarray(np.ptp(sample, axis=-1) > np.maximum(_LEAST_SPREAD, _ROUNDING * size))
 

@@ -196,7 +196,7 @@ class CourseExpert:
 
     @property
     def recovering(self) -> bool:
-        """Whether a recovery manoeuvre is active."""
+        """Return whether a recovery manoeuvre is active."""
         return self._recovery.active
 
     def reset(self, pose: Pose) -> None:

@@ -74,7 +74,7 @@ class Recovery:
 
     @property
     def active(self) -> bool:
-        """Whether a manoeuvre is being driven."""
+        """Return whether a manoeuvre is being driven."""
         return bool(self._moves)
 
     def watch(

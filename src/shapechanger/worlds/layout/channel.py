@@ -148,7 +148,7 @@ def dig_channel(
 
 
 def _winds(line: NDArray[np.float64]) -> bool:
-    """Whether a line turns to both sides by at least `_WIND_RAD` in sum."""
+    """Return whether a line turns to both sides by at least `_WIND_RAD` in sum."""
     turned = turn_angles(line)
     return bool(turned[turned > 0.0].sum() > _WIND_RAD < -turned[turned < 0.0].sum())
 

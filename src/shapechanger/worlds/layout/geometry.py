@@ -229,7 +229,7 @@ def distances_to_segments(points: NDArray[np.float64], pieces: Segments) -> NDAr
 
 
 def any_crossing(pieces: Segments) -> bool:
-    """Whether any two segments cross; a common end does not count."""
+    """Return whether any two segments cross; a common end does not count."""
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
     def side(points: NDArray[np.float64]) -> NDArray[np.float64]:
