@@ -1,4 +1,4 @@
-"""What each number of an observation or an action means.
+"""Layouts: the meaning of each number of an observation or an action.
 
 A `Layout` is an ordered list of `Feature`s. Every embodiment, simulated or real, publishes two:
 one for what it senses and one for what it moves. Transfer is a map between two layouts.
@@ -94,7 +94,7 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def size(self) -> int:
-        """How many numbers the feature holds."""
+        """Size of the feature."""
         return math.prod(self.shape)
 
     @property
@@ -106,7 +106,7 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Layout(msgspec.Struct, frozen=True):
-    """What each number of a flat observation or action means, in order.
+    """Meaning of each number of a flat observation or action, in order.
 
     Attributes:
         features: The features; a block of n numbers takes n places, in C order.
@@ -156,7 +156,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @property
     def size(self) -> int:
-        """How many numbers the flat vector holds."""
+        """Size of the flat vector."""
         return sum(feature.size for feature in self.features)
 
     @property

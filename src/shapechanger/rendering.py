@@ -36,7 +36,7 @@ _PROBE: Final = 16
 
 
 def has_screen() -> bool:
-    """Whether a window can be opened: always on macOS and Windows, with a display on Linux."""
+    """Return whether a window can be opened: on Linux only with a display."""
     return sys.platform != "linux" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
@@ -167,7 +167,7 @@ def _require_glfw() -> None:
 
 
 def _first_line(error: Exception) -> str:
-    """What an error says, in one line."""
+    """Return the message of an error on one line."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
 
 

@@ -185,7 +185,7 @@ def examine(make: MakeEnv) -> Iterator[str]:
 
 
 def _layouts(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """What the numbers of the env mean."""
+    """Return the layouts of the env."""
     try:
         return layouts_of(env)
     except LayoutError as error:

@@ -78,16 +78,16 @@ class RecordFinger:
     out: Path
     """The log to write, such as finger.npz."""
     seconds: float = 10.0
-    """How long, s."""
+    """Duration, s."""
     seed: int = 0
     """Seed of the motions."""
     actions: str = "impedance"
-    """What an action commands: impedance, tension or length."""
+    """Meaning of an action: impedance, tension or length."""
     gap: str = ""
     """Name of the gap that the finger is drawn from, such as real-like; empty for the nominal
     finger."""
     finger_seed: int = 0
-    """Which finger of the gap."""
+    """Seed of the finger drawn from the gap."""
     options: str = ""
     """More arguments of the env as JSON, such as '{"robot": "my-finger"}'."""
 

@@ -34,7 +34,7 @@ class Play:
     out: Path | None = None
     """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
     episodes: int = 1
-    """How many episodes."""
+    """Number of episodes."""
     seed: int = 0
     """Seed of the starts, and of random actions."""
     max_steps: int = 1000

@@ -70,7 +70,7 @@ class Transfer:
     target_body: str = ""
     """Another body of the target's family: its name, or edits as JSON."""
     target_lens: tuple[str, ...] = ()
-    """What is wrong with the target's camera, for a vehicle: night, glare, blur or dirt."""
+    """Disturbances of a vehicle's target camera: night, glare, blur or dirt."""
     source_options: str = ""
     """More arguments of the source as JSON, such as '{"actions": "length"}'."""
     target_options: str = ""
@@ -78,7 +78,7 @@ class Transfer:
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
     arms: tuple[Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"], ...] = ()
-    """What to compare; scratch is always needed. If not given, scratch, zero-shot and fine-tune;
+    """Arms to compare; scratch is required. The default is scratch, zero-shot and fine-tune;
     where the target is the same task in another finger, also what is learned in a source that was
     randomised, and in one that was identified by the target's motion."""
     rule: tuple[str, ...] = ()
@@ -87,7 +87,7 @@ class Transfer:
     map: Path | None = None
     """The body map as a TOML file, in place of --rule and --units."""
     units: Literal["same", "torque"] = "same"
-    """Whether actions map as they are, or by the torque that they give."""
+    """Whether actions are mapped directly or by the torque that they produce."""
     seed: int = 0
     """Number that the seeds of all runs are drawn from."""
     workers: int | None = None

@@ -1,4 +1,4 @@
-"""Who drives while an episode is recorded: an expert, a policy, or a policy with corrections.
+"""Drivers of recorded episodes: an expert, a policy, or a policy with corrections.
 
 With corrections the policy drives, and an expert takes over where it goes wrong: M. Kelly et al.,
 "HG-DAgger: Interactive Imitation Learning with Human Experts", ICRA 2019. There a person decides

@@ -298,7 +298,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     @property
     def is_healthy(self) -> bool:
-        """Whether the state is finite, and the torso upright and within its healthy heights."""
+        """Return whether the state is finite and the torso upright within its healthy heights."""
         return bool(super().is_healthy) and self.up > 0.0
 
 

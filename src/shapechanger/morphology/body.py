@@ -139,7 +139,7 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
 
 
 def _key(edit: Edit) -> Hashable:
-    """What must be equal for two edits to be one edit at two strengths: all but its numbers."""
+    """Return the part of an edit that is equal at different strengths: all but its numbers."""
     values: dict[str, Any] = msgspec.structs.asdict(edit)
     return type(edit), tuple(
         (k, None if _is_number(v) else v)

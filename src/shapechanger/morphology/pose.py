@@ -50,7 +50,7 @@ class Lift(NamedTuple):
         pose[self.place] += self.up * distance_m
 
     def height(self, pose: _Array) -> float:
-        """How high the trunk's origin is at a pose (nq,), m."""
+        """Return the height of the trunk's origin at a pose (nq,), m."""
         return float(self.at_zero_m + self.up * pose[self.place])
 
     def number_at(self, height_m: float) -> float:
@@ -65,7 +65,7 @@ def trunk_joint(model: mujoco.MjModel) -> int | None:
 
 
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
-    """What raises the trunk; None for a body that is fixed to the world or moves in a plane on it.
+    """Return the coordinate that raises the trunk; None for a body that cannot be raised.
 
     That of the first free joint; without one, the first vertical slide of a body that hangs on the
     world, unless it has limits: a hoist does not stand.
@@ -106,7 +106,7 @@ def keep_within_limits(model: mujoco.MjModel, pose: _Array) -> _Array:
 
 
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
-    """How high the trunk's origin is when the lowest point touches the floor, m.
+    """Return the height of the trunk's origin when the lowest point touches the floor, m.
 
     Args:
         model: The body.
@@ -128,7 +128,7 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
 
 
 def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """How far the body's lowest point is above the floor, m; negative when it is inside.
+    """Return the clearance of the body's lowest point above the floor, m; negative inside it.
 
     `data` must hold the geoms' places, as after `mj_kinematics`. The floor is every plane and
     height field that is fixed to the world and can touch the body's geoms; 1000 where there is
@@ -145,7 +145,7 @@ def _gap_at(model: mujoco.MjModel, pose: _Array) -> float:
 
 
 class StartRules:
-    """What makes a start pose possible, read from a model once: for envs that start often.
+    """Rules for possible start poses, read from a model once.
 
     Attributes:
         lift: What raises the trunk, as of `trunk_lift`.

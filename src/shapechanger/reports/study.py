@@ -194,7 +194,7 @@ def _measure_table(arm: Arm, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 
 def _scale(summary: Summary) -> str:
-    """What a score is, or why there are none."""
+    """Describe the score, or why there is none."""
     random, final = number(summary.reference.random), number(summary.reference.final)
     if summary.unit == "return":
         return (
@@ -242,7 +242,7 @@ def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
 
 
 def _body_map(ours: BodyMap) -> dict[str, Any]:
-    """Which rule fills which entry: entries of the same name counted, all others listed."""
+    """Describe the map: entries of the same name are counted, all others are listed."""
     rows = ours.table()
     matched = [row for row in rows if row.why == SAME_NAME]
     groups: dict[tuple[str, str, str], list[str]] = {}

@@ -178,7 +178,7 @@ def _merge_notes(target: str, total: str) -> str:
 def _reached(
     arm: Arm, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
 ) -> str:
-    """How many seeds reached a threshold, and how soon; empty where undefined."""
+    """Describe how many seeds reached a threshold and how soon; empty if undefined."""
     if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
         return ""
     reaches = (in_target.arm, in_total.arm, in_target.scratch)
@@ -373,7 +373,7 @@ def scratch_gain(study: Study) -> Estimate:
 
 
 def source_takes_all(summary: Summary) -> bool:
-    """Whether the source used up the budget, so that none is left for the target in total steps.
+    """Return whether the source used up the budget of total steps.
 
     Every measure in total steps but the jumpstart then compares the random policy with scratch.
     """

@@ -125,7 +125,7 @@ class _CertifiesShift(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EnvTraits:
-    """What a study reads from an env once.
+    """Properties of an env, read once per study.
 
     Attributes:
         observation_layout: Meaning of an observation.
@@ -169,7 +169,7 @@ def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
 
 
 def is_single_instance(env: gym.Env[Any, Any]) -> bool:
-    """Whether only one instance of the env can exist, as of a robot: `side_by_side = False`."""
+    """Return whether only one instance can exist, as of a robot: `side_by_side = False`."""
     return not getattr(env.unwrapped, "side_by_side", True)
 
 

@@ -92,7 +92,7 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TaskTraits(NamedTuple):
-    """What a study reads from its two envs.
+    """Properties of the two envs of a study.
 
     Attributes:
         source: Traits of the source.

@@ -170,7 +170,7 @@ class RecordDemonstrations:
     out: Path
     """Folder of the recording; what is there already stays, and more comes to it."""
     minutes: float = 10.0
-    """How long, in minutes of the env."""
+    """Duration, minutes of the env's time."""
     driver: str = EXPERT
     """"expert", or the file of a policy."""
     trust: bool = False
@@ -183,7 +183,7 @@ class RecordDemonstrations:
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     lenses: tuple[str, ...] = ()
-    """What is wrong with a vehicle's camera, such as night."""
+    """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False
     """Put a vehicle that runs into something back on its lane, in place of ending the episode."""
     options: str = ""

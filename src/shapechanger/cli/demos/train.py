@@ -39,11 +39,11 @@ class TrainClone:
     out: Path
     """The file to write, such as policy.zip; policy.html and policy.json come beside it."""
     head: Literal["auto", "class", "regression"] = "auto"
-    """What comes out: one of the actions that were shown (at most 16), or numbers."""
+    """Output: one of the demonstrated actions (at most 16), or numbers."""
     inputs: Literal["auto", "picture", "state", "both"] = "auto"
-    """What goes in; pictures where there are any, and the state elsewhere, if not given."""
+    """Input; by default frames if there are any, else the state."""
     split: Literal["time", "episode"] = "time"
-    """What judges the policy: the last stretch of time, or the last whole episodes."""
+    """Held-out data: the last stretch of time, or the last complete episodes."""
     held_out: float = 0.2
     """Share of the steps that judges the policy and is not learned from; 0 to learn from all."""
     seed: int = 0

@@ -24,7 +24,7 @@ class Find:
     """List the robots on this network."""
 
     seconds: float = 2.0
-    """How long to listen."""
+    """Time to listen, s."""
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
@@ -56,9 +56,9 @@ class Remember:
     """Store a robot's address and key under a name."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
-    """What to call it."""
+    """Local name of the robot."""
     address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
-    """Where it is, as HOST or HOST:PORT."""
+    """Address, as HOST or HOST:PORT."""
     fingerprint: str
     """SHA-256 of its certificate, as the robot shows it; "insecure" for no TLS."""
 
@@ -76,7 +76,7 @@ class Forget:
     """Remove a known robot."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
-    """What it is called here."""
+    """Local name of the robot."""
 
     def run(self) -> None:
         """Remove its file."""

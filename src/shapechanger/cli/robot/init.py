@@ -20,7 +20,7 @@ class Init:
     """Create the profile, key and certificate of a new robot."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND")]
-    """What it is like: the name of a profile that comes with Shapechanger, such as car."""
+    """Name of a shipped profile, such as car."""
     name: str = ""
     """Name of the robot; that of its kind if not given."""
     out: Path | None = None

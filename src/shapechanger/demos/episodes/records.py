@@ -148,7 +148,7 @@ def _layout_size(layout: str) -> int:
 
 
 Driver = Literal["person", "policy", "expert", "program"]
-"""Who decided: a person, a learned policy, an expert with full state, or another program."""
+"""Kinds of drivers: a person, a learned policy, an expert with full state, or a program."""
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 

@@ -168,7 +168,7 @@ def _box(layout: Layout) -> spaces.Box:
 
 @dataclass(frozen=True, kw_only=True)
 class _Observed:
-    """What a step observes.
+    """Return the observation of a step.
 
     Attributes:
         state: Layout of the state; None without a state.

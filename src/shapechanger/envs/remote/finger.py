@@ -107,7 +107,7 @@ class RemoteFingerEnv(FingerReachEnv):
     """
 
     side_by_side: ClassVar[bool] = False
-    """Whether several may run at once: a rig is a single one, and a twin takes many processes."""
+    """Whether several can run at once: there is one rig, and a twin needs many processes."""
 
     def __init__(
         self,

@@ -24,7 +24,7 @@ from shapechanger.tasks.drive import DriveReward
 __all__ = ["LATE", "OnReset", "RemoteVehicleEnv", "Schedule", "frame_age_s", "latencies"]
 
 OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
-"""How a reset brings the robot to the start."""
+"""Kind of reset."""
 
 LATE: Final = 0.5
 """Delay of a step up to which its deadline is met, as a share of the control period."""

@@ -1,4 +1,4 @@
-"""What an environment must offer so that its shift can be certified; Gymnasium is not imported."""
+"""Protocols of environments whose shifts can be certified, without Gymnasium."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ __all__ = ["Certificate", "certify"]
 
 
 class Certificate(msgspec.Struct, frozen=True):
-    """What a target does differently from its source.
+    """Certified differences between a target and its source.
 
     Attributes:
         source: Label of the source.

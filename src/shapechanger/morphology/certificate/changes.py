@@ -41,7 +41,7 @@ _DIGITS: Final = (4, 8, 17)
 
 
 class Change(msgspec.Struct, frozen=True):
-    """What is different in the target.
+    """One difference between the target and the source.
 
     Attributes:
         quantity: What changed, such as "mass", "length", "contact friction" or "gear"; the kind of
@@ -91,7 +91,7 @@ def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
 
 
 def _plain(values: Sequence[float | str] | None) -> Amount:
-    """What JSON can hold: one value for itself, and no infinite number."""
+    """Convert values for JSON: a single value stays scalar, infinite numbers become strings."""
     if values is None:
         return None
     finite = tuple(
@@ -101,7 +101,7 @@ def _plain(values: Sequence[float | str] | None) -> Amount:
 
 
 def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
-    """What a sentence says after the name of the element."""
+    """Format the part of a sentence after the name of the element."""
     suffix = f" {unit}" if unit not in ("", "1") else ""
     if quantity in _WHOLE:
         there = before if after is None else after

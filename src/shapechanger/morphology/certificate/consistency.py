@@ -1,4 +1,4 @@
-"""Whether the numbers of a compiled model fit together.
+"""Consistency of the numbers of a compiled model.
 
 A compiled model can be written to. Mass without inertia, or either without `mujoco.mj_setConst`,
 leaves a robot that is neither the old one nor the new one: MuJoCo softens contacts and limits by
@@ -58,7 +58,7 @@ _FLAGS: Final = {
 
 
 def inconsistencies(model: mujoco.MjModel) -> tuple[str, ...]:
-    """What does not fit together in a model, one sentence each; empty if all does.
+    """Return the inconsistencies of a model, one sentence each.
 
     Checked are the inertia of every body that can move, and the constants that
     `mujoco.mj_setConst` computes, against a recomputed copy.

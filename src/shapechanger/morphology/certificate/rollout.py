@@ -91,7 +91,7 @@ _EARLY_TOLERANCE: Final = 1e-8
 
 
 class Rollout(msgspec.Struct, frozen=True):
-    """How two environments answered the same commands.
+    """Responses of two environments to the same commands.
 
     Step 0 is the reset; step n is the answer to the n-th command.
 
@@ -215,7 +215,7 @@ def compare_rollouts(
 
 @dataclass(frozen=True, slots=True)
 class _Episode:
-    """What one environment answered."""
+    """Responses of one environment."""
 
     observations: list[_Floats]
     rewards: list[float]

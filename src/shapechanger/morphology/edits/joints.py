@@ -62,7 +62,7 @@ class JointRange(Edit, frozen=True):
             set_limits(joint, *new)
 
     def _far_limits(self, joint: mujoco.MjsJoint) -> tuple[float, float]:
-        """Where the limits of a slide that has none come from: the farther, the smaller the part.
+        """Return the starting limits for a slide without limits: the smaller the part, the wider.
 
         Raises:
             MorphologyError: If the edit gives one limit only.

@@ -1,4 +1,4 @@
-"""What a compiled model effectively does, whichever way it was written, and its fingerprint."""
+"""Effective models: what decides a compiled model's motion, and its fingerprint."""
 
 from __future__ import annotations
 

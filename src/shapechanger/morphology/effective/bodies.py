@@ -121,7 +121,7 @@ _SIZE_COUNT: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, 
 
 
 def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
-    """Where each of the bodies that matter sits on its parent, and what it weighs."""
+    """Return pose, mass and inertia of the bodies that matter."""
     rows = Rows(names.bodies)
     moving = model.body_treeid >= 0
     free = np.zeros(model.nbody, np.bool_)
@@ -163,7 +163,7 @@ def bodies_that_matter(model: mujoco.MjModel, carrying: _Bools) -> _Bools:
 
 
 def joints(model: mujoco.MjModel, names: Names) -> Section:
-    """How each joint moves and what resists it; angles in rad."""
+    """Return type, axis, limits and resistance of the joints; angles in rad."""
     rows = Rows(names.joints)
     kinds = [word(mujoco.mjtJoint(kind)) for kind in model.jnt_type.tolist()]
     kind = np.asarray(kinds, np.str_)

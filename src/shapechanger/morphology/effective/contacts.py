@@ -1,4 +1,4 @@
-"""What a contact between two geoms is, after MuJoCo has combined what the two say.
+"""Contact parameters of pairs of geoms, combined as MuJoCo does.
 
 A geom's friction is no fact of the simulation: the contact takes the larger of the two geoms'
 coefficients, so a slippery foot on a rough floor is a rough foot. These are the rules by which
@@ -76,7 +76,7 @@ def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
 
 
 def _not_related(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
-    """Whether the bodies are neither welded together nor parent and child (the world is none)."""
+    """Return which bodies are neither welded together nor parent and child (except the world)."""
     weld = model.body_weldid[model.geom_bodyid[pairs]]
     distinct = weld[:, 0] != weld[:, 1]
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
@@ -206,7 +206,7 @@ def effective_contacts(model: mujoco.MjModel, names: Names | None = None) -> dic
 
 
 def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
-    """What the solver makes of reference parameters, shape (n, 2).
+    """Return reference parameters as the solver uses them, shape (n, 2).
 
     A positive time constant is raised to two time steps, unless `refsafe` is off or the integrator
     is `discrete`, which is stable at any.
@@ -222,7 +222,7 @@ def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
 
 
 def _explicit_rows(model: mujoco.MjModel, explicit: _Ints) -> _Rows:
-    """What explicit pairs say about themselves."""
+    """Return the parameters of explicit pairs."""
     return _Rows(
         dim=model.pair_dim[explicit].astype(np.int64),
         friction=model.pair_friction[explicit],
@@ -236,7 +236,7 @@ def _explicit_rows(model: mujoco.MjModel, explicit: _Ints) -> _Rows:
 
 
 def _mixed(model: mujoco.MjModel, pairs: _Ints) -> _Rows:
-    """What two geoms make of their parameters."""
+    """Return the mixed parameters of pairs of geoms."""
     first, second = pairs[:, 0], pairs[:, 1]
     one = model.geom_priority[first] > model.geom_priority[second]
     two = model.geom_priority[first] < model.geom_priority[second]

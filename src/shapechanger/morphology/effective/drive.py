@@ -40,7 +40,7 @@ _GAINS_WITH_INPUTS: Final = (_GAIN.mjGAIN_SO3, _GAIN.mjGAIN_PID, _GAIN.mjGAIN_DC
 
 
 def actuators(model: mujoco.MjModel, names: Names) -> Section:
-    """What each actuator pulls on, and how a control becomes a force."""
+    """Return transmissions, gains, biases and dynamics of the actuators."""
     rows = Rows(names.actuators)
     transmissions = [_TRN(kind) for kind in model.actuator_trntype.tolist()]
     gains = [_GAIN(kind) for kind in model.actuator_gaintype.tolist()]
@@ -107,7 +107,7 @@ def tendons(model: mujoco.MjModel, names: Names) -> Section:
 
 
 def equalities(model: mujoco.MjModel, names: Names) -> Section:
-    """What the model holds together."""
+    """Return the equality constraints."""
     rows = Rows(names.equalities)
     kinds = [mujoco.mjtEq(kind) for kind in model.eq_type.tolist()]
     rows.words("type", map(word, kinds))

@@ -39,7 +39,7 @@ _TARGET: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What the elements are called, in the model's order; within each kind no name occurs twice.
+    """Names of the elements in the model's order, unique within each kind.
 
     Attributes:
         bodies: Names of the bodies, the world first.
@@ -118,7 +118,7 @@ def names_of(model: mujoco.MjModel) -> Names:
 
 
 def _kind_of_target(transmission: int, *, joint_like: bool) -> str:
-    """Which elements an actuator of this transmission drives."""
+    """Return the kind of element that an actuator with this transmission drives."""
     so3 = "joints" if joint_like else "sites"  # A ball joint, or a site with its reference site.
     return _TARGET.get(mujoco.mjtTrn(transmission), so3)
 
@@ -155,7 +155,7 @@ class _Member(Protocol):
 
 
 def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.bool_]:
-    """Which of `values` is one of some members of a MuJoCo enumeration."""
+    """Return which of `values` are among some members of a MuJoCo enumeration."""
     return np.isin(values, [int(member) for member in members])
 
 
@@ -165,7 +165,7 @@ def named(names: tuple[str, ...], indices: NDArray[np.integer]) -> list[str]:
 
 
 def word(member: _Member) -> str:
-    """What a member of a MuJoCo enumeration is called: `mjJNT_HINGE` becomes `hinge`."""
+    """Return the name of a member of a MuJoCo enumeration: `hinge` for `mjJNT_HINGE`."""
     return member.name.partition("_")[2].lower()
 
 

@@ -35,7 +35,7 @@ _Bools = NDArray[np.bool_]
 
 
 class EffectiveModel(msgspec.Struct, frozen=True):
-    """What a model does, as names and numbers in SI units, angles in rad.
+    """Effective model: all that decides motion, as names and numbers in SI units, angles in rad.
 
     Joints and actuators stand in the order of the model, which decides what the numbers of its
     state and its control mean; everything else is sorted by name.
@@ -56,7 +56,7 @@ class EffectiveModel(msgspec.Struct, frozen=True):
 
 
 def effective_model(model: mujoco.MjModel) -> EffectiveModel:
-    """What decides the motion of a compiled model.
+    """Extract everything that decides the motion of a compiled model.
 
     The sections are `options`, `sizes`, `bodies`, `joints`, `geoms`, `sites`, `contacts`,
     `actuators`, `tendons`, `equalities`, `flexes`, `plugins` and `derived`. The last holds what
@@ -188,5 +188,5 @@ def _text(text: str) -> bytes:
 
 
 def _count(items: tuple[object, ...]) -> bytes:
-    """How many items follow."""
+    """Encode the number of items that follow."""
     return struct.pack("<I", len(items))

@@ -99,7 +99,7 @@ _DERIVED: Final = (
 
 
 def options(model: mujoco.MjModel) -> Section:
-    """How time passes, what surrounds the bodies, and how the solver works."""
+    """Return timestep, gravity, medium and solver options."""
     option = model.opt
     rows = Rows(("simulation",))
     for name in _NUMBERS:
@@ -127,7 +127,7 @@ def options(model: mujoco.MjModel) -> Section:
 
 
 def sizes(model: mujoco.MjModel) -> Section:
-    """How many numbers position, velocity, control and activation have."""
+    """Return the sizes of position, velocity, control and activation."""
     rows = Rows(_SIZES)
     rows.numbers("dimensions", [getattr(model, name) for name in _SIZES])
     return rows.section(in_order=True)
@@ -159,7 +159,7 @@ def plugins(model: mujoco.MjModel) -> Section:
 
 
 def derived(model: mujoco.MjModel, kept: NDArray[np.bool_], geoms: NDArray[np.bool_]) -> Section:
-    """What `mujoco.mj_setConst` computes from the rest and the solver then relies on.
+    """Return the constants of `mujoco.mj_setConst` that the solver relies on.
 
     Args:
         model: The compiled model.

@@ -1,4 +1,4 @@
-"""What a model says indirectly, said outright: names, frames and a total mass.
+"""Make implicit parts of a model explicit: names, frames and a total mass.
 
 Edits change numbers in place. A name that is missing cannot be asked for, a pose that is seen from
 a frame has other axes than its body, and a total mass that the compiler restores undoes any change.
@@ -114,7 +114,7 @@ def _write_pose(element: mujoco.MjsGeom | mujoco.MjsSite) -> None:
 
 
 class _Pose(NamedTuple):
-    """Where frames are in their body's frame: quaternion (w, x, y, z) and position, m."""
+    """Pose of frames in their body's frame: quaternion (w, x, y, z) and position, m."""
 
     turn: Array
     shift: Array

@@ -70,7 +70,7 @@ def orientation(spec: mujoco.MjSpec, element: _Oriented) -> Array:
 
 
 def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
-    """Whether an element, which may be a box or an ellipsoid too, is given by its axis' ends."""
+    """Return whether an element, even a box or an ellipsoid, is given by its axis' ends."""
     return not math.isnan(element.fromto[0])
 
 
@@ -117,7 +117,7 @@ def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
 
 
 def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
-    """Where a point of a segment comes to lie when what holds it at `held` stays, m."""
+    """Return a point of a segment after stretching around `held`, m."""
     scale = np.full(3, factor)
     if axis is not None:
         scale = np.ones(3)
@@ -217,12 +217,12 @@ _TURNING: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
 
 
 def anchor(body: mujoco.MjsBody) -> Array:
-    """Where the segment is held, in its own frame, m."""
+    """Return the anchor of the segment in its own frame, m."""
     return next((np.array(j.pos) for j in body.joints if j.type in _TURNING), np.zeros(3))
 
 
 def held_at(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
-    """Where the segment is held, in its parent's frame, m."""
+    """Return the anchor of the segment in its parent's frame, m."""
     return body.pos + rotation(orientation(spec, body)) @ anchor(body)
 
 

@@ -147,7 +147,7 @@ class Heartbeat:
         self._period_ns = round(period_s * 1e9)
         self._beaten_ns = 0
         self.lost = False
-        """Whether the supervisor is gone."""
+        """Return whether the supervisor has died."""
 
     def fileno(self) -> int:
         """Return the file descriptor to wait for."""

@@ -89,9 +89,9 @@ class Guard:
         self._sent: GuardState | None = None
         self._said = ""
         self.is_safe = True
-        """Whether all outputs obeyed when they were closed."""
+        """Return whether all outputs obeyed on closing."""
         self.ended = ""
-        """Why it ends, in words; empty while it does not."""
+        """Reason for ending; empty while it runs."""
 
     def run(self, heartbeat: Heartbeat) -> None:
         """Run until asked to end.

@@ -17,7 +17,7 @@ __all__ = ["Learner", "PolicyOrigin"]
 
 
 class PolicyOrigin(NamedTuple):
-    """Where a stored policy comes from.
+    """Origin of a stored policy.
 
     Attributes:
         env: The env that it was trained in.

@@ -239,7 +239,7 @@ class Reference(msgspec.Struct, frozen=True):
 
     @property
     def defined(self) -> bool:
-        """Whether scores exist: scratch ended above the random policy by more than rounding."""
+        """Return whether scores exist: scratch ended above the random policy beyond rounding."""
         size = max(1.0, abs(self.random), abs(self.final))
         return self.final - self.random > _SAME * size
 

@@ -169,7 +169,7 @@ def _squared_error(sample: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> str:
-    """Why these samples have no interval; empty if they have one."""
+    """Return why these samples have no interval; empty if they have one."""
     if min(arm.size, scratch.size) < 2:
         return _TOO_FEW
     if not (_spread(arm) | _spread(scratch)):

@@ -111,7 +111,7 @@ def check_supported(model: object) -> None:
 
 
 def _problem(model: object) -> str:
-    """Why the model is not supported, as a sentence; empty if it is."""
+    """Return why the model is not supported, as a sentence; empty if it is."""
     if not isinstance(model, PPO | SAC):
         return f"This model is {type(model).__name__}."
     extractors = [m for m in model.policy.modules() if isinstance(m, BaseFeaturesExtractor)]

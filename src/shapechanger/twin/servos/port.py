@@ -8,7 +8,7 @@ __all__ = ["ServoPort"]
 
 
 class ServoPort:
-    """What the SDK's packet handler needs of a port, without real time.
+    """Port for the SDK's packet handler, without real time.
 
     The simulated servos answer at once. An answer that is late or missing counts as timed out as
     soon as the SDK asks.

@@ -104,7 +104,7 @@ class Room:
     def cast(
         self, x: float, y: float, directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
-        """Where rays from a point end.
+        """Return the end points of rays from a point.
 
         Args:
             x: Of the point.
