@@ -203,6 +203,8 @@ def test_no_envs_are_refused() -> None:
     """A vector env has at least one env."""
     with pytest.raises(VectorEnvError, match="at least one env, got 0"):
         ThreadVectorEnv([])
+    with pytest.raises(VectorEnvError, match="at least one thread, got 0"):
+        ThreadVectorEnv([lambda: _Bounded(1.0)], threads=0)
 
 
 class _Bounded(gym.Env[Any, Any]):

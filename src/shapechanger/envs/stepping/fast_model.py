@@ -90,9 +90,10 @@ def find_fast_model(
 
 
 def forget_fast_models() -> None:
-    """Clear the cache, to measure the time of a search."""
+    """Clear the cache and the counted demand, to measure the time of a search."""
     with _lock:
         _fast_models.clear()
+        _demands.clear()
 
 
 class Demand:

@@ -305,7 +305,7 @@ class TunedStep(Reshapable):
 
     def _bind(self, watch: ModelWatch) -> Binding:
         """Return views of the present data."""
-        return Binding(watch, self.data, self.frame_skip)
+        raise NotImplementedError
 
     def _ready(self) -> Any:
         """Return the binding to step with; None where Gymnasium's methods must step."""
