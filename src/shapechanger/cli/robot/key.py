@@ -41,13 +41,12 @@ class Key:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name of the robot."""
     credentials: Path | None = None
-    """Folder of its key and certificate, if not the one that `init` made."""
+    """Folder of its key and certificate; by default the one that `init` made."""
     qr: bool = False
-    """Show the picture that brings a phone to the console. It holds the key: show it to nobody who
-    must not drive."""
+    """Show a QR code that opens the console on a phone. It contains the key, so keep it private."""
     address: str = ""
-    """With --qr: where the phone reaches the robot, HOST or HOST:PORT; this machine's name if not
-    given."""
+    """With --qr: address of the robot for the phone, HOST or HOST:PORT; by default this machine's
+    name."""
 
     def run(self) -> None:
         """Print them, and the command that stores them on another computer."""
