@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-import shapechanger.envs.stepping.fast_model as twins
+from shapechanger.envs.stepping import fast_model
 from benchmarks.row import Row
 from shapechanger.envs.stepping.tuned import paused_timer
 
@@ -173,10 +173,10 @@ def _search_row() -> Row:
     times: list[float] = []
     with gym.make("shapechanger/Ant-v1") as env:
         inner: Any = env.unwrapped
-        watch = twins.ModelWatch(inner.model)
+        watch = fast_model.ModelWatch(inner.model)
         for _ in range(15):
-            twins.forget()
-            times.append(1e3 * _cpu_s(lambda: twins.find_twin(watch, inner.body_spec)))
+            fast_model.forget_fast_models()
+            times.append(1e3 * _cpu_s(lambda: fast_model.find_fast_model(watch, inner.body_spec)))
     times.sort()
     return Row(
         "finding the fast model of Ant, once a body, CPU time",
