@@ -24,6 +24,11 @@ _CASES: dict[str, list[dict[str, Any]]] = {
     "arrays": [{"a": _VECTOR}, {"a": _VECTOR + 1}, {}],
     "words": [{"a": "x", "b": None}, {"a": "yy", "b": (1, 2)}],
     "in one another": [{"a": {"b": 1.0, "c": {"d": 2}}}, {}, {"a": {"c": {"d": 3}, "e": "x"}}],
+    "another order within": [
+        {"final_info": {}, "final_obs": _VECTOR},
+        {"final_obs": _VECTOR, "final_info": {"a": 0.0}},
+        {"final_info": {"b": 0.0}, "final_obs": _VECTOR},
+    ],
     "ends": [
         {"a": 1.0},
         {"final_obs": _VECTOR, "final_info": {"a": 2.0}, "a": 3.0},

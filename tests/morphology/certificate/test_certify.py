@@ -39,6 +39,12 @@ def test_an_empty_shift_is_refused() -> None:
         certify(Swing(), Swing())
 
 
+def test_an_env_without_a_model_gets_no_certificate() -> None:
+    """Nothing is compared, and the env is named."""
+    with pytest.raises(MorphologyError, match="CartPole-v1 has no model that could be compared"):
+        certify(gymnasium.make("CartPole-v1"), Swing())
+
+
 def test_an_empty_shift_may_be_asked_for() -> None:
     """Then the certificate itself says that it is empty."""
     certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)

@@ -593,3 +593,14 @@ def test_temperature_protects_too() -> None:
     rules = _driving(plan)
     rules.sense(Sensing(failures={"chip": "No file."}), _T0)
     assert "Sensor chip" in rules.tick(_T0).stop_reason
+
+
+@pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])
+def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
+    """Failed servos have released their tendons: a person has to look before they pull again."""
+    plan = replace(quick_car(), sensors=(SensorPlan("spools", "dynamixel", "tendons"),))
+    rules = _driving(plan)
+    late = frozenset({"spools"}) if slow else frozenset[str]()
+    rules.sense(Sensing(failures={"spools": "Overload."}, slow=late), _T0)
+    assert rules.arming.armed is armed
+    assert rules.tick(_T0).actions == (0.0, 0.0)

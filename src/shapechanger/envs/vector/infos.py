@@ -37,17 +37,35 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group the infos of the envs `numbers` by their keys."""
-    groups: dict[tuple[str, ...], list[int]] = {}
+    """Group the infos of the envs `numbers` by their keys, and by those of nested infos."""
+    groups: dict[tuple[Any, ...], list[int]] = {}
     for place, info in enumerate(infos):
-        groups.setdefault(tuple(info), []).append(place)
+        groups.setdefault(_keys(info), []).append(place)
     return [
         InfoColumns(
             [numbers[place] for place in places],
-            dict(zip(keys, zip(*(infos[i].values() for i in places), strict=True), strict=True)),
+            dict(
+                zip(
+                    infos[places[0]],
+                    zip(*(infos[i].values() for i in places), strict=True),
+                    strict=True,
+                )
+            ),
         )
-        for keys, places in groups.items()
+        for places in groups.values()
     ]
+
+
+def _keys(info: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the keys of an info; a nested info stands as a pair of its key and its keys.
+
+    Two envs whose nested infos differ must not share a group: the keys of the batch would come in
+    another order than Gymnasium's.
+    """
+    return tuple(
+        (key, _keys(cast("dict[str, Any]", value))) if isinstance(value, dict) else key
+        for key, value in info.items()
+    )
 
 
 def batched(parts: Iterable[InfoColumns], num_envs: int) -> _Batch:
