@@ -61,7 +61,9 @@ _RULES = {
         never=_HARDWARE | {"torch"},
     ),
     # Transfer cannot tell a simulator from a robot. Cloning is one of its learners.
-    "transfer": _Rule(_names("errors layout demos shapechanger"), never=_HARDWARE | _SIMULATORS),
+    "transfer": _Rule(
+        _names("errors layout tasks demos shapechanger"), never=_HARDWARE | _SIMULATORS
+    ),
     "reports": _Rule(
         _names("errors layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
     ),

@@ -7,8 +7,12 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+import shapechanger  # noqa: F401  # Registers the ids.
+from shapechanger.errors import UnknownName
+from shapechanger.tasks.measure import FORWARD_SPEED
 from shapechanger.transfer.learners.evaluation import evaluate, random_actions
 
 
@@ -96,3 +100,38 @@ def test_success_is_the_last_that_was_said() -> None:
     envs = [Succeeding(said) for said in ([False, True], [True, False], [True], [])]
     result = evaluate(lambda o: np.zeros((len(o), 1)), envs, 1)
     assert result.success == pytest.approx(2 / 3)
+
+
+class Runner(Countdown):
+    """Runs at 2 m/s until it falls, and reports a term as one of NumPy's numbers."""
+
+    measures = (FORWARD_SPEED,)
+    spec = EnvSpec("Runner-v0", max_episode_steps=8)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        """One step further."""
+        observation, _, fallen, truncated, _ = super().step(action)
+        info = {"x_velocity": np.float64(2.0), "reward_ctrl": np.float32(-0.5)}
+        return observation, -0.5, fallen, truncated, info
+
+
+def test_a_fallen_runner_stands_still_for_the_rest() -> None:
+    """Four of eight steps at 2 m/s are 1 m/s; terms of any numeric type are counted."""
+    result = evaluate(lambda o: np.zeros((len(o), 1)), [Runner()], 4)
+    assert result.measures == {"forward speed": 1.0}
+    assert result.terms == {"reward_ctrl": -2.0}
+    assert result.value("forward speed") == 1.0
+    assert result.value("reward_ctrl") == result.value("return") == -2.0
+    with pytest.raises(UnknownName, match="forward speed"):
+        result.value("forward sped")
+
+
+@pytest.mark.parametrize("name", ["Ant", "HalfCheetah", "Hopper", "InvertedPendulum", "Finger"])
+def test_reward_terms_of_an_evaluation_add_up_to_its_return(name: str) -> None:
+    """None is lost, whatever its type."""
+    env = gym.make(f"shapechanger/{name}-v1")
+    result = evaluate(random_actions(env.action_space, 0), [env], 0)
+    assert sum(result.terms.values()) == pytest.approx(result.mean_return, rel=1e-5)
+    env.close()

@@ -31,6 +31,7 @@ from shapechanger.envs.stepping.tuned import (
 )
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
+from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 
 __all__ = ["AntEnv", "ExtendedAntEnv"]
 
@@ -92,6 +93,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     """
 
     family = ANT
+    measures = (FORWARD_SPEED, RETURN)
     replaced = (
         *("do_simulation", "_step_mujoco_simulation", "state_vector", "dt"),
         *("_get_obs", "_get_rew", "is_healthy", "healthy_reward", "up"),

@@ -35,6 +35,7 @@ from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
+from shapechanger.tasks.measure import FORWARD_SPEED, RETURN, Measure
 
 __all__ = [
     "IN_A_PLANE",
@@ -76,11 +77,13 @@ class Runner(Reshapable):
         **arguments: All arguments of Gymnasium's env, and those of `Reshapable`.
 
     Attributes:
+        measures: What a policy is measured by.
         root: Types of the joints that the task reads the trunk's place from.
         place_size: How many numbers of the trunk's place the observation omits by default.
         velocity_limit: Where the observation clips velocities, m/s and rad/s.
     """
 
+    measures: ClassVar[tuple[Measure, ...]] = (FORWARD_SPEED, RETURN)
     root: ClassVar[tuple[str, ...]] = IN_A_PLANE
     place_size: ClassVar[int] = 1
     velocity_limit: ClassVar[float] = math.inf

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
 from shapechanger.layout import Layout
+from shapechanger.tasks.measure import RETURN, Measure
 
 __all__ = [
     "EnvRef",
@@ -25,6 +26,7 @@ __all__ = [
     "env_traits",
     "is_single_instance",
     "layouts_of",
+    "measures_of",
 ]
 
 
@@ -171,6 +173,12 @@ def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
 def is_single_instance(env: gym.Env[Any, Any]) -> bool:
     """Return whether only one instance can exist, as of a robot: `side_by_side = False`."""
     return not getattr(env.unwrapped, "side_by_side", True)
+
+
+def measures_of(env: gym.Env[Any, Any]) -> tuple[Measure, ...]:
+    """Return the measures of an env, the default first; the return is always one of them."""
+    declared: tuple[Measure, ...] = getattr(env.unwrapped, "measures", ())
+    return declared if RETURN in declared else (*declared, RETURN)
 
 
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:

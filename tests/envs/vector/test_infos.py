@@ -10,7 +10,7 @@ from gymnasium.vector import VectorEnv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.vector.infos import InfoColumns, batched, in_columns
+from shapechanger.envs.vector.infos import InfoColumns, StepResults, batched, in_columns
 from tests.envs.vector.sameness import require_same
 
 _VECTOR = np.arange(3.0)
@@ -83,3 +83,13 @@ def test_what_is_told_in_columns_is_batched_alike(told: list[int], order: Any) -
     parts += in_columns(alone, [infos[i] for i in alone])
     order.shuffle(parts)
     require_same(batched(parts, len(infos)), _gymnasiums(infos))
+
+
+def test_an_info_of_columns_is_read_env_by_env() -> None:
+    """An env may have ended by itself after infos had been put in columns."""
+    results = StepResults(2)
+    infos = InfoColumns([0, 1], {"a": np.array([1.0, 2.0])})
+    results.put_columns(infos, np.zeros(2), np.zeros(2, np.bool_), [False, False])
+    assert results.info(1) == {"a": 2.0}
+    results.put(0, (0.5, True, False, {"diverged": True}))
+    assert results.of_each() == [{"diverged": True}, {"a": 2.0}]

@@ -16,6 +16,7 @@ from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
+from shapechanger.tasks.measure import RETURN, SUCCESS
 
 __all__ = ["FingerReachEnv"]
 
@@ -62,6 +63,7 @@ class FingerReachEnv(FingerEnv):
         **arguments: Arguments of `FingerEnv`.
     """
 
+    measures = (SUCCESS, RETURN)
     _options = ("posture", "target")
 
     def __init__(self, *, goal: bool = False, **arguments: Any) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import gymnasium as gym
@@ -11,7 +12,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, is_single_instance
+from shapechanger.errors import UnknownName
+from shapechanger.tasks.measure import RETURN, Measure
+from shapechanger.transfer.env_ref import (
+    EnvRef,
+    HasHeldOutStarts,
+    is_single_instance,
+    measures_of,
+)
 from shapechanger.transfer.learners.settings import Settings
 
 __all__ = [
@@ -36,6 +44,7 @@ class Evaluation(msgspec.Struct, frozen=True):
         terms: Mean sum over an episode of each reward term that the env reports.
         success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
             not report success.
+        measures: Mean of each measure that the env declares besides the return, by its name.
     """
 
     steps: int
@@ -43,6 +52,18 @@ class Evaluation(msgspec.Struct, frozen=True):
     mean_length: float
     terms: dict[str, float] = {}
     success: float | None = None
+    measures: dict[str, float] = {}
+
+    def value(self, measure: str) -> float:
+        """Return the value of a measure, or the sum of a reward term, by name.
+
+        Raises:
+            UnknownName: If the evaluation has none of this name.
+        """
+        known = {RETURN.name: self.mean_return, **self.measures, **self.terms}
+        if measure not in known:
+            raise UnknownName("measure", measure, known)
+        return known[measure]
 
 
 def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
@@ -85,18 +106,21 @@ def evaluate(
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
         played += _play(act, envs, seed + first)
-    terms: dict[str, float] = {}
-    for episode in played:
-        for name, value in episode.terms.items():
-            terms[name] = terms.get(name, 0.0) + value / len(played)
     reached = [episode.success for episode in played if episode.success is not None]
     return Evaluation(
         steps,
         float(np.mean([episode.total for episode in played])),
         float(np.mean([episode.length for episode in played])),
-        terms,
+        _means([episode.terms for episode in played]),
         float(np.mean(reached)) if reached else None,
+        _means([episode.measures for episode in played]),
     )
+
+
+def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:
+    """Average numbers by name over all episodes; a missing one counts as 0."""
+    names = dict.fromkeys(name for episode in episodes for name in episode)
+    return {name: sum(e.get(name, 0.0) for e in episodes) / len(episodes) for name in names}
 
 
 @dataclass(slots=True)
@@ -107,6 +131,31 @@ class _Episode:
     length: int = 0
     terms: dict[str, float] = field(default_factory=dict[str, float])
     success: bool | None = None
+    measures: dict[str, float] = field(default_factory=dict[str, float])
+
+    def add(self, reward: float, info: Mapping[str, Any], measures: Sequence[Measure]) -> None:
+        """Add a step."""
+        self.total += reward
+        self.length += 1
+        for name, value in info.items():
+            # NumPy's float32 is no Python float, and ants report their control cost as one.
+            if name.startswith("reward_") and isinstance(value, Real | np.number):
+                self.terms[name] = self.terms.get(name, 0.0) + float(value)
+        if "is_success" in info:
+            self.success = bool(info["is_success"])
+        for measure in measures:
+            if measure.key not in info:
+                continue
+            value = float(info[measure.key])
+            if measure.over == "episode":
+                value += self.measures.get(measure.name, 0.0)
+            self.measures[measure.name] = value
+
+    def end(self, measures: Sequence[Measure], limit: int | None) -> None:
+        """Divide sums over the episode by the time limit in steps, or by its length if None."""
+        for measure in measures:
+            if measure.over == "episode" and measure.name in self.measures:
+                self.measures[measure.name] /= limit or self.length
 
 
 def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episode]:
@@ -115,22 +164,19 @@ def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episo
     observations = np.stack(starts)
     episodes = [_Episode() for _ in envs]
     alive = list(range(len(envs)))
+    measures = [measure for measure in measures_of(envs[0]) if measure.key]
+    limit = None if envs[0].spec is None else envs[0].spec.max_episode_steps
     while alive:
         actions = act(observations[alive])
         still: list[int] = []
         for i, action in zip(alive, actions, strict=True):
             observation, reward, terminated, truncated, info = envs[i].step(action)
             observations[i] = observation
-            episode = episodes[i]
-            episode.total += float(reward)
-            episode.length += 1
-            for name, value in info.items():
-                if name.startswith("reward_") and isinstance(value, float | int):
-                    episode.terms[name] = episode.terms.get(name, 0.0) + float(value)
-            if "is_success" in info:
-                episode.success = bool(info["is_success"])
+            episodes[i].add(float(reward), info, measures)
             if not (terminated or truncated):
                 still.append(i)
+            else:
+                episodes[i].end(measures, limit)
         alive = still
     return episodes
 
