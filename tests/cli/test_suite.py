@@ -156,6 +156,7 @@ def test_each_training_is_done_once(undisturbed: tuple[Path, _Counting, str]) ->
     assert {kind: done.count(kind) for kind in done} == {
         "source": 3 * 2,
         "random": 3 * 2,
+        "zero-action": 3,
         "scratch": 3 * 2,
         "zero-shot": 6 * 2,
         "fine-tune": 6 * 2,

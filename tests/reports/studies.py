@@ -114,7 +114,8 @@ def make_study(
             rising(400.0, 1000.0, 1000.0, seeds, seed=2) if fine_tune is None else fine_tune
         ),
     }
-    wanted: list[RunKind] = [*([] if given else ["source"]), "random", *arms]
+    drawn["zero-action"] = drawn["random"][:1]
+    wanted: list[RunKind] = [*([] if given else ["source"]), "random", "zero-action", *arms]
     plan = Plan(
         task=TransferTask(
             source or EnvRef("shapechanger/Ant-v1"), target or EnvRef("shapechanger/BigAnt-v1")
@@ -144,7 +145,9 @@ def make_study(
 def _summaries(plan: Plan, drawn: dict[RunKind, NDArray[np.float64]]) -> dict[Arm, Summary]:
     """The measures, with few resamples."""
     scratch = LearningCurves(STEPS, drawn["scratch"])
-    reference = Reference.of(scratch, drawn["random"], plan.last_k)
+    ends = {arm: float(drawn[arm][:, -plan.last_k :].mean()) for arm in plan.arms}
+    floors = {"random actions": float(drawn["random"].mean())}
+    reference = Reference.of(floors, ends)
     return {
         arm: summarise(
             scratch,

@@ -60,8 +60,8 @@ def test_every_arm_and_seed_is_there(finished: tuple[Study, Path]) -> None:
     study, _ = finished
     assert [run.run.name for run in study.runs] == [
         f"{kind}-{i}"
-        for kind in ("source", "random", "scratch", "zero-shot", "fine-tune")
-        for i in range(2)
+        for kind in ("source", "random", "zero-action", "scratch", "zero-shot", "fine-tune")
+        for i in range(1 if kind == "zero-action" else 2)
     ]
     assert [e.steps for e in study.of("scratch")[0].curve] == [0, 32, 64, 96]
     assert set(study.summaries) == {"zero-shot", "fine-tune"}

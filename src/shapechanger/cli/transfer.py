@@ -75,6 +75,9 @@ class Transfer:
     """More arguments of the source as JSON, such as '{"actions": "length"}'."""
     target_options: str = ""
     """The same of the target, such as '{"gap": "real-like"}' for a finger."""
+    measure: str = ""
+    """What policies are compared by: a measure of the target such as "forward speed", a reward term
+    such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
     arms: tuple[Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"], ...] = ()
@@ -192,6 +195,7 @@ class Transfer:
             rules=dict(_split_rule(rule) for rule in self.rule),
             map_text=_read(self.map) if self.map else "",
             units=self.units,
+            measure=self.measure,
             traits=traits,
         )
 

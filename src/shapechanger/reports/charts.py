@@ -62,6 +62,8 @@ _STYLE: Final = {
 }
 _NO_METADATA: Final = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
+# An interval of two seeds may reach ten times as far as they lie apart.
+_BAND_SEEDS: Final = 3
 # Two panels fit side by side on a page and one on a phone, at legible sizes. Inches.
 _PANEL: Final = (4.7, 4.1)
 _LOW_PANEL: Final = (4.7, 2.6)
@@ -93,8 +95,9 @@ def learning_curves(study: Study, counting: Counting) -> str:
     """Plot the learning curves of a study.
 
     A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over seeds;
-    a horizontal level is a policy that is not trained on the target. Both ways of counting share
-    the limits of the y axis.
+    of fewer than three seeds each evaluation is a point, because an interval of two says nothing. A
+    horizontal level is a policy that is not trained on the target. Both ways of counting share the
+    limits of the y axis.
 
     Args:
         study: The study.
@@ -105,7 +108,7 @@ def learning_curves(study: Study, counting: Counting) -> str:
     def draw(figure: Figure, axes: Axes) -> None:
         _draw_arms(axes, study, float(study.plan.source_steps) if counting == "total" else 0.0)
         axes.set_xlabel("Target steps" if counting == "target" else "Source and target steps")
-        axes.set_ylabel("Mean return on the target")
+        axes.set_ylabel(_axis_label(study))
         axes.set_ylim(*_return_limits(study))
         axes.xaxis.set_major_formatter(EngFormatter(sep="\N{THIN SPACE}"))
         axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -212,7 +215,14 @@ def _svg(size_in: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> 
 def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
     """Draw all arms; those that start from the source begin at `source_steps`."""
     last = float(study.plan.steps)
-    _draw_level(axes, study, "random", 0.0, source_steps + last)
+    reference = next(iter(study.summaries.values())).reference
+    style = _LINE_STYLES["random"]
+    axes.axhline(
+        reference.zero,
+        color=style.colour,
+        linestyle=style.line,
+        label=f"no skill: {reference.zero_of}",
+    )
     if source_steps:
         axes.axvline(source_steps, color="#999999", linewidth=0.8)
         axes.text(
@@ -239,7 +249,12 @@ def _draw_curves(axes: Axes, study: Study, kind: RunKind, start: float) -> None:
     steps = curves.steps + start
     spread = t_interval(curves.returns)
     axes.plot(steps, curves.returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
-    axes.fill_between(steps, spread.low, spread.high, color=style.colour, alpha=0.18, linewidth=0.0)
+    if curves.n_seeds >= _BAND_SEEDS:
+        axes.fill_between(
+            steps, spread.low, spread.high, color=style.colour, alpha=0.18, linewidth=0.0
+        )
+    else:
+        axes.plot(steps, curves.returns.T, style.marker, color=style.colour, markersize=2.5)
     axes.plot(
         steps,
         spread.mean,
@@ -257,27 +272,38 @@ def _draw_level(axes: Axes, study: Study, kind: RunKind, start: float, end: floa
     """Draw a policy that is not trained on the target as a level with its interval."""
     style, returns = _LINE_STYLES[kind], study.curves(kind).returns[:, :1]
     spread = t_interval(returns)
-    axes.fill_between(
-        [start, end], spread.low[0], spread.high[0], color=style.colour, alpha=0.12, linewidth=0.0
-    )
+    if returns.size >= _BAND_SEEDS:
+        axes.fill_between(
+            [start, end],
+            spread.low[0],
+            spread.high[0],
+            color=style.colour,
+            alpha=0.12,
+            linewidth=0.0,
+        )
+    else:
+        axes.plot([start] * returns.size, returns[:, 0], "o", color=style.colour, markersize=3.5)
     axes.plot(
         [start, end],
         np.repeat(spread.mean, 2),
         color=style.colour,
         linestyle=style.line,
         linewidth=1.8,
-        label="random policy" if kind == "random" else f"{kind}, {returns.size} seeds",
+        label=f"{kind}, {returns.size} seeds",
     )
 
 
-def _return_limits(study: Study) -> tuple[float, float]:
-    """Limits of the y axis: they contain every run.
+def _axis_label(study: Study) -> str:
+    """Name of the measure with its unit."""
+    unit = "" if study.plan.unit == "1" else f", {study.plan.unit}"
+    return f"{study.plan.measure.capitalize()} on the target{unit}"
 
-    An interval of two seeds may reach ten times as far as its runs do, so intervals are clipped.
-    """
-    kinds: list[RunKind] = ["random", *study.plan.arms]
+
+def _return_limits(study: Study) -> tuple[float, float]:
+    """Limits of the y axis: they contain every run; intervals are clipped."""
     returns: NDArray[np.float64] = np.concatenate(
-        [study.curves(kind).returns.ravel() for kind in kinds]
+        [study.curves(arm).returns.ravel() for arm in study.plan.arms]
+        + [np.array([next(iter(study.summaries.values())).reference.zero])]
     )
     low, high = float(returns.min()), float(returns.max())
     margin = 0.15 * (high - low) or 0.1 * max(1.0, abs(high))

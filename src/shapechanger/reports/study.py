@@ -195,28 +195,31 @@ def _measure_table(arm: Arm, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 def _scale(summary: Summary) -> str:
     """Describe the score, or why there is none."""
-    random, final = number(summary.reference.random), number(summary.reference.final)
-    if summary.unit == "return":
+    reference = summary.reference
+    zero, one = number(reference.zero), number(reference.one)
+    if summary.unit == "value":
         return (
-            f"There are no scores: scratch ended at {final}, which is not above the random policy, "
-            f"worth {random}. Gains are in units of return."
+            f"There are no scores: the best arm, {reference.one_of}, ended at {one}, which is not "
+            f"above {zero}, which takes no skill ({reference.zero_of}). Gains are in units of the "
+            "measure."
         )
     return (
-        "Returns are normalised to scores by (return - random) / (final - random), both of the "
-        f"target: random = {random} is the mean return of the random policy, and final = {final} "
-        f"is the mean return of scratch over its last {summary.last_k} evaluations. So 0 is "
-        "the random policy, 1 is scratch, and more than 1 is better than scratch. The intervals "
-        "take these two numbers as given. A gain in returns is one in scores times "
-        f"{number(summary.reference.final - summary.reference.random)}."
+        "Values are normalised to scores by (value - zero) / (one - zero), both of the target: "
+        f"zero = {zero} is the most that takes no skill, here {reference.zero_of}, of random "
+        "actions, the action zero and untrained policies; one = "
+        f"{one} is the mean of the last {summary.last_k} evaluations of the best arm, here "
+        f"{reference.one_of}. The intervals take these two numbers as given. A gain in values is "
+        f"one in scores times {number(reference.one - reference.zero)}."
     )
 
 
 def _arm_cells(row: ArmRow) -> tuple[Any, ...]:
-    names = {"random": "random policy", "source": "source policy, in the source"}
+    names = {"random": "random actions", "source": "source policy, in the source"}
     return (
         names.get(row.kind, row.kind),
         row.seeds,
-        row.first_return,
+        row.first,
+        row.final,
         row.final_return,
         row.length,
         row.success or "not reported",
@@ -227,7 +230,7 @@ def _arm_cells(row: ArmRow) -> tuple[Any, ...]:
 
 def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
     """The reward terms of each kind of run; no rows if no env reports any."""
-    kinds = {"random": "random policy", "source": "source policy"}
+    kinds = {"random": "random actions", "source": "source policy"}
     names = dict.fromkeys(name for row in arms for name in row.terms)
     return {
         "header": ("Term", *(kinds.get(row.kind, row.kind) for row in arms)),

@@ -7,6 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.errors import UnknownName
 from shapechanger.reports.numbers import (
     count,
     estimate_text,
@@ -23,7 +24,6 @@ from shapechanger.transfer.metrics import (
     ReachTimes,
     Summary,
     TimeToThreshold,
-    estimate_difference,
 )
 from shapechanger.transfer.plan import EVERY_ARM, Arm, RunKind
 from shapechanger.transfer.study import Study
@@ -46,8 +46,8 @@ __all__ = [
     "direction",
     "finals",
     "headline_arm",
+    "is_flat",
     "measure_rows",
-    "scratch_gain",
     "source_takes_all",
     "successes",
     "verdict",
@@ -65,12 +65,12 @@ PURE_NUMBER: Final = "pure number"
 _TAYLOR_STONE: Final = "Taylor & Stone, JMLR 10, 2009"
 
 EXPLANATIONS: Final[dict[str, str]] = {
-    JUMPSTART: "Return of the arm minus that of scratch at the first evaluation on the target; in "
+    JUMPSTART: "The arm minus scratch at the first evaluation on the target; in "
     "total steps, minus that of scratch after as many steps as the source used. Above 0: transfer "
     f"helped. ({_TAYLOR_STONE})",
     TOTAL_REWARD_GAIN: "Height of the arm's learning curve above that of scratch, averaged over "
     f"the whole budget. Above 0: transfer helped. ({_TAYLOR_STONE}, divided by the budget)",
-    ASYMPTOTIC_GAIN: "Return of the arm minus that of scratch at the end of the budget. Above 0: "
+    ASYMPTOTIC_GAIN: "The arm minus scratch at the end of the budget. Above 0: "
     f"transfer helped. ({_TAYLOR_STONE})",
     AUC_RATIO: "Area under the arm's learning curve over that of scratch, both in scores. Above 1: "
     f"transfer helped. ({_TAYLOR_STONE}, as the transfer ratio)",
@@ -89,7 +89,7 @@ class MeasureRow(NamedTuple):
     Attributes:
         arm: The arm.
         measure: Name of the measure.
-        unit: "score", "return", "steps" or "pure number".
+        unit: "score", "value", "steps" or "pure number".
         target: Value and interval, counted in target steps.
         total: Value and interval, counted in total steps.
         method: Kind of interval, or "none"; both, where the two ways of counting differ.
@@ -199,32 +199,34 @@ def _seeds(reach: ReachTimes, n_seeds: int) -> str:
 
 
 GOOD: Final = 0.9
-"""Share of the way from the random policy to the best run that counts as having learnt."""
+"""Share of the way from what takes no skill to the best run that counts as having learnt."""
 
-_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM)
+_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", "zero-action", *EVERY_ARM)
 
 
 class ArmRow(NamedTuple):
     """Summary of the runs of one kind.
 
     Attributes:
-        kind: The arm; or "random" for the random policy, or "source" for the source policies, in
-            the source.
+        kind: The arm; "random" or "zero-action" for these actions on the target; or "source" for
+            the source policies, in the source.
         seeds: Number of runs.
-        first_return: Mean return at the first evaluation, with its t-interval over seeds.
+        first: Mean of the measure at the first evaluation, with its t-interval over seeds.
+        final: Mean of the measure at the end, with its t-interval over seeds.
         final_return: Mean return at the end, with its t-interval over seeds.
         length: Mean length of the episodes at the end, in steps.
         success: Share of successful episodes at the end, with its t-interval over seeds; empty
             where the env does not report success.
-        good: Number of runs that covered 90 % of the way from the random policy to the best run on
-            the target; empty for source policies, and where no run beats the random policy.
-        per_seed: Return of each run at the end.
+        good: Number of runs that covered 90 % of the way from what takes no skill to the best run
+            on the target; empty for source policies, and where no run learned.
+        per_seed: Measure of each run at the end.
         terms: For each reward term its mean sum over an episode at the end.
     """
 
     kind: RunKind
     seeds: int
-    first_return: str
+    first: str
+    final: str
     final_return: str
     length: str
     success: str
@@ -234,7 +236,7 @@ class ArmRow(NamedTuple):
 
 
 def arm_rows(study: Study) -> tuple[ArmRow, ...]:
-    """Summarise each kind of run, those of the source and the random policy first.
+    """Summarise each kind of run, those of the source and those without skill first.
 
     The end of a run is the mean of its last evaluations, as many as the plan says; for a source
     policy it is the last one, because that is the policy that is transferred.
@@ -251,9 +253,17 @@ def successes(study: Study, kind: RunKind) -> NDArray[np.float64]:
 
 
 def finals(study: Study, kind: RunKind) -> NDArray[np.float64]:
-    """Final return of each run, shape (n_seeds,)."""
+    """Final value of each run, shape (n_seeds,)."""
     ends = (_end(study, result) for result in study.of(kind))
-    return np.array([float(np.mean([e.mean_return for e in end])) for end in ends])
+    return np.array([float(np.mean([_value(study, e) for e in end])) for end in ends])
+
+
+def _value(study: Study, evaluation: Evaluation) -> float:
+    """The measure; NaN in a source env that does not declare it."""
+    try:
+        return evaluation.value(study.plan.measure)
+    except UnknownName:
+        return float("nan")
 
 
 def _row(study: Study, kind: RunKind) -> ArmRow:
@@ -263,14 +273,22 @@ def _row(study: Study, kind: RunKind) -> ArmRow:
     return ArmRow(
         kind=kind,
         seeds=len(results),
-        first_return=spread_text(np.array([r.curve[0].mean_return for r in results])),
-        final_return=spread_text(at_the_end),
+        first=_spread(np.array([_value(study, r.curve[0]) for r in results])),
+        final=_spread(at_the_end),
+        final_return=spread_text(
+            np.array([np.mean([e.mean_return for e in _end(study, r)]) for r in results])
+        ),
         length=number(float(np.mean([e.mean_length for e in ends]))),
         success=share_text(successes(study, kind)),
         good=_good(study, kind),
         per_seed=list_text([float(value) for value in at_the_end]),
         terms=_terms(ends),
     )
+
+
+def _spread(values: NDArray[np.float64]) -> str:
+    """Format values with their t-interval."""
+    return "not reported" if np.isnan(values).any() else spread_text(values)
 
 
 def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
@@ -282,13 +300,13 @@ def _good(study: Study, kind: RunKind) -> str:
     """Number of runs that ever came close to the best one, as in `4 of 5`."""
     if kind == "source":
         return ""
-    floor = float(finals(study, "random").mean())
+    floor = next(iter(study.summaries.values())).reference.zero
     best = max(float(finals(study, arm).max()) for arm in study.plan.arms)
     if best <= floor:
         return ""
     height = floor + GOOD * (best - floor)
     results = study.of(kind)
-    reached = sum(max(e.mean_return for e in result.curve) >= height for result in results)
+    reached = sum(max(_value(study, e) for e in result.curve) >= height for result in results)
     return f"{reached} of {len(results)}"
 
 
@@ -303,18 +321,8 @@ Direction = Literal["up", "down", "unclear"]
 _TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear difference"}
 # Below this many seeds an interval is so wide that only large effects show.
 _FEW_SEEDS: Final = 5
-
-
-class _Finding(NamedTuple):
-    """One clause of the verdict, chosen by the direction of an estimate."""
-
-    clauses: dict[Direction, str]
-    estimate: Estimate
-    label: str
-
-    @property
-    def text(self) -> str:
-        return f"{self.clauses[direction(self.estimate)]} ({self.label})"
+# A rise of scratch by less than this share of its end shows nothing.
+_FLAT: Final = 0.1
 
 
 def direction(estimate: Estimate) -> Direction:
@@ -330,27 +338,47 @@ def direction(estimate: Estimate) -> Direction:
 
 
 def verdict(study: Study) -> str:
-    """State whether transfer helped: a sentence on target steps, one on total steps, and warnings.
+    """State in one sentence of at most 25 words whether transfer helped; numbers are in the table.
 
-    Fine-tune is judged by its total reward gain, a measure chosen in advance; the asymptotic gain
-    and the time to the highest threshold follow it. A study without fine-tune is judged by the
-    jumpstart of its first other arm. Success rates are added where the envs report success.
+    Fine-tune is judged by its total reward gain in target steps, a measure chosen in advance; a
+    study without fine-tune by the jumpstart of its first other arm. Where scratch starts within a
+    tenth of its end, the sentence says that the study shows nothing.
     """
-    arm = headline_arm(study)
-    summary = study.summaries[arm]
-    if arm == "fine-tune":
-        sentences = [_in_target_steps(summary), _in_total_steps(summary)]
-    else:
-        sentences = _untrained(summary)
-    sentences += _successes(study)
-    if direction(scratch_gain(study)) != "up":
-        sentences.append(
-            "Scratch itself did not clearly learn: it ended at "
-            f"{_final_text(study, 'scratch')}, and the random policy is worth "
-            f"{_final_text(study, 'random')}, so the comparison means little: try more target "
-            "steps."
+    arm, plan = headline_arm(study), study.plan
+    scratch = study.curves("scratch")
+
+    def text(values: NDArray[np.float64]) -> str:
+        unit = "" if plan.unit == "1" else f" {plan.unit}"
+        return f"{float(f'{values.mean():.3g}'):,.10g}{unit}"
+
+    if is_flat(study):
+        return (
+            f"This budget or measure shows nothing: scratch's {plan.measure} starts at "
+            f"{text(scratch.returns[:, 0])} and ends at {text(finals(study, 'scratch'))}."
         )
-    return " ".join(sentences)
+    curves, measures = study.curves(arm), study.summaries[arm].in_target_steps
+    if curves.n_evals == 1:
+        return (
+            f"Transfer {_TRANSFER[direction(measures.jumpstart)]} at the start: untrained on the "
+            f"target, {arm}'s {plan.measure} is {text(curves.returns)} and scratch's "
+            f"{text(scratch.returns[:, 0])}."
+        )
+    return (
+        f"Transfer {_TRANSFER[direction(measures.total_reward_gain)]}: over {count(plan.steps)} "
+        f"target steps {arm}'s {plan.measure} averages {text(curves.auc())} and scratch's "
+        f"{text(scratch.auc())}."
+    )
+
+
+def is_flat(study: Study) -> bool:
+    """Return whether scratch starts within a tenth of its end, so that nothing can be compared.
+
+    A study whose other arms rise far above scratch shows something all the same.
+    """
+    start = float(study.curves("scratch").returns[:, 0].mean())
+    end = float(finals(study, "scratch").mean())
+    best = max(float(finals(study, arm).mean()) for arm in study.plan.arms)
+    return max(end, best) - start <= _FLAT * max(abs(end), abs(best))
 
 
 def headline_arm(study: Study) -> Arm:
@@ -358,24 +386,10 @@ def headline_arm(study: Study) -> Arm:
     return "fine-tune" if "fine-tune" in study.summaries else next(iter(study.summaries))
 
 
-def _successes(study: Study) -> list[str]:
-    """The sentence on success rates; none where the envs do not report success."""
-    kinds: list[RunKind] = ["source", *study.plan.arms]
-    shares = {kind: share_text(successes(study, kind)) for kind in kinds}
-    names = {"source": "the source policy in the source"}
-    parts = [f"{names.get(kind, kind)} {share}" for kind, share in shares.items() if share]
-    return [f"Success at the end: {'; '.join(parts)}."] if parts else []
-
-
-def scratch_gain(study: Study) -> Estimate:
-    """Final return of scratch minus that of the random policy."""
-    return estimate_difference(finals(study, "scratch"), finals(study, "random"))
-
-
 def source_takes_all(summary: Summary) -> bool:
     """Return whether the source used up the budget of total steps.
 
-    Every measure in total steps but the jumpstart then compares the random policy with scratch.
+    Every measure in total steps but the jumpstart then compares no skill with scratch.
     """
     return summary.source_steps >= summary.horizon
 
@@ -389,12 +403,12 @@ def caveats(study: Study) -> tuple[str, ...]:
         sentences.append(
             f"The source used {source} steps and the budget is {budget}, so in total steps "
             "nothing is left for the target: only the jumpstart is meaningful there, and the "
-            "other measures compare the random policy with scratch."
+            "other measures compare no skill with scratch."
         )
     elif summary.source_steps > 0.0:
         sentences.append(
-            f"In total steps the budget stays {budget}: an arm is worth what the random policy is "
-            f"until its {source} source steps have passed."
+            f"In total steps the budget stays {budget}: an arm counts as without skill until its "
+            f"{source} source steps have passed."
         )
     if study.plan.source_policy:
         sentences.append(
@@ -412,111 +426,3 @@ def caveats(study: Study) -> tuple[str, ...]:
             "mean that there is none."
         )
     return tuple(sentences)
-
-
-def _in_target_steps(summary: Summary) -> str:
-    """The sentence on fine-tune in target steps."""
-    findings = _findings(summary.in_target_steps, summary.unit)
-    towards = direction(findings[0].estimate)
-    against = {"up": "down", "down": "up", "unclear": ""}[towards]
-    text = f"Counted in target steps, transfer {_TRANSFER[towards]}: fine-tune {findings[0].text}"
-    for finding in findings[1:]:
-        link = " and" if finding is findings[-1] else ","
-        text += f"{', but' if direction(finding.estimate) == against else link} {finding.text}"
-    return f"{text}."
-
-
-def _in_total_steps(summary: Summary) -> str:
-    """The sentence on fine-tune in total steps."""
-    if source_takes_all(summary):
-        return _nothing_left(summary)
-    gain = summary.in_total_steps.total_reward_gain
-    return (
-        f"Counted in total steps, {count(summary.source_steps)} of which go to the source, it "
-        f"{_TRANSFER[direction(gain)]} (total reward gain {estimate_text(gain, signed=True)}, "
-        f"{summary.unit})."
-    )
-
-
-def _findings(measures: Measures, unit: str) -> list[_Finding]:
-    """The measures of the verdict on fine-tune; the first one decides."""
-    gain, end = measures.total_reward_gain, measures.asymptotic_gain
-    found = [
-        _Finding(
-            {
-                "up": "earned more than scratch over its whole learning curve",
-                "down": "earned less than scratch over its whole learning curve",
-                "unclear": "earned neither clearly more nor clearly less than scratch over its "
-                "whole learning curve",
-            },
-            gain,
-            f"total reward gain {estimate_text(gain, signed=True)}, {unit}",
-        ),
-        _Finding(
-            {
-                "up": "ended higher",
-                "down": "ended lower",
-                "unclear": "ended neither clearly higher nor clearly lower",
-            },
-            end,
-            f"asymptotic gain {estimate_text(end, signed=True)}, {unit}",
-        ),
-    ]
-    last = measures.times_to_threshold[-1] if measures.times_to_threshold else None
-    if last is not None and last.steps_saved.value is not None:
-        reached = f"reached the score {last.threshold:g}"
-        found.append(
-            _Finding(
-                {
-                    "up": f"{reached} sooner",
-                    "down": f"{reached} later",
-                    "unclear": f"{reached} neither clearly sooner nor clearly later",
-                },
-                last.steps_saved,
-                f"{estimate_text(last.steps_saved, signed=True)} steps saved",
-            )
-        )
-    return found
-
-
-def _nothing_left(summary: Summary) -> str:
-    """The sentence on total steps where the source used up the budget."""
-    start = summary.in_total_steps.jumpstart
-    compared = {
-        "up": "fine-tune starts above the level that scratch has reached by then",
-        "down": "fine-tune starts below the level that scratch has reached by then",
-        "unclear": "fine-tune starts neither clearly above nor clearly below the level that "
-        "scratch has reached by then",
-    }[direction(start)]
-    return (
-        "Counted in total steps, the budget cannot show a gain: the source alone used "
-        f"{count(summary.source_steps)} steps of {count(summary.horizon)}, and {compared} "
-        f"(jumpstart {estimate_text(start, signed=True)}, {summary.unit})."
-    )
-
-
-def _untrained(summary: Summary) -> list[str]:
-    """The sentences on a policy that is not trained on the target."""
-    measures, unit = summary.in_target_steps, summary.unit
-    start, end = measures.jumpstart, measures.asymptotic_gain
-    late = summary.in_total_steps.jumpstart
-    when = (
-        f"at its end, though the source used {count(summary.source_steps)} steps"
-        if source_takes_all(summary)
-        else f"after {count(summary.source_steps)} steps, as many as the source used"
-    )
-    better = {"up": "better than", "down": "worse than", "unclear": "not clearly different from"}
-    return [
-        f"Counted in target steps, transfer {_TRANSFER[direction(start)]} at the start: the source "
-        f"policy, which is not trained on the target, is {better[direction(start)]} an untrained "
-        f"one (jumpstart {estimate_text(start, signed=True)}, {unit}) and "
-        f"{better[direction(end)]} the end of scratch (asymptotic gain "
-        f"{estimate_text(end, signed=True)}, {unit}).",
-        f"Counted in total steps, it is {better[direction(late)]} scratch {when} "
-        f"(jumpstart {estimate_text(late, signed=True)}, {unit}).",
-    ]
-
-
-def _final_text(study: Study, kind: Literal["scratch", "random"]) -> str:
-    """Final return of a kind of run, with its t-interval."""
-    return spread_text(finals(study, kind))

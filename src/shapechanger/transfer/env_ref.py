@@ -138,6 +138,7 @@ class EnvTraits:
         individual: Name of the argument that selects one of several individuals; may be empty.
         has_demonstrator: Whether it has an expert for its task.
         adapts_source: Whether it can adapt its source.
+        measures: What a policy is measured by, the default first.
     """
 
     observation_layout: Layout
@@ -148,6 +149,7 @@ class EnvTraits:
     individual: str
     has_demonstrator: bool
     adapts_source: bool
+    measures: tuple[Measure, ...]
 
 
 def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
@@ -167,6 +169,7 @@ def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
         individual=getattr(inner, "individual", ""),
         has_demonstrator=isinstance(inner, HasDemonstrator),
         adapts_source=isinstance(inner, SourceAdaptation),
+        measures=measures_of(env),
     )
 
 

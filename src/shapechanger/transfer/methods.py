@@ -24,6 +24,7 @@ from shapechanger.transfer.learners.evaluation import (
     evaluate,
     evaluation_envs,
     random_actions,
+    zero_actions,
 )
 from shapechanger.transfer.learners.ppo import PpoLearner, use_one_thread
 from shapechanger.transfer.learners.sac import CameraLearner
@@ -136,6 +137,8 @@ def perform_run(
     curve: list[Evaluation] = []
 
     def on_evaluation(evaluation: Evaluation) -> None:
+        if run.kind != "source":
+            evaluation.value(plan.measure)  # A reward term that the env lacks is refused here.
         if not math.isfinite(evaluation.mean_return):
             raise StudyError(
                 f"{run.name} diverged: its return after {evaluation.steps} steps is "
@@ -152,8 +155,8 @@ def perform_run(
             return learner.load(given.path, trust=given.trust)
         return learner.load(policy_path(Path(study), Run("source", run.index)))
 
-    if run.kind == "random":
-        on_evaluation(_evaluate_random(plan, run))
+    if run.kind in ("random", "zero-action"):
+        on_evaluation(_evaluate_unskilled(plan, run))
     elif run.kind == "zero-shot":
         on_evaluation(learner.evaluate(target, source_policy(), plan.body_map))
     else:
@@ -209,14 +212,16 @@ def adapt_source(plan: Plan, run: Run) -> EnvRef:
     return plan.task.source.having(more)
 
 
-def _evaluate_random(plan: Plan, run: Run) -> Evaluation:
-    """Evaluate random actions in the target."""
+def _evaluate_unskilled(plan: Plan, run: Run) -> Evaluation:
+    """Evaluate random actions, or the action zero, in the target."""
     envs = evaluation_envs(plan.target_of(run), plan.settings)
     try:
         # Each run draws its own actions, from starts of its own.
         seed = plan.seed_of(run)
-        actions = random_actions(envs[0].action_space, seed)
-        return evaluate(actions, envs, seed, episodes=plan.settings.eval_episodes)
+        draw = random_actions if run.kind == "random" else zero_actions
+        return evaluate(
+            draw(envs[0].action_space, seed), envs, seed, episodes=plan.settings.eval_episodes
+        )
     finally:
         for env in envs:
             env.close()

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from shapechanger.errors import StudyError, UnknownName
+from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import Settings
@@ -25,14 +26,15 @@ __all__ = [
 ]
 
 Arm = Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"]
-RunKind = Literal["source", "random"] | Arm
+RunKind = Literal["source", "random", "zero-action"] | Arm
 
 ARMS: Final[tuple[Arm, ...]] = ("scratch", "zero-shot", "fine-tune")
 """Arms that every pair of envs can be compared by."""
 ADAPTED_SOURCE_ARMS: Final[tuple[Arm, ...]] = ("randomised", "identified")
 """Arms that learn in a source adapted to the target (source adaptation)."""
 EVERY_ARM: Final[tuple[Arm, ...]] = (*ARMS, *ADAPTED_SOURCE_ARMS)
-_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM)
+# Seeds follow from the place in this list: append only.
+_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM, "zero-action")
 # Welch's interval needs two of each.
 _MIN_SEEDS: Final = 2
 
@@ -55,6 +57,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         task: Source and target.
         body_map: Map between their layouts.
+        measure: What runs are compared by: the name of a measure of the target, of one of its
+            reward terms, or "return".
+        unit: Unit of the measure.
         learner: Name of the learner.
         settings: Its settings, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
@@ -77,6 +82,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     task: TransferTask
     body_map: BodyMap
+    measure: str = RETURN.name
+    unit: str = RETURN.unit
     learner: str
     settings: Settings
     steps: int
@@ -106,11 +113,14 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     def runs(self) -> tuple[Run, ...]:
         """Every run of the study; those that others depend on come first."""
         given = bool(self.source_policy)
-        wanted: list[RunKind] = ["random", *(arm for arm in EVERY_ARM if arm in self.arms)]
+        arms = [arm for arm in EVERY_ARM if arm in self.arms]
+        wanted: list[RunKind] = ["random", "zero-action", *arms]
         if not given and {"zero-shot", "fine-tune"} & set(self.arms):
             wanted.insert(0, "source")
-        # One given policy does the same in every run.
-        once = {"zero-shot"} if given and not self.individual else set[str]()
+        # One given policy does the same in every run, and so does an action.
+        once = set[str]() if self.individual else {"zero-action"}
+        if given and not self.individual:
+            once.add("zero-shot")
         return tuple(
             Run(kind, i) for kind in wanted for i in range(1 if kind in once else self.seeds)
         )

@@ -13,7 +13,14 @@ import msgspec
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import ForeignStudy, ShapechangerError, SpaceMismatch, StudyError
+from shapechanger.errors import (
+    ForeignStudy,
+    ShapechangerError,
+    SpaceMismatch,
+    StudyError,
+    UnknownName,
+)
+from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
@@ -87,8 +94,8 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
         return [result for result in self.runs if result.run.kind == kind]
 
     def curves(self, kind: RunKind) -> LearningCurves:
-        """Return the learning curves of one kind of run, in units of return."""
-        return _curves(self.of(kind))
+        """Return the learning curves of one kind of run, in units of the measure."""
+        return _curves(self.plan, self.of(kind))
 
 
 class TaskTraits(NamedTuple):
@@ -171,6 +178,7 @@ def make_plan(
     rules: Mapping[str, Any] | None = None,
     map_text: str = "",
     units: str = "same",
+    measure: str = "",
     traits: TaskTraits | None = None,
 ) -> Plan:
     """Plan a study.
@@ -189,10 +197,12 @@ def make_plan(
         rules: Rules of the body map for entries without a partner, as in `BodyMap.between`.
         map_text: The body map as TOML, in place of `rules` and `units`.
         units: "same" or "torque", as in `BodyMap.between`.
+        measure: Name of a measure of the target, of one of its reward terms, or "return"; empty
+            for the target's default.
         traits: What `inspect_task` returned for the task; None to inspect it now.
 
     Raises:
-        UnknownName: If an env, an arm or a feature does not exist.
+        UnknownName: If an env, an arm, a measure or a feature does not exist.
         MapError: If the spaces cannot be mapped.
         StudyError: If the budget or the number of seeds is too small, the given policy is of
             another kind of learner, or an env lacks what the learner needs.
@@ -210,6 +220,7 @@ def make_plan(
             f"{task.target} cannot adapt {task.source} to itself, which the arms "
             f"{' and '.join(ADAPTED_SOURCE_ARMS)} need: leave them out."
         )
+    measured = _measure(traits.target, measure)
     wanted = settings.steps if steps is None else steps
     require_budget(wanted, settings)
     budget = settings.whole_updates(wanted)
@@ -240,6 +251,8 @@ def make_plan(
             if map_text
             else BodyMap.between(*layouts, rules=rules, units=cast("Any", units))
         ),
+        measure=measured.name,
+        unit=measured.unit,
         learner=learner,
         settings=settings,
         steps=budget,
@@ -257,6 +270,22 @@ def make_plan(
             **{name: version_of(name) for name in _PACKAGES},
         },
     )
+
+
+def _measure(target: EnvTraits, name: str) -> Measure:
+    """Return a measure of the target; a reward term is taken as given.
+
+    Raises:
+        UnknownName: If there is none of this name.
+    """
+    known = {measure.name: measure for measure in target.measures}
+    if not name:
+        return target.measures[0]
+    if name in known:
+        return known[name]
+    if name.startswith("reward_"):
+        return Measure(name, RETURN.unit)
+    raise UnknownName("measure", name, known)
 
 
 def run_study(
@@ -389,13 +418,21 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
     by_kind: dict[RunKind, list[RunResult]] = {}
     for result in results:
         by_kind.setdefault(result.run.kind, []).append(result)
-    scratch = _curves(by_kind["scratch"])
+    curves = {kind: _curves(plan, by_kind[kind]) for kind in by_kind if kind != "source"}
+    scratch = curves["scratch"]
     last_k = min(plan.last_k, scratch.n_evals)
-    reference = Reference.of(scratch, _curves(by_kind["random"]).returns, last_k)
+    reference = Reference.of(
+        {
+            "random actions": float(curves["random"].returns.mean()),
+            "the zero action": float(curves["zero-action"].returns.mean()),
+            "untrained policies": float(scratch.returns[:, 0].mean()),
+        },
+        {arm: float(curves[arm].returns[:, -last_k:].mean()) for arm in plan.arms},
+    )
     summaries: dict[Arm, Summary] = {
         arm: summarise(
             scratch,
-            _curves(by_kind[arm]),
+            curves[arm],
             reference,
             source_steps=plan.source_steps,
             rng=np.random.default_rng(plan.seed),
@@ -415,8 +452,8 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
     )
 
 
-def _curves(results: list[RunResult]) -> LearningCurves:
-    """Learning curves of several runs."""
+def _curves(plan: Plan, results: list[RunResult]) -> LearningCurves:
+    """Learning curves of several runs, in units of the plan's measure."""
     steps = [float(evaluation.steps) for evaluation in results[0].curve]
-    returns = [[evaluation.mean_return for evaluation in result.curve] for result in results]
-    return LearningCurves(np.array(steps), np.array(returns))
+    values = [[e.value(plan.measure) for e in result.curve] for result in results]
+    return LearningCurves(np.array(steps), np.array(values))

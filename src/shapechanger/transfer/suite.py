@@ -24,7 +24,7 @@ from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_fold
 
 __all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_folder", "study_outcomes"]
 
-_OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "scratch")
+_OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
 _DEMONSTRATIONS: Final = "demonstrations"
 
@@ -180,7 +180,7 @@ def _outcome(study: Study) -> StudyOutcome:
     return StudyOutcome(
         study_folder(study.plan, Path()).name,
         final,
-        sum(run.curve[0].mean_return for run in zero_shot) / len(zero_shot) if zero_shot else None,
+        float(study.curves("zero-shot").returns.mean()) if zero_shot else None,
         float(tuned.returns[:, -1].mean()),
         study.plan.steps if first is None else first,
         _first_at(tuned, final),

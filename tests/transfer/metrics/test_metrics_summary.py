@@ -19,7 +19,7 @@ from shapechanger.transfer.metrics import (
 )
 
 STEPS = np.array([0.0, 10.0, 20.0])
-REFERENCE = Reference(random=-100.0, final=300.0)
+REFERENCE = Reference(zero=-100.0, one=300.0)
 # In scores: 0, 0.5, 1 on the mean; and 0.5, 1, 1.5.
 SCRATCH = LearningCurves(STEPS, np.array([[-120.0, 90.0, 290.0], [-80.0, 110.0, 310.0]]))
 ARM = LearningCurves(STEPS, np.array([[90.0, 280.0, 510.0], [110.0, 320.0, 490.0]]))
@@ -105,10 +105,10 @@ def test_same_generator_same_summary() -> None:
     assert summary() == summary()
 
 
-def test_scratch_that_did_not_learn_leaves_returns() -> None:
-    """Gains are then in units of return, and what needs scores is undefined with a reason."""
-    result = summary(reference=Reference(random=400.0, final=300.0))
-    assert result.unit == "return"
+def test_arms_that_did_not_learn_leave_values() -> None:
+    """Gains are then in units of the measure, and what needs scores is undefined with a reason."""
+    result = summary(reference=Reference(zero=400.0, one=300.0))
+    assert result.unit == "value"
     measured = result.in_target_steps
     assert measured.jumpstart.value == pytest.approx(200.0)
     assert measured.asymptotic_gain.value == pytest.approx(200.0)
@@ -121,7 +121,7 @@ def test_scratch_that_did_not_learn_leaves_returns() -> None:
         assert missing.value is None
         assert "no score" in missing.note
     assert len(measured.times_to_threshold) == len(DEFAULT_THRESHOLDS)
-    # In total steps the floor is the random policy's return: (400 · 10 + 200 · 10) / 20 - 100.
+    # In total steps the floor is what takes no skill: (400 · 10 + 200 · 10) / 20 - 100.
     assert result.in_total_steps.total_reward_gain.value == pytest.approx(200.0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import msgspec
@@ -28,6 +28,7 @@ __all__ = [
     "evaluate",
     "evaluation_envs",
     "random_actions",
+    "zero_actions",
 ]
 
 # Observations of shape (n, ...) in, actions of shape (n, ...) out.
@@ -185,3 +186,16 @@ def random_actions(space: gym.Space[Any], seed: int) -> Act:
     """Return a policy that draws actions uniformly from `space`."""
     space.seed(seed)
     return lambda observations: np.stack([space.sample() for _ in observations])
+
+
+def zero_actions(space: gym.Space[Any], seed: int) -> Act:
+    """Return a policy that always takes the action nearest to zero; `seed` is not used.
+
+    Args:
+        space: A box.
+        seed: Unused.
+    """
+    del seed
+    box = cast("gym.spaces.Box", space)
+    action = np.clip(np.zeros(box.shape, box.dtype), box.low, box.high)
+    return lambda observations: np.stack([action] * len(observations))

@@ -1,13 +1,14 @@
 """Learning curves and scores.
 
 A curve is linear between two evaluations. Every measure uses that, so areas, crossings and values
-between evaluations are consistent. A score of 0 is the random policy and 1 the end of scratch.
+between evaluations are consistent. A score of 0 takes no skill, and 1 is the end of the best arm.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -188,60 +189,61 @@ def _frozen_copy(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
     return copy
 
 
-# Two returns closer than this, relative to the larger of them and 1, are equal up to rounding.
+# Two values closer than this, relative to the larger of them and 1, are equal up to rounding.
 _SAME: Final = 1e-9
 
 
 class Reference(msgspec.Struct, frozen=True):
-    """The two returns that define the scale of scores, both measured on the target.
+    """The two values that define the scale of scores, both measured on the target.
 
-    score = (J - random) / (final - random)
+    score = (J - zero) / (one - zero)
 
-    The formula is that of D4RL (arXiv 2004.07219). Both ends belong to the target, because the
-    return of an expert on the source is no reference for another body. The reference is taken as
-    given: intervals of scores do not include its uncertainty.
+    The formula is that of D4RL (arXiv 2004.07219). Zero is what takes no skill: an ant that stands
+    still earns 1,000, so the random policy alone would be too low a floor. Both ends belong to the
+    target, because an expert on the source is no reference for another body. The reference is taken
+    as given: intervals of scores do not include its uncertainty.
 
     Attributes:
-        random: Mean return of the random policy.
-        final: Mean return of scratch over its last evaluations.
+        zero: Value without skill.
+        one: Value at the end of the best arm.
+        zero_of: What earned zero, such as "random actions".
+        one_of: Arm that earned one.
 
     Raises:
         StudyError: If one of them is not finite.
     """
 
-    random: float
-    final: float
+    zero: float
+    one: float
+    zero_of: str = ""
+    one_of: str = ""
 
     def __post_init__(self) -> None:
         """Check that both are finite."""
-        if not (math.isfinite(self.random) and math.isfinite(self.final)):
-            raise StudyError(
-                f"A reference needs finite returns, got {self.random} and {self.final}."
-            )
+        if not (math.isfinite(self.zero) and math.isfinite(self.one)):
+            raise StudyError(f"A reference needs finite values, got {self.zero} and {self.one}.")
 
     @classmethod
-    def of(cls, scratch: LearningCurves, random_returns: ArrayLike, last_k: int) -> Reference:
+    def of(cls, floors: Mapping[str, float], ends: Mapping[str, float]) -> Reference:
         """Measure the reference of a target.
 
         Args:
-            scratch: Curves of the runs from scratch, in units of return.
-            random_returns: Returns of the random policy, any shape.
-            last_k: Number of final evaluations that are averaged, >= 1.
+            floors: Mean values of what takes no skill, by name; at least one.
+            ends: Mean values at the end of each arm, by name; at least one.
 
         Raises:
-            StudyError: If there are fewer evaluations, or no finite random returns.
+            StudyError: If there are none.
         """
-        final = scratch.at(scratch.last_steps(last_k)).mean()
-        returns = np.asarray(random_returns, dtype=np.float64)
-        if returns.size == 0:
-            raise StudyError("A reference needs at least one return of the random policy.")
-        return cls(random=float(returns.mean()), final=float(final))
+        if not floors or not ends:
+            raise StudyError("A reference needs a floor and the end of an arm.")
+        zero_of, one_of = max(floors, key=floors.__getitem__), max(ends, key=ends.__getitem__)
+        return cls(floors[zero_of], ends[one_of], zero_of, one_of)
 
     @property
     def defined(self) -> bool:
-        """Return whether scores exist: scratch ended above the random policy beyond rounding."""
-        size = max(1.0, abs(self.random), abs(self.final))
-        return self.final - self.random > _SAME * size
+        """Return whether scores exist: an arm ended above what takes no skill, beyond rounding."""
+        size = max(1.0, abs(self.zero), abs(self.one))
+        return self.one - self.zero > _SAME * size
 
     def scores(self, curves: LearningCurves, *, clip: bool = False) -> LearningCurves:
         """Convert curves and their floor to scores.
@@ -249,21 +251,21 @@ class Reference(msgspec.Struct, frozen=True):
         Args:
             curves: Curves in units of return.
             clip: Clip each evaluation to 0 and 1, as `forward_transfer` needs, whose formula takes
-                1 as the maximum. The other measures need unclipped scores, since an arm can beat
-                scratch.
+                1 as the maximum. The other measures need unclipped scores, since a run can beat
+                the mean of the best arm.
 
         Raises:
-            StudyError: If scratch did not learn, so that scores are undefined.
+            StudyError: If no arm learned, so that scores are undefined.
         """
         if not self.defined:
             raise StudyError(
-                f"Scratch ended at {self.final:g} and the random policy is worth {self.random:g}: "
-                "scratch did not learn, so there are no scores. Compare returns instead."
+                f"The best arm ended at {self.one:g}, and {self.zero:g} takes no skill: no arm "
+                "learned, so there are no scores. Compare values instead."
             )
         low, high = (0.0, 1.0) if clip else (-math.inf, math.inf)
 
         def score(returns: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.clip((returns - self.random) / (self.final - self.random), low, high)
+            return np.clip((returns - self.zero) / (self.one - self.zero), low, high)
 
         return dataclasses.replace(
             curves,

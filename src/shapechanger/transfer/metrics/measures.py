@@ -144,7 +144,7 @@ def auc_ratio(
     """Area under the arm's curve over that of scratch, a pure number; 1 if they are equal.
 
     ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It depends on constants
-    added to the reward, so it is meaningful for scores only, where 0 is the random policy.
+    added to the reward, so it is meaningful for scores only, where 0 takes no skill.
     Undefined unless scratch's area is above zero.
 
     Args:
@@ -352,7 +352,7 @@ def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
 # A grid, because a single threshold could be chosen in hindsight. In units of score.
 DEFAULT_THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
 
-_NO_SCORES: Final = "Undefined: scratch did not end above the random policy, so there is no score."
+_NO_SCORES: Final = "Undefined: no arm ended above what takes no skill, so there is no score."
 
 
 class Measures(msgspec.Struct, frozen=True):
@@ -379,9 +379,9 @@ class Summary(msgspec.Struct, frozen=True):
     """All measures of one arm against scratch, with their basis.
 
     Attributes:
-        unit: Unit of the gains: "score", or "return" where scratch did not learn, so that there
-            are no scores and only jumpstart, asymptotic gain and total reward gain exist.
-        reference: The scale of scores. A gain in returns is one in scores times final - random.
+        unit: Unit of the gains: "score", or "value" where no arm learned, so that there are no
+            scores and only jumpstart, asymptotic gain and total reward gain exist.
+        reference: The scale of scores. A gain in values is one in scores times one - zero.
         horizon: H, the budget in steps, for both ways of counting.
         source_steps: Training steps of the arm on the source.
         n_seeds_arm: Training runs of the arm.
@@ -392,7 +392,7 @@ class Summary(msgspec.Struct, frozen=True):
         in_total_steps: Measures in total steps.
     """
 
-    unit: Literal["score", "return"]
+    unit: Literal["score", "value"]
     reference: Reference
     horizon: float
     source_steps: float
@@ -443,7 +443,7 @@ def summarise(
         )
 
     return Summary(
-        unit="score" if reference.defined else "return",
+        unit="score" if reference.defined else "value",
         reference=reference,
         horizon=scratch.horizon,
         source_steps=float(source_steps),
@@ -452,7 +452,7 @@ def summarise(
         last_k=last_k,
         confidence=confidence,
         in_target_steps=measure(arm),
-        in_total_steps=measure(in_total_steps(arm, source_steps, floor=reference.random)),
+        in_total_steps=measure(in_total_steps(arm, source_steps, floor=reference.zero)),
     )
 
 
