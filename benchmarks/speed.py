@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.stepping import fast_model
 from benchmarks.row import Row
+from shapechanger.envs.stepping import fast_model
 from shapechanger.envs.stepping.tuned import paused_timer
 
 __all__ = ["single"]

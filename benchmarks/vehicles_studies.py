@@ -53,7 +53,7 @@ def tries() -> list[Row]:
     out = Path("results", "Car-to-Tank-sac")
     Transfer("Car", "Tank", learner="sac", seeds=_seeds(), out=out).run()
     study = msgspec.json.decode((out / STUDY_FILE).read_bytes(), type=Study)
-    return [_row(crossing) for crossing in study_outcomes([study])]
+    return [_row(crossing) for crossing in study_outcomes({"Car-to-Tank": study})]
 
 
 def _suite(name: Literal["vehicles", "lenses"]) -> list[StudyOutcome]:

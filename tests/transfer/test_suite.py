@@ -21,7 +21,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
-from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_folder, study_outcomes
+from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_outcomes
 from tests.reports.studies import make_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import files_of
@@ -66,6 +66,12 @@ def _plan(source: EnvRef, target: EnvRef, **more: Any) -> Plan:
     return make_plan(task, "cloning", QUICK_CLONING, **{"seeds": 2, **more})
 
 
+def _study(plan: Plan) -> str:
+    """Name of a study of two lanes, such as Dry-to-Wet."""
+    ends = (plan.task.source, plan.task.target)
+    return "-to-".join(env.id.rpartition("/")[2].removesuffix("-v1") for env in ends)
+
+
 def _names(*kinds: str) -> set[str]:
     """Names of the runs of two seeds; the action zero needs one run."""
     return {
@@ -84,7 +90,7 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a suite in which Dry-to-Wet is done; tests work on copies."""
     out = tmp_path_factory.mktemp("suite") / "suite"
     told = _Told()
-    run_in_suite(_plan(DRY, WET), out, executor=told)
+    run_in_suite(_plan(DRY, WET), out, _study(_plan(DRY, WET)), executor=told)
     assert set(told.names) == _names(*_KINDS)
     return out
 
@@ -99,7 +105,7 @@ def _asked_for(plan: Plan, out: Path) -> set[str]:
     """The runs that a study beside the others would do; it does none."""
     told = _Told(refuses=True)
     with pytest.raises(_Stopped):
-        run_in_suite(plan, out, executor=told)
+        run_in_suite(plan, out, _study(plan), executor=told)
     return set(told.names)
 
 
@@ -109,7 +115,7 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
     assert _asked_for(plan, out) == _names(
         "random", "zero-action", "scratch", "zero-shot", "fine-tune"
     )
-    there, here = out / "Dry-to-Wet", study_folder(plan, out)
+    there, here = out / "Dry-to-Wet", out / _study(plan)
     assert here == out / "Dry-to-Icy"
     for name in _names("source"):
         taken_over = files_of(here / "runs" / name)
@@ -124,7 +130,7 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
 def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
     """Another source, the same target; and the study says what it says when it is alone."""
     plan, told = _plan(ICY, WET), _Told()
-    beside = run_in_suite(plan, out, executor=told)
+    beside = run_in_suite(plan, out, _study(plan), executor=told)
     assert set(told.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "zero-action", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
@@ -178,7 +184,7 @@ def test_what_is_there_already_stays(out: Path) -> None:
     _asked_for(plan, out)
     assert taken_over.stat().st_ino == before
     told = _Told()
-    run_in_suite(_plan(DRY, WET), out, executor=told)
+    run_in_suite(_plan(DRY, WET), out, _study(_plan(DRY, WET)), executor=told)
     assert told.names == []
 
 
@@ -197,7 +203,7 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
     with monkeypatch.context() as patch:
         patch.setattr(suite.shutil, "copytree", full)
         with pytest.raises(OutputError, match="source-0: No space left"):
-            run_in_suite(plan, out, executor=_Told(refuses=True))
+            run_in_suite(plan, out, _study(plan), executor=_Told(refuses=True))
     assert not (runs / "source-0").exists()
     _asked_for(plan, out)
     assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
@@ -208,23 +214,17 @@ def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
     """It may hold what is wanted here, so somebody should look at it."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
     with pytest.raises(CorruptStudy, match=r"to-Wet/plan\.json .*delete .*to-Wet to repeat"):
-        run_in_suite(_plan(DRY, ICY), out, executor=_Told(refuses=True))
+        run_in_suite(_plan(DRY, ICY), out, _study(_plan(DRY, ICY)), executor=_Told(refuses=True))
 
 
 def test_a_folder_of_another_study_is_left_alone(out: Path) -> None:
     """The same pair with another seed is another study."""
     before = files_of(out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
-        run_in_suite(_plan(DRY, WET, seed=1), out, executor=Serial())
+        run_in_suite(
+            _plan(DRY, WET, seed=1), out, _study(_plan(DRY, WET, seed=1)), executor=Serial()
+        )
     assert files_of(out) == before
-
-
-def test_a_folder_is_named_after_both_bodies_and_what_is_wrong_with_the_camera() -> None:
-    """So that studies of one pair with several lenses have folders of their own."""
-    car = EnvRef("shapechanger/Car-v1", {"put_back": True})
-    dark = EnvRef("shapechanger/Car-v1", {"put_back": True, "lenses": ["night", "dirt"]})
-    plan = msgspec.structs.replace(make_study().plan, task=TransferTask(car, dark))
-    assert study_folder(plan, Path("all")) == Path("all", "Car-to-Car-night-dirt")
 
 
 _STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluation each 1,024.
@@ -239,7 +239,7 @@ def _crossing(
     fine_tune: NDArray[np.float64], scratch: NDArray[np.float64] = _STEADY, **more: Any
 ) -> StudyOutcome:
     (found,) = study_outcomes(
-        [make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)]
+        {"Ant-to-BigAnt": make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)}
     )
     return found
 
@@ -294,7 +294,7 @@ def test_half_is_less_than_half() -> None:
 def test_zero_shot_may_be_left_out_and_order_is_kept() -> None:
     """One line for each study, in their order."""
     without = make_study(arms=("scratch", "fine-tune"))
-    found = study_outcomes([without, make_study(target=EnvRef("shapechanger/ExtendedAnt-v1"))])
-    assert [crossing.name for crossing in found] == ["Ant-to-BigAnt", "Ant-to-ExtendedAnt"]
+    found = study_outcomes({"first": without, "second": make_study()})
+    assert [crossing.name for crossing in found] == ["first", "second"]
     assert found[0].zero_shot is None
     assert found[1].zero_shot is not None

@@ -1,32 +1,189 @@
-"""`shapechanger suite`: several studies with a joint table."""
+"""`shapechanger suite`: several studies with a joint table, described in a TOML file."""
 
 from __future__ import annotations
 
+import difflib
+import json
+import re
 import shlex
 import sys
+import tomllib
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import permutations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
+import msgspec
 import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
-from shapechanger.cli.env_arguments import driven, env_ref, require_seed
+from shapechanger.cli.env_arguments import default_learner, driven, env_ref, require_seed
 from shapechanger.cli.transfer import run_steps, write_study_report
+from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
-    from shapechanger.transfer.plan import TransferTask
+    from shapechanger.transfer.learners.settings import Settings
+    from shapechanger.transfer.plan import Plan, TransferTask
+    from shapechanger.transfer.study import TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
-__all__ = ["Suite"]
+__all__ = ["SuiteFile", "load_suite", "shipped_suites", "suite_tasks"]
 
-_VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
-_LENSES: Final = ("night", "glare", "blur", "dirt")
+_SHIPPED: Final = Path(__file__).parent / "suites"
 _SUMMARY: Final = "suite.json"
-_STEPS_A_MINUTE: Final = 1200.0
 _FILE_WIDTH: Final = 200
+
+
+class _Body(msgspec.Struct, forbid_unknown_fields=True):
+    """An env with another body, lens or argument."""
+
+    env: str
+    name: str = ""
+    body: str | list[dict[str, Any]] = ""
+    lenses: tuple[str, ...] = ()
+    options: dict[str, Any] = {}
+
+
+class _Sweep(msgspec.Struct, forbid_unknown_fields=True):
+    """Targets that differ in one number of one edit."""
+
+    env: str
+    edit: dict[str, Any]
+    field: str
+    values: tuple[float, ...]
+
+
+_Env = str | _Body
+
+
+class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
+    """What a suite runs; one of `envs`, `pairs`, or `sources` with `targets` or `sweep`.
+
+    Attributes:
+        envs: All ordered pairs of different ones of these.
+        pairs: Sources with their targets.
+        sources: Sources, each with every target.
+        targets: Targets.
+        sweep: Targets that differ in one number of one edit of their body.
+        learner: Name of the learner; empty for the one tuned on the target.
+        settings: Settings of the learner that replace its own.
+        arms: Arms of each study; empty for scratch, zero-shot and fine-tune.
+        measure: As in `make_plan`.
+        seeds: Runs of each arm.
+        steps: Target steps of a run; None for the learner's own number.
+        source_steps: Source steps of a source policy; None for the learner's own number.
+        seed: The seed from which the seeds of all runs are drawn.
+    """
+
+    envs: tuple[_Env, ...] = ()
+    pairs: tuple[tuple[_Env, _Env], ...] = ()
+    sources: tuple[_Env, ...] = ()
+    targets: tuple[_Env, ...] = ()
+    sweep: _Sweep | None = None
+    learner: str = ""
+    settings: dict[str, Any] = {}
+    arms: tuple[str, ...] = ()
+    measure: str = ""
+    seeds: int = 5
+    steps: int | None = None
+    source_steps: int | None = None
+    seed: int = 0
+
+
+def shipped_suites() -> tuple[str, ...]:
+    """Return the names of the suites that come with Shapechanger."""
+    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
+
+
+def load_suite(name: str) -> SuiteFile:
+    """Load a suite.
+
+    Args:
+        name: A TOML file, or the name of a shipped suite.
+
+    Raises:
+        UnknownName: If there is no such file or suite.
+        StudyError: If the file is no TOML, or a key or value of it is wrong; with its line.
+    """
+    path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UnknownName("suite", name, shipped_suites()) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"The suite {path} cannot be read: {error}.") from error
+    try:
+        return msgspec.convert(tomllib.loads(text), SuiteFile)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{path} is no TOML: {error}.") from None
+    except msgspec.ValidationError as error:
+        raise StudyError(f"{path}{_explain(text, str(error))}") from None
+
+
+def _explain(text: str, reason: str) -> str:
+    """Locate a mistake in a TOML file and suggest the nearest key."""
+    found = re.search(r"unknown field `(\w+)`", reason) or re.search(r"\$\.(\w+)", reason)
+    if found is None:
+        return f": {reason}."
+    key = found[1]
+    lines = text.splitlines()
+    at = next((i for i, line in enumerate(lines, 1) if re.match(rf"\W*{key}\b", line)), 1)
+    if "unknown field" not in reason:
+        return f", line {at}: {reason}."
+    known = [field.name for field in msgspec.structs.fields(SuiteFile)]
+    close = difflib.get_close_matches(key, known, n=1)
+    meant = f" Did you mean {close[0]!r}?" if close else ""
+    return f", line {at}: a suite has no key {key!r}.{meant} Keys: {', '.join(known)}."
+
+
+def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
+    """Return the name and the task of each study of a suite.
+
+    Raises:
+        StudyError: If the suite has no pairs, or names them in two ways.
+        UnknownName: If an env, or a name in a body, does not exist.
+    """
+    from shapechanger.transfer.plan import TransferTask
+
+    ways = [bool(suite.envs), bool(suite.pairs), bool(suite.sources)]
+    if sum(ways) != 1 or bool(suite.sources) != bool(suite.targets or suite.sweep):
+        raise StudyError(
+            "A suite names its studies in one way: as envs, as pairs, or as sources with targets "
+            "or a sweep."
+        )
+    targets = [*suite.targets, *(_swept(suite.sweep) if suite.sweep else ())]
+    pairs = [*permutations(suite.envs, 2), *suite.pairs, *product(suite.sources, targets)]
+    tasks = [
+        (f"{_name(one)}-to-{_name(other)}", TransferTask(_ref(one), _ref(other)))
+        for one, other in pairs
+    ]
+    names = [name for name, _ in tasks]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise StudyError(f"Several studies are called {twice[0]}: give their envs a `name`.")
+    return tasks
+
+
+def _swept(sweep: _Sweep) -> list[_Body]:
+    return [
+        _Body(sweep.env, f"{sweep.env}-{value:g}", [{**sweep.edit, sweep.field: value}])
+        for value in sweep.values
+    ]
+
+
+def _ref(env: _Env) -> EnvRef:
+    if isinstance(env, str):
+        return driven(env_ref(env))
+    body = env.body if isinstance(env.body, str) else json.dumps(env.body)
+    return driven(env_ref(env.env, body), env.lenses).having(env.options)
+
+
+def _name(env: _Env) -> str:
+    """The env's name as a part of a folder's name."""
+    if isinstance(env, _Body):
+        return env.name or "-".join([_name(env.env), *env.lenses])
+    return env.rpartition("/")[2].removesuffix("-v1")
 
 
 @dataclass(frozen=True)
@@ -36,17 +193,21 @@ class Suite:
     Run the same command again to resume, or with more seeds to add to it.
     """
 
-    name: Annotated[Literal["vehicles", "lenses"], tyro.conf.Positional]
-    """The twelve ordered pairs of car, tank, truck and boat; or the car with something wrong with
-    its camera."""
-    seeds: int = 5
-    """Runs of each arm."""
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
+    """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, pendulums,
+    shank or vehicles."""
+    seeds: int | None = None
+    """Runs of each arm; the suite's own number if not given."""
     steps: int | None = None
-    """Demonstrated steps on the target, 1,200 a minute; ten minutes if not given."""
+    """Target steps of a run; the suite's own number if not given."""
+    source_steps: int | None = None
+    """Source steps of a source policy; the suite's own number if not given."""
+    only: tuple[str, ...] = ()
+    """Names of the studies to run, such as Ant-to-BigAnt; all if not given."""
     out: Path | None = None
     """The suite's folder; results/NAME if not given."""
-    seed: int = 0
-    """Number that the seeds of all runs are drawn from."""
+    seed: int | None = None
+    """Number that the seeds of all runs are drawn from; the suite's own if not given."""
     workers: int | None = None
     """Runs at a time; one for each core if not given."""
 
@@ -54,36 +215,31 @@ class Suite:
         """Run the studies, write their reports, and print the joint table."""
         from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.files import write_json
-        from shapechanger.transfer.learners.settings import learner_settings
-        from shapechanger.transfer.study import inspect_task, make_plan, unfinished_runs
+        from shapechanger.transfer.study import inspect_task, unfinished_runs
         from shapechanger.transfer.suite import open_study_folder, run_in_suite, study_outcomes
 
-        require_seed(self.seed)
-        out = self.out or Path("results", self.name)
+        suite = load_suite(self.name)
+        require_seed(suite.seed if self.seed is None else self.seed)
+        tasks = dict(suite_tasks(suite))
+        for name in self.only:
+            if name not in tasks:
+                raise UnknownName("study", name, tasks)
+        out = self.out or Path("results", Path(self.name).stem)
         command = shlex.join(["shapechanger", *sys.argv[1:]])
         # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
-        settings = learner_settings("cloning")
         found: list[StudyOutcome] = []
-        for task in self._tasks():
-            traits = inspect_task(task)
-            plan = make_plan(
-                task,
-                "cloning",
-                settings,
-                seeds=self.seeds,
-                steps=self.steps,
-                source_steps=settings.steps if self.steps is None else self.steps,
-                seed=self.seed,
-                traits=traits,
-            )
+        for name in self.only or tasks:
+            traits = inspect_task(tasks[name])
+            plan = self._plan(suite, tasks[name], traits)
             try:
-                folder = open_study_folder(plan, out)
+                folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
                     study = run_in_suite(
                         plan,
                         out,
+                        name,
                         executor=executor,
                         on_progress=progress,
                         command=command,
@@ -92,50 +248,79 @@ class Suite:
             except KeyboardInterrupt:
                 raise Interrupted(f"Stopped. Go on with: {command}") from None
             write_study_report(study, folder)
-            found += study_outcomes([study])
+            found += study_outcomes({name: study})
             write_json(out / _SUMMARY, found)
             console.print(f"wrote {folder / 'report.html'}", soft_wrap=True)
         console.print(_table(found))
+        halves = sum(outcome.halves for outcome in found)
         console.print(
-            "Gains are of fine-tuning over scratch, in scores (0: random actions, 1: what scratch "
-            "ends with), with 95 % intervals over seeds.",
-            soft_wrap=True,
-        )
-        halves = sum(crossing.halves for crossing in found)
-        console.print(
+            "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the end "
+            "of the best arm), with 95 % intervals over seeds.\n"
             f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
-            "half of scratch's minutes.",
+            "half of scratch's steps.",
             soft_wrap=True,
         )
 
-    def _tasks(self) -> list[TransferTask]:
-        from shapechanger.transfer.plan import TransferTask
+    def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
+        """The plan of one study."""
+        from shapechanger.transfer.study import default_arms, make_plan
 
-        if self.name == "vehicles":
-            pairs = permutations(_VEHICLES, 2)
-            return [TransferTask(driven(env_ref(a)), driven(env_ref(b))) for a, b in pairs]
-        car = env_ref("Car")
-        return [TransferTask(driven(car), driven(car, (lens,))) for lens in _LENSES]
+        learner = suite.learner or default_learner(task.target)
+        return make_plan(
+            task,
+            learner,
+            _settings(learner, suite.settings),
+            seeds=suite.seeds if self.seeds is None else self.seeds,
+            steps=suite.steps if self.steps is None else self.steps,
+            source_steps=suite.source_steps if self.source_steps is None else self.source_steps,
+            arms=suite.arms or default_arms(traits),  # pyright: ignore[reportArgumentType]
+            seed=suite.seed if self.seed is None else self.seed,
+            measure=suite.measure,
+            traits=traits,
+        )
+
+
+def _settings(learner: str, changed: dict[str, Any]) -> Settings:
+    """The settings of a learner, some of them replaced.
+
+    Raises:
+        UnknownName: If the learner has no such setting.
+        StudyError: If a value is of the wrong type.
+    """
+    from shapechanger.transfer.learners.settings import learner_settings
+
+    settings = learner_settings(learner)
+    known: dict[str, Any] = msgspec.structs.asdict(settings)
+    for name in changed:
+        if name not in known:
+            raise UnknownName(f"setting of {learner}", name, known)
+    try:
+        return msgspec.convert(
+            {**msgspec.to_builtins(settings), **changed}, type(settings), strict=True
+        )
+    except msgspec.ValidationError as error:
+        raise StudyError(f"The settings of {learner} are wrong: {error}.") from None
 
 
 def _table(found: list[StudyOutcome]) -> Table:
-    """Format the results: returns and minutes, then gains with intervals."""
+    """Format the results: values and steps, then gains with intervals."""
     from shapechanger.reports.numbers import estimate_text
 
     table = Table(
-        *("study", "scratch", "zero-shot", "fine-tuned", "scratch, min", "fine-tune, min"),
-        *("jumpstart", "total reward gain", "gain at the end"),
+        *("study", "measure", "scratch", "zero-shot", "fine-tuned", "scratch, steps"),
+        *("fine-tune, steps", "jumpstart", "total reward gain", "gain at the end"),
         box=None,
     )
-    for crossing in found:
-        tuned = crossing.fine_tune_steps
+    for outcome in found:
+        tuned = outcome.fine_tune_steps
         table.add_row(
-            crossing.name,
-            f"{crossing.final:.1f}",
-            "" if crossing.zero_shot is None else f"{crossing.zero_shot:.1f}",
-            f"{crossing.fine_tuned:.1f}",
-            f"{crossing.scratch_steps / _STEPS_A_MINUTE:.1f}",
-            "never" if tuned is None else f"{tuned / _STEPS_A_MINUTE:.1f}",
-            *(estimate_text(gain, signed=True) for gain in crossing.gains.values()),
+            outcome.name,
+            outcome.measure,
+            f"{outcome.final:.4g}",
+            "" if outcome.zero_shot is None else f"{outcome.zero_shot:.4g}",
+            f"{outcome.fine_tuned:.4g}",
+            f"{outcome.scratch_steps:,.0f}",
+            "never" if tuned is None else f"{tuned:,.0f}",
+            *(estimate_text(gain, signed=True) for gain in outcome.gains.values()),
         )
     return table

@@ -8,13 +8,14 @@ runs from the finished studies of its suite.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
 from shapechanger.errors import OutputError
+from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
 from shapechanger.transfer.methods import load_result
@@ -22,7 +23,7 @@ from shapechanger.transfer.metrics import Estimate, LearningCurves
 from shapechanger.transfer.plan import Plan, RunKind
 from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
 
-__all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_folder", "study_outcomes"]
+__all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_outcomes"]
 
 _OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
@@ -34,14 +35,15 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
     Attributes:
         name: SOURCE-to-TARGET.
-        final: Final return of scratch, mean over seeds.
-        zero_shot: Return of the source policy without training; None if that arm is missing.
-        fine_tuned: Final return of fine-tuning, mean over seeds.
+        final: Measure of scratch at its end, mean over seeds.
+        zero_shot: Measure of the source policy without training; None if that arm is missing.
+        fine_tuned: Measure of fine-tuning at its end, mean over seeds.
         scratch_steps: Steps at which scratch first reaches `final`.
         fine_tune_steps: Steps at which fine-tuning first reaches `final`; None if it never does.
         unit: Unit of the gains, see `Summary`.
         gains: Gains of fine-tuning over scratch, in target steps and with intervals: `jumpstart`,
             `total_reward_gain` and `asymptotic_gain`.
+        measure: Name of the measure.
     """
 
     name: str
@@ -52,6 +54,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
     fine_tune_steps: float | None
     unit: str = "score"
     gains: dict[str, Estimate] = {}
+    measure: str = RETURN.name
 
     @property
     def halves(self) -> bool:
@@ -59,23 +62,10 @@ class StudyOutcome(msgspec.Struct, frozen=True):
         return self.fine_tune_steps is not None and self.fine_tune_steps < self.scratch_steps / 2
 
 
-def study_folder(plan: Plan, out: Path) -> Path:
-    """Return the folder of a study of a suite.
-
-    Args:
-        plan: The plan of the study.
-        out: Folder of the suite.
-    """
-    return out / "-to-".join(
-        env.id.split("/")[-1].removesuffix("-v1")
-        + "".join(f"-{lens}" for lens in env.kwargs.get("lenses", ()))
-        for env in (plan.task.source, plan.task.target)
-    )
-
-
 def run_in_suite(
     plan: Plan,
     out: Path,
+    name: str,
     *,
     executor: Executor | None = None,
     on_progress: OnProgress = lambda name, steps, ended: None,
@@ -87,6 +77,7 @@ def run_in_suite(
     Args:
         plan: The plan of the study.
         out: Folder of the suite.
+        name: Name of the study, which is that of its folder.
         executor: As in `run_study`.
         on_progress: As in `run_study`.
         command: As in `run_study`.
@@ -97,18 +88,19 @@ def run_in_suite(
         CorruptStudy: If a file in one cannot be read.
         OutputError: If `out` cannot be written.
     """
-    folder = open_study_folder(plan, out)
+    folder = open_study_folder(plan, out, name)
     return run_study(
         plan, folder, executor=executor, on_progress=on_progress, command=command, traits=traits
     )
 
 
-def open_study_folder(plan: Plan, out: Path) -> Path:
+def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
     """Make a study's folder below `out`, with the runs that other studies there share with it.
 
     Args:
         plan: The plan of the study.
         out: Folder of the suite.
+        name: Name of the study, which is that of its folder.
 
     Returns:
         The folder of the study.
@@ -119,7 +111,7 @@ def open_study_folder(plan: Plan, out: Path) -> Path:
         OutputError: If `out` cannot be written.
     """
     make_folder(out)
-    folder = study_folder(plan, out)
+    folder = out / name
     claim_folder(plan, folder)
     for other in sorted(out.glob(f"*/{PLAN_FILE}")):
         if other.parent != folder:
@@ -127,9 +119,9 @@ def open_study_folder(plan: Plan, out: Path) -> Path:
     return folder
 
 
-def study_outcomes(studies: Iterable[Study]) -> list[StudyOutcome]:
-    """Return the outcome of each study."""
-    return [_outcome(study) for study in studies]
+def study_outcomes(studies: Mapping[str, Study]) -> list[StudyOutcome]:
+    """Return the outcome of each study, by name."""
+    return [_outcome(name, study) for name, study in studies.items()]
 
 
 def _share(plan: Plan, folder: Path, sibling: Path) -> None:
@@ -170,7 +162,7 @@ def _copy_atomic(theirs: Path, mine: Path) -> None:
         raise OutputError(f"Cannot write {mine}: {error.strerror or error}.") from error
 
 
-def _outcome(study: Study) -> StudyOutcome:
+def _outcome(name: str, study: Study) -> StudyOutcome:
     scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
     final = float(scratch.returns[:, -1].mean())
     zero_shot = study.of("zero-shot")
@@ -178,14 +170,15 @@ def _outcome(study: Study) -> StudyOutcome:
     measures = summary.in_target_steps
     first = _first_at(scratch, final)
     return StudyOutcome(
-        study_folder(study.plan, Path()).name,
+        name,
         final,
         float(study.curves("zero-shot").returns.mean()) if zero_shot else None,
         float(tuned.returns[:, -1].mean()),
         study.plan.steps if first is None else first,
         _first_at(tuned, final),
         summary.unit,
-        {name: getattr(measures, name) for name in _GAINS},
+        {gain: getattr(measures, gain) for gain in _GAINS},
+        study.plan.measure,
     )
 
 

@@ -1,0 +1,82 @@
+"""Files of suites: those that ship, and what a mistake in one gets."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.cli.env_arguments import driven, env_ref
+from shapechanger.cli.suite import load_suite, shipped_suites, suite_tasks
+from shapechanger.transfer.plan import TransferTask
+
+
+def test_a_suite_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """The message names those that are, and the nearest."""
+    with pytest.raises(SystemExit) as stop:
+        main(["suite", "vehicle"])
+    assert stop.value.code == 2
+    message = capsys.readouterr().err
+    assert "Did you mean 'vehicles'?" in message
+    assert "lenses" in message
+
+
+def _pairs(name: str) -> list[tuple[str, str, str]]:
+    tasks = suite_tasks(load_suite(name))
+    return [(name, str(task.source), str(task.target)) for name, task in tasks]
+
+
+def test_the_shipped_suites_are_those_of_the_docs() -> None:
+    """All ordered pairs, the car with each lens alone, and nine lengths of an ant's shanks."""
+    counts = {name: len(_pairs(name)) for name in shipped_suites()}
+    assert counts == {"ants": 12, "lenses": 4, "pendulums": 6, "shank": 9, "vehicles": 12}
+    for _, task in suite_tasks(load_suite("vehicles")):
+        assert task.source.kwargs == task.target.kwargs == {"put_back": True}
+    lenses = dict(suite_tasks(load_suite("lenses")))
+    car = driven(env_ref("Car"))
+    assert lenses["Car-to-Car-night"] == TransferTask(car, driven(car, ("night",)))
+    shank = dict(suite_tasks(load_suite("shank")))["Ant-to-Ant-2.5"]
+    edits = [{"edit": "stretch", "body": "shank_*", "factor": 2.5}]
+    assert json.loads(shank.target.kwargs["body"]) == edits
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seeds = 3\nsed = 4\n", "line 2: a suite has no key 'sed'. Did you mean 'seed'?"),
+        ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
+        ("envs = [", "is no TOML"),
+        ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
+        ("sources = ['Ant']\n", "in one way"),
+        ("envs = ['Ant', 'Bigant', 'Hopper']\n", "Did you mean"),
+        (
+            "pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]\n",
+            "called Ant-to-Ant",
+        ),
+        (
+            "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-run'\n[settings]\nlearning_rte = 1.0\n",
+            "Did you mean 'learning_rate'?",
+        ),
+        (
+            "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-run'\n[settings]\nlearning_rate = 'x'\n",
+            "Expected `float`, got `str`",
+        ),
+        ("envs = ['Ant', 'BigAnt']\nmeasure = 'forward sped'\n", "Did you mean 'forward speed'?"),
+        ("envs = ['Ant', 'BigAnt']\narms = ['scratch', 'fine-tun']\n", "Did you mean 'fine-tune'?"),
+    ],
+)
+def test_a_wrong_file_gets_one_sentence(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the line where there is one, what exists and the nearest spelling; nothing is done."""
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(SystemExit) as stop:
+        main(["suite", str(file), "--out", str(tmp_path / "out")])
+    message = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert words in message
+    assert message.count("\n") == 1
+    assert not (tmp_path / "out").exists()
