@@ -99,7 +99,8 @@ def test_a_suite_is_one_command(undisturbed: tuple[Path, _Counting, str]) -> Non
     out, _, said = undisturbed
     lines = [line.strip() for line in said.splitlines()]
     header = next(i for i, line in enumerate(lines) if line.startswith("study"))
-    assert lines[header].startswith("study") and "zero-shot" in lines[header]
+    assert lines[header].startswith("study")
+    assert "zero-shot" in lines[header]
     assert lines[header].endswith("gain at the end")
     assert [line.split()[0] for line in lines[header + 1 : header + 7]] == _PAIRS
     for name in _PAIRS:
