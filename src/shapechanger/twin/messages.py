@@ -31,6 +31,7 @@ __all__ = [
     "InputEdges",
     "LayOutCourse",
     "LeaveBoard",
+    "PinRequest",
     "PlaceVehicle",
     "PressButton",
     "PulsePin",
@@ -116,36 +117,46 @@ class ConnectClient(_Request):
     pid: int
 
 
-class ClaimPin(_Request):
-    """Claim a pin, answered by its level; refused while another process holds it."""
+class _PinRequest(_Request, kw_only=True):
+    """A request about a pin or chip, at a time in ns; a board with a twin's clock sets its own."""
+
+    t: int = 0
+
+
+class ClaimPin(_PinRequest):
+    """Claim a pin, answered by its level; refused while another process holds it.
+
+    Attributes:
+        pin: BCM number.
+        mode: What the pin is from now on.
+        pull: Pull of an input: "up", "down" or "floating".
+        level: First level of an output.
+    """
 
     pin: int
     mode: Literal["input", "output"]
-    pull: str
-    level: int
-    t: int
+    pull: str = "floating"
+    level: int = 0
 
 
-class DrivePin(_Request):
+class DrivePin(_PinRequest):
     """Set the level of an output (`hz` 0), or the duty of its software PWM."""
 
     pin: int
     duty: float
     hz: int
-    t: int
 
 
-class PulsePin(_Request):
+class PulsePin(_PinRequest):
     """Send servo pulses on an output; a width of 0 us ends them."""
 
     pin: int
     us: int
     hz: int
-    t: int
 
 
-class ReadChip(_Request):
-    """Read registers of an I2C chip, answered by their bytes."""
+class ReadChip(_PinRequest):
+    """Read registers of an I2C chip, answered by their bytes; an `errno` if no chip answers."""
 
     bus: int
     address: int
@@ -153,14 +164,13 @@ class ReadChip(_Request):
     length: int
 
 
-class WriteChip(_Request):
-    """Write registers of an I2C chip."""
+class WriteChip(_PinRequest):
+    """Write registers of an I2C chip; an `errno` if no chip answers."""
 
     bus: int
     address: int
     register: int
     data: list[int]
-    t: int
 
 
 class ExchangeServoBytes(_Request):
@@ -262,13 +272,11 @@ class ReadWhereabouts(_Request):
     """Ask for the true state of the vehicle, a `Whereabouts`."""
 
 
+PinRequest = ClaimPin | DrivePin | PulsePin | ReadChip | WriteChip
+
 Request = (
     ConnectClient
-    | ClaimPin
-    | DrivePin
-    | PulsePin
-    | ReadChip
-    | WriteChip
+    | PinRequest
     | ExchangeServoBytes
     | WaitForGrant
     | SleepOnBoard
