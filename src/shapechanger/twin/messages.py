@@ -8,6 +8,7 @@ operator are answered after every request that a robot's process sent before the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 import msgspec
@@ -339,23 +340,5 @@ class GrantTime(_Event, frozen=True):
 BoardEvent = BoardReply | InputEdges | GrantTime
 
 encode = msgspec.msgpack.encode
-_REQUESTS: Final = msgspec.msgpack.Decoder(Request)
-_EVENTS: Final = msgspec.msgpack.Decoder(BoardEvent)
-
-
-def decode_request(data: bytes) -> Request:
-    """Decode a message to the board.
-
-    Raises:
-        msgspec.MsgspecError: If it is malformed.
-    """
-    return _REQUESTS.decode(data)
-
-
-def decode_event(data: bytes) -> BoardEvent:
-    """Decode a message from the board.
-
-    Raises:
-        msgspec.MsgspecError: If it is malformed.
-    """
-    return _EVENTS.decode(data)
+decode_request: Callable[[bytes], Request] = msgspec.msgpack.Decoder(Request).decode
+decode_event: Callable[[bytes], BoardEvent] = msgspec.msgpack.Decoder(BoardEvent).decode
