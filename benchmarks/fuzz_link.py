@@ -39,9 +39,8 @@ from shapechanger.link.messages import (
     encode,
 )
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.limits import MessageRate
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
 from shapechanger.robot.guard.messages import Order
 
 __all__ = ["fuzz", "main", "mutated", "resident_kb"]

@@ -11,7 +11,7 @@ import pytest
 from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.twin.robot import Operator
-from shapechanger.twin.signals import NoLedger, read_ledger
+from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
 from shapechanger.twin.world.place import Place, open_world
 from shapechanger.twin.world.vehicle import DrivingWorld
@@ -121,11 +121,3 @@ def test_a_board_that_cannot_be_there_says_why(
     with pytest.raises(RobotError, match="did not start"):
         start_board(CAR, "twin", tmp_path, place=Place("corridor", "tank"))
     assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err
-
-
-def test_no_ledger_keeps_nothing() -> None:
-    """It takes whatever a ledger takes."""
-    ledger = NoLedger()
-    ledger.write(1, "pin", pin=3, duty=1.0)
-    ledger.close()
-    ledger.write(2, "place", seed=1)

@@ -11,9 +11,10 @@ import os
 import signal
 import socket
 import sys
+import time
 from collections.abc import Sequence
 from types import FrameType
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 import msgspec
 
@@ -21,13 +22,13 @@ from shapechanger.errors import RobotError, UnknownName, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
-from shapechanger.twin.chips import chips_of
 from shapechanger.twin.messages import (
     BreakCamera,
     BreakChip,
     BreakMagnet,
     BreakServo,
     ExchangeServoBytes,
+    GrantTime,
     LayOutCourse,
     PlaceVehicle,
     PressButton,
@@ -39,6 +40,7 @@ from shapechanger.twin.messages import (
     SetBattery,
     SetDistance,
     SleepOnBoard,
+    SleepResult,
     WaitForGrant,
     Whereabouts,
 )
@@ -46,11 +48,10 @@ from shapechanger.twin.pin_board import PinBoard
 from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.server import (
     LATER,
+    START_NS,
     BoardConnection,
     BoardServer,
     OwnerGone,
-    RealTime,
-    TwinTime,
 )
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter
@@ -61,6 +62,9 @@ from shapechanger.worlds.world import RESTING_V, World
 
 __all__ = ["Board", "main"]
 
+_WORLD_STEP_NS: Final = 10_000_000
+_LOOK_FOR_READER_S: Final = 0.05
+"""Interval of looking for a reader of the pictures while time stands still."""
 _BUTTONS: Final = ("bumper", "stop")
 
 _log = logging.getLogger(__name__)
@@ -72,64 +76,59 @@ class Board:
     Args:
         wiring: What is attached to the pins.
         world: World of the vehicle.
-        time: Time of the board.
+        clock: Time of the board.
         ledger: Record of all changes.
         camera: Front camera; None without one.
         listening: Listening socket for clients.
         owner_fd: Descriptor whose end ends the board.
         seed: Seed of everything random.
+
+    Attributes:
+        world: World of the vehicle.
+        camera: Front camera; None without one.
+        server: Server of the clients.
     """
 
     def __init__(
         self,
         wiring: TwinWiring,
         world: World,
-        time: RealTime | TwinTime,
+        clock: RealTime | TwinTime,
         ledger: LedgerWriter,
         camera: FrontCameraPipe | None,
         listening: socket.socket,
         owner_fd: int,
         seed: int,
     ) -> None:
-        self._world = world
-        self._time = time
+        self.world = world
+        self.camera = camera
+        self._time = clock
         self._ledger = ledger
-        self._camera = camera
-        self._surroundings = Surroundings(wiring, world, time.now_ns())
+        self._surroundings = Surroundings(wiring, world, clock.now_ns())
         self._sensors = self._surroundings.sensors
-        self._pins = PinBoard(wiring, chips_of(wiring.plan, world), ledger, seed)
-        self._pins.on_output = self._sensors.output_changed
-        self._server = BoardServer(
-            listening,
-            owner_fd,
-            self._pins,
-            self._sensors.levels,
-            time.clock,
-            time.now_ns,
-            self._operate,
+        self._pins = PinBoard(wiring, world, self._sensors, ledger, seed)
+        self.server = BoardServer(
+            listening, owner_fd, self._pins, clock.kind, clock.now_ns, self._operate
         )
 
     def run(self) -> None:
         """Run until the owner is gone."""
         try:
-            self._time.run(self._server, self._camera, self._advance, self._take_picture)
+            self._time.run(self)
         except OwnerGone:
             _log.info("the owner is gone, so this board ends")
         finally:
-            self._server.close()
+            self.server.close()
             self._ledger.close()
-            if self._camera is not None:
-                self._camera.close()
+            if self.camera is not None:
+                self.camera.close()
 
-    def _advance(self, now_ns: int) -> None:
+    def advance(self, now_ns: int) -> None:
+        """Advance the world to a time, and send the edges of inputs on the way."""
         edges = self._surroundings.advance(now_ns, self._pins.levels)
         for edge in edges:
             self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
-        self._server.send_edges(edges)
-
-    def _take_picture(self, now_ns: int) -> None:
-        if self._camera is not None:
-            self._camera.take(self._world, now_ns)
+        self.server.send_edges(edges)
 
     def _operate(self, connection: BoardConnection, request: Request) -> object:
         """Execute a request about time, servos or the world."""
@@ -153,16 +152,16 @@ class Board:
             case ReadWhereabouts():
                 return self._whereabouts()
             case PlaceVehicle():
-                self._world.place(request.seed)
+                self.world.place(request.seed)
                 self._ledger.write(self._time.now_ns(), "place", seed=request.seed)
             case PutVehicleBack():
                 try:
-                    self._world.put_back()
+                    self.world.put_back()
                 except WorldError as error:
                     raise RobotError(f"The vehicle cannot be put back: {error}") from error
                 self._ledger.write(self._time.now_ns(), "put_back")
             case LayOutCourse():
-                self._world.lay_out(request.seed)
+                self.world.lay_out(request.seed)
                 self._ledger.write(self._time.now_ns(), "course", seed=request.seed)
             case _:
                 self._ledger.write(self._time.now_ns(), "fault", what=self._fail(request))
@@ -178,7 +177,7 @@ class Board:
                 self._press(request.button, request.down)
                 return f"{request.button} {'down' if request.down else 'up'}"
             case SetBattery():
-                self._world.resting_v = RESTING_V if request.volts is None else request.volts
+                self.world.resting_v = RESTING_V if request.volts is None else request.volts
                 return f"battery {request.volts}"
             case SetDistance():
                 self._sensors.override_distance(request.metres, dead=request.dead)
@@ -202,7 +201,7 @@ class Board:
         return self._surroundings.rig
 
     def _whereabouts(self) -> Whereabouts:
-        seen = self._world.inputs()
+        seen = self.world.inputs()
         return Whereabouts(
             x=seen.pose.x,
             y=seen.pose.y,
@@ -210,18 +209,18 @@ class Board:
             speed=seen.speed,
             travelled_m=seen.travelled_m,
             bumped=seen.bumped,
-            distance_m=self._world.distance_m(),
-            truth=self._world.truth(),
+            distance_m=self.world.distance_m(),
+            truth=self.world.truth(),
             t=self._time.now_ns(),
         )
 
     def _break_camera(self, fault: str) -> None:
-        if self._camera is None:
+        if self.camera is None:
             raise RobotError("This twin has no camera.")
         faults: dict[str, CameraFault] = {known: known for known in CAMERA_FAULTS}
         if fault not in faults:
             raise UnknownName("fault of a camera", fault, CAMERA_FAULTS)
-        self._camera.fault = faults[fault]
+        self.camera.fault = faults[fault]
 
     def _press(self, button: str, down: bool) -> None:
         if button not in _BUTTONS:
@@ -230,6 +229,125 @@ class Board:
             self._sensors.press_stop(down, self._time.now_ns())
         else:
             self._sensors.hold_bumpers(down)
+
+
+class RealTime:
+    """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
+
+    kind: Literal["real", "twin"] = "real"
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds."""
+        return time.monotonic_ns()
+
+    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
+        """Refuse: real time advances by itself."""
+        raise RobotError("This board runs in real time, which cannot be advanced.")
+
+    def wait(self, connection: BoardConnection, until_ns: int) -> None:
+        """Refuse: real time is not granted."""
+        raise RobotError("This board runs in real time, which is not granted.")
+
+    def run(self, board: Board) -> None:
+        """Run a board until its owner is gone."""
+        camera = board.camera
+        step_ns = self.now_ns()
+        while True:
+            due_ns = step_ns if camera is None else min(step_ns, camera.next_ns)
+            board.server.serve(max(0, due_ns - self.now_ns()) / 1e9)
+            now_ns = self.now_ns()
+            if now_ns >= due_ns:
+                board.advance(now_ns)
+                step_ns = now_ns + _WORLD_STEP_NS if now_ns >= step_ns else step_ns
+                if camera is not None and now_ns >= camera.next_ns:
+                    camera.take(board.world, now_ns)
+
+
+class _Sleeper(NamedTuple):
+    """A client that sleeps, ordered by the end of its sleep and then by arrival."""
+
+    until_ns: int
+    number: int
+    connection: BoardConnection
+    request_id: int
+
+
+class TwinTime:
+    """Time that advances only while a client sleeps, and waits for all that take part.
+
+    Args:
+        tick_hz: Rate of the grants of time, Hz; a client may ask for further ones in between.
+    """
+
+    kind: Literal["real", "twin"] = "twin"
+
+    def __init__(self, tick_hz: float) -> None:
+        self._tick_hz = tick_hz
+        self._now_ns = START_NS
+        self._ticks = 0
+        self._sleepers: list[_Sleeper] = []
+        self._sleeps = 0
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds."""
+        return self._now_ns
+
+    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
+        """Let a client sleep."""
+        self._sleeps += 1
+        self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, request_id))
+
+    def wait(self, connection: BoardConnection, until_ns: int) -> None:
+        """Finish the grant of a client, which takes part from now on."""
+        connection.takes_part = True
+        connection.works = False
+        connection.until_ns = until_ns
+
+    def run(self, board: Board) -> None:
+        """Run a board until its owner is gone."""
+        server, camera = board.server, board.camera
+        while True:
+            if self._sleepers:
+                server.serve(0.0)
+            else:
+                found = camera is None or camera.find_reader()
+                server.serve(None if found else _LOOK_FOR_READER_S)
+            # Clients that are gone no longer sleep.
+            self._sleepers = [one for one in self._sleepers if one.connection.fileno() >= 0]
+            if not self._sleepers:
+                continue
+            first = min(self._sleepers)
+            if first.until_ns > self._now_ns:
+                self._step(board, first.until_ns)
+            if first.until_ns <= self._now_ns:
+                self._sleepers.remove(first)
+                newest_ns = None if camera is None else camera.newest_ns
+                result = SleepResult(self._now_ns, newest_ns)
+                server.reply(first.connection, first.request_id, result)
+
+    def _step(self, board: Board, end_ns: int) -> None:
+        """Advance to the next time at which anything happens."""
+        server, camera = board.server, board.camera
+        participants = [one for one in server.connections if one.takes_part]
+        wanted = [one.until_ns for one in participants if one.until_ns > self._now_ns]
+        grant_ns = min(end_ns, self._next_tick_ns(), *wanted)
+        picture_ns = grant_ns if camera is None else max(camera.next_ns, self._now_ns)
+        self._now_ns = min(grant_ns, picture_ns)
+        board.advance(self._now_ns)
+        if camera is not None and camera.next_ns <= self._now_ns:
+            camera.take(board.world, self._now_ns)
+        if self._now_ns < grant_ns:
+            return
+        for connection in participants:
+            connection.works = True
+            server.send(connection, GrantTime(self._now_ns))
+        while any(one.works and one.fileno() >= 0 for one in participants):
+            server.serve(None)
+
+    def _next_tick_ns(self) -> int:
+        while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= self._now_ns:
+            self._ticks += 1
+        return tick_ns
 
 
 def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
@@ -261,7 +379,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     _warm_up(world, settings.seed, pictures=size is not None)
     if settings.clock == "real":
         run_early()  # Hardware is never late because the machine is busy.
-    time = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
+    clock = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
     camera = None
     if plan_of_camera is not None:
         camera = FrontCameraPipe(
@@ -269,7 +387,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             plan_of_camera.fps,
             plan_of_camera.jpeg_quality,
             latest_only=settings.clock == "real",
-            start_ns=time.now_ns(),
+            start_ns=clock.now_ns(),
             seed=settings.seed,
             barcode=not settings.place.world,
         )
@@ -278,7 +396,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     board = Board(
         TwinWiring(plan, settings.one_shot_ms),
         world,
-        time,
+        clock,
         LedgerWriter(settings.ledger),
         camera,
         listening,

@@ -17,21 +17,16 @@ from shapechanger.twin.messages import (
     MAX_MESSAGE,
     BoardGreeting,
     BoardReply,
-    ClaimPin,
     ConnectClient,
-    DrivePin,
     ExchangeServoBytes,
     GrantTime,
     InputEdges,
     LeaveBoard,
-    PulsePin,
-    ReadChip,
     Request,
     Role,
     SleepOnBoard,
     SleepResult,
     WaitForGrant,
-    WriteChip,
     decode_event,
     encode,
 )
@@ -118,31 +113,6 @@ class BoardClient:
         if reply.errno:
             raise OSError(reply.errno, os.strerror(reply.errno))
         return msgspec.msgpack.decode(reply.result, type=kind)
-
-    def claim(
-        self, pin: int, mode: Literal["input", "output"], pull: str, level: int, t: int
-    ) -> int:
-        """Claim a pin; see `BoardPins.claim`."""
-        found = self.ask(ClaimPin(pin=pin, mode=mode, pull=pull, level=level, t=t), int)
-        self.levels[pin] = found
-        return found
-
-    def drive(self, pin: int, duty: float, hz: int, t: int) -> None:
-        """Set an output; see `BoardPins.drive`."""
-        self.post(DrivePin(pin=pin, duty=duty, hz=hz, t=t))
-
-    def pulse(self, pin: int, us: int, hz: int, t: int) -> None:
-        """Send servo pulses; see `BoardPins.pulse`."""
-        self.post(PulsePin(pin=pin, us=us, hz=hz, t=t))
-
-    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
-        """Read registers; see `BoardPins.read_chip`."""
-        request = ReadChip(bus=bus, address=address, register=register, length=length)
-        return self.ask(request, list[int])
-
-    def write_chip(self, bus: int, address: int, register: int, data: list[int], t: int) -> None:
-        """Write registers; see `BoardPins.write_chip`."""
-        self.ask(WriteChip(bus=bus, address=address, register=register, data=data, t=t))
 
     def exchange_servo_bytes(self, device: str, data: bytes) -> bytes:
         """Send bytes to the servo bus and return those that have arrived from it."""

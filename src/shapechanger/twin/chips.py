@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
@@ -131,10 +132,6 @@ class SimulatedAs5600:
 
 
 _CONFIGURATION: Final = 0
-_SHUNT_VOLTAGE: Final = 1
-_BUS_VOLTAGE: Final = 2
-_POWER: Final = 3
-_CURRENT: Final = 4
 _CALIBRATION: Final = 5
 _RESET: Final = 0x8000
 _AT_POWER_ON: Final = 0x399F
@@ -179,27 +176,22 @@ class SimulatedIna219:
         shunt = round(min(0.32, seen.current_a * _SHUNT_OHM) / _SHUNT_LSB_V)
         bus = round(seen.battery_v / _BUS_LSB_V)
         current = shunt * self._calibration // 4096
-        match register:
-            case 0:
-                return self._configuration
-            case 1:
-                return shunt & 0xFFFF
-            case 2:
-                return min(bus, 0x1FFF) << 3 | _CONVERSION_READY
-            case 3:
-                return current * bus // 5000 & 0xFFFF
-            case 4:
-                return current & 0xFFFF
-            case 5:
-                return self._calibration
-            case _:
-                return 0
+        words = (
+            self._configuration,
+            shunt & 0xFFFF,
+            min(bus, 0x1FFF) << 3 | _CONVERSION_READY,
+            current * bus // 5000 & 0xFFFF,  # Power.
+            current & 0xFFFF,
+            self._calibration,
+        )
+        return words[register] if register < len(words) else 0
 
 
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C
 _ACCEL_XOUT_H: Final = 0x3B
 _GYRO_ZOUT_L: Final = 0x48
+_MEASURED: Final = struct.Struct(">7h")  # Acceleration, temperature, rate of turn.
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 _MPU6050_RESET: Final = 0x80
@@ -260,12 +252,8 @@ class SimulatedMpu6050:
             0.0,
             math.degrees(seen.yaw_rate) * per_rate,
         )
-        data = b"".join(_word(value) for value in values)
-        self._registers[_ACCEL_XOUT_H : _ACCEL_XOUT_H + len(data)] = data
-
-
-def _word(value: float) -> bytes:
-    return max(-32768, min(32767, round(value))).to_bytes(2, "big", signed=True)
+        words = [max(-32768, min(32767, round(value))) for value in values]
+        _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
 
 
 _OSCILLATOR_HZ: Final = 25e6  # Section 7.3.5.

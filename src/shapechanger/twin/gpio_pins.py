@@ -9,6 +9,7 @@ from gpiozero.pins.pi import PiFactory, PiPin
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
+from shapechanger.twin.messages import ClaimPin, DrivePin
 
 if TYPE_CHECKING:
     from shapechanger.twin.hardware import BoardPins
@@ -65,12 +66,14 @@ class TwinPin(PiPin):
     def _claim(self, level: int = 0) -> None:
         now_ns = self.factory.clock.now_ns()
         mode = "output" if self._function == "output" else "input"
-        found = self._board.claim(self._number, mode, self._pull, level, now_ns)
+        request = ClaimPin(pin=self._number, mode=mode, pull=self._pull, level=level, t=now_ns)
+        found = self._board.levels[self._number] = self._board.ask(request, int)
         self._pwm_hz, self._duty = 0, float(found)
 
     def _drive(self, duty: float, hz: int) -> None:
         if (duty, hz) != (self._duty, self._pwm_hz):
-            self._board.drive(self._number, duty, hz, self.factory.clock.now_ns())
+            now_ns = self.factory.clock.now_ns()
+            self._board.post(DrivePin(pin=self._number, duty=duty, hz=hz, t=now_ns))
             self._duty, self._pwm_hz = duty, hz
 
     def _get_function(self) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
+from shapechanger.twin.messages import ClaimPin, PinRequest, PulsePin, ReadChip, WriteChip
 
 if TYPE_CHECKING:  # The SDK of the servos is an extra of its own.
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
@@ -34,46 +35,19 @@ class BoardPins(Protocol):
         """True if `close` was called."""
         ...
 
-    def claim(
-        self, pin: int, mode: Literal["input", "output"], pull: str, level: int, t: int
-    ) -> int:
-        """Claim a pin.
+    def post(self, request: PinRequest) -> None:
+        """Send a request that has no result."""
+        ...
+
+    def ask(self, request: PinRequest, kind: Any = None) -> Any:
+        """Send a request and return its result.
 
         Args:
-            pin: BCM number.
-            mode: What the pin is from now on.
-            pull: Pull of an input: "up", "down" or "floating".
-            level: First level of an output.
-            t: Time, ns.
-
-        Returns:
-            Its level.
+            request: The request.
+            kind: Type of the result.
 
         Raises:
-            RobotError: If another process holds it.
-        """
-        ...
-
-    def drive(self, pin: int, duty: float, hz: int, t: int) -> None:
-        """Set the level of an output (`hz` 0), or the duty of its software PWM."""
-        ...
-
-    def pulse(self, pin: int, us: int, hz: int, t: int) -> None:
-        """Send servo pulses on an output; a width of 0 us ends them."""
-        ...
-
-    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
-        """Read bytes of an I2C chip.
-
-        Raises:
-            OSError: If no chip answers.
-        """
-        ...
-
-    def write_chip(self, bus: int, address: int, register: int, data: list[int], t: int) -> None:
-        """Write bytes to an I2C chip.
-
-        Raises:
+            RobotError: If the board refuses it.
             OSError: If no chip answers.
         """
         ...
@@ -115,13 +89,22 @@ class TwinBus:
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """Read several bytes, starting at one register."""
-        return self._board.read_chip(self._bus, i2c_addr, register, length)
+        request = ReadChip(bus=self._bus, address=i2c_addr, register=register, length=length)
+        return self._board.ask(request, list[int])
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
         """Write several bytes, starting at one register."""
         if not all(0 <= byte <= 0xFF for byte in data):
             raise ValueError(f"Bytes must be 0 to 255, got {list(data)}.")
-        self._board.write_chip(self._bus, i2c_addr, register, list(data), self._clock.now_ns())
+        self._board.ask(
+            WriteChip(
+                bus=self._bus,
+                address=i2c_addr,
+                register=register,
+                data=list(data),
+                t=self._clock.now_ns(),
+            )
+        )
 
     def close(self) -> None:
         """Let go of the bus; its chips continue with what they do."""
@@ -146,11 +129,11 @@ class TwinServoPins:
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
         """Send pulses of this width on a BCM pin from now on; 0 for none."""
         if pin not in self._pulses:
-            self._board.claim(pin, "output", "floating", 0, self._clock.now_ns())
-        pulse = (int(width_us), int(frequency_hz))
-        if self._pulses.get(pin) != pulse:
-            self._board.pulse(pin, *pulse, self._clock.now_ns())
-            self._pulses[pin] = pulse
+            self._board.ask(ClaimPin(pin=pin, mode="output", t=self._clock.now_ns()), int)
+        us, hz = int(width_us), int(frequency_hz)
+        if self._pulses.get(pin) != (us, hz):
+            self._board.post(PulsePin(pin=pin, us=us, hz=hz, t=self._clock.now_ns()))
+            self._pulses[pin] = us, hz
 
     def close(self) -> None:
         """End all pulses; the pins stay low."""

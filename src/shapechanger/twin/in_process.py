@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import simplejpeg
@@ -25,8 +25,8 @@ from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.chips import chips_of
 from shapechanger.twin.hardware import TwinHardware
+from shapechanger.twin.messages import PinRequest
 from shapechanger.twin.pin_board import Owner, PinBoard
 from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.server import START_NS
@@ -39,47 +39,34 @@ from shapechanger.worlds.world import World
 __all__ = ["InProcessRobot", "LocalBoard", "LocalClock", "LocalPins"]
 
 
+_log = logging.getLogger(__name__)
+
+_SESSION: Final = 1
+# Ticks in which the guard must arm, once all speed controllers listen.
+_MAX_ARM_TICKS: Final = 10
+
+
 class LocalPins:
     """The pins of a board in this process, which is the only one to use them; see `BoardPins`.
 
     Args:
         pins: Pins and chips of the board.
-        input_levels: Levels of the pins that sensors drive, kept up to date by the sensors.
     """
 
-    def __init__(self, pins: PinBoard, input_levels: dict[int, int]) -> None:
+    def __init__(self, pins: PinBoard) -> None:
         self._pins = pins
-        self._input_levels = input_levels
         self._owner = Owner(self, os.getpid())
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self.closed = False
 
-    def claim(
-        self, pin: int, mode: Literal["input", "output"], pull: str, level: int, t: int
-    ) -> int:
-        """Claim a pin; see `BoardPins.claim`."""
-        found = self._pins.claim(self._owner, pin, mode, pull, level, t)
-        if mode == "input":
-            found = self._input_levels.get(pin, found)
-        self.levels[pin] = found
-        return found
+    def post(self, request: PinRequest) -> None:
+        """Execute a request."""
+        self._pins.execute(self._owner, request)
 
-    def drive(self, pin: int, duty: float, hz: int, t: int) -> None:
-        """Set an output; see `BoardPins.drive`."""
-        self._pins.drive(self._owner, pin, duty, hz, t)
-
-    def pulse(self, pin: int, us: int, hz: int, t: int) -> None:
-        """Send servo pulses; see `BoardPins.pulse`."""
-        self._pins.pulse(self._owner, pin, us, hz, t)
-
-    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
-        """Read registers; see `BoardPins.read_chip`."""
-        return self._pins.read_chip(bus, address, register, length)
-
-    def write_chip(self, bus: int, address: int, register: int, data: list[int], t: int) -> None:
-        """Write registers; see `BoardPins.write_chip`."""
-        self._pins.write_chip(self._owner.pid, bus, address, register, data, t)
+    def ask(self, request: PinRequest, kind: Any = None) -> Any:
+        """Execute a request and return its result."""
+        return self._pins.execute(self._owner, request)
 
     def drain(self) -> None:
         """Do nothing: edges arrive by `report_edge`."""
@@ -132,10 +119,8 @@ class LocalBoard:
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
         self._clock = LocalClock()
         self._surroundings = Surroundings(wiring, world, self._clock.time_ns)
-        sensors = self._surroundings.sensors
-        self.pins = PinBoard(wiring, chips_of(wiring.plan, world), NoLedger(), seed)
-        self.pins.on_output = sensors.output_changed
-        self._local_pins = LocalPins(self.pins, sensors.levels)
+        self.pins = PinBoard(wiring, world, self._surroundings.sensors, NoLedger(), seed)
+        self._local_pins = LocalPins(self.pins)
         self.rig = self._surroundings.rig
         self.hardware = TwinHardware(self._local_pins, self._clock, self._open_servo_port)
 
@@ -147,8 +132,8 @@ class LocalBoard:
     def advance(self, now_ns: int) -> None:
         """Advance time, the world and the sensors."""
         self._clock.time_ns = now_ns
-        for edge in self._surroundings.advance(now_ns, self.pins.levels):
-            self._local_pins.report_edge(edge.pin, edge.level, edge.t)
+        for t, pin, level in self._surroundings.advance(now_ns, self.pins.levels):
+            self._local_pins.report_edge(pin, level, t)
 
     def _open_servo_port(self, settings: BusSettings) -> ServoPort:
         if self.rig is None:
@@ -162,13 +147,6 @@ class LocalBoard:
             return bus.send()
 
         return ServoPort(exchange, settings.baud)
-
-
-_log = logging.getLogger(__name__)
-
-_SESSION: Final = 1
-# Ticks in which the guard must arm, once all speed controllers listen.
-_MAX_ARM_TICKS: Final = 10
 
 
 class _Orders:
@@ -249,9 +227,7 @@ class InProcessRobot:
             session=_SESSION,
         )
         self._guard: Guard | None = None
-        self._pictured = (
-            0  # Counts through all starts, so that every picture has a number of its own.
-        )
+        self._pictured = 0  # Counts through all starts, so that each picture has its own number.
         self._start()
 
     @property
@@ -277,9 +253,8 @@ class InProcessRobot:
         self._arm()
         if place is not None:
             place()
-            self._advance(
-                self._period_ns
-            )  # A served robot sends its first observation after one period, too.
+            # A served robot sends its first observation after one period, too.
+            self._advance(self._period_ns)
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:

@@ -8,6 +8,7 @@ operator are answered after every request that a robot's process sent before the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 import msgspec
@@ -31,6 +32,7 @@ __all__ = [
     "InputEdges",
     "LayOutCourse",
     "LeaveBoard",
+    "PinRequest",
     "PlaceVehicle",
     "PressButton",
     "PulsePin",
@@ -116,36 +118,46 @@ class ConnectClient(_Request):
     pid: int
 
 
-class ClaimPin(_Request):
-    """Claim a pin, answered by its level; refused while another process holds it."""
+class _PinRequest(_Request, kw_only=True):
+    """A request about a pin or chip, at a time in ns; a board with a twin's clock sets its own."""
+
+    t: int = 0
+
+
+class ClaimPin(_PinRequest):
+    """Claim a pin, answered by its level; refused while another process holds it.
+
+    Attributes:
+        pin: BCM number.
+        mode: What the pin is from now on.
+        pull: Pull of an input: "up", "down" or "floating".
+        level: First level of an output.
+    """
 
     pin: int
     mode: Literal["input", "output"]
-    pull: str
-    level: int
-    t: int
+    pull: str = "floating"
+    level: int = 0
 
 
-class DrivePin(_Request):
+class DrivePin(_PinRequest):
     """Set the level of an output (`hz` 0), or the duty of its software PWM."""
 
     pin: int
     duty: float
     hz: int
-    t: int
 
 
-class PulsePin(_Request):
+class PulsePin(_PinRequest):
     """Send servo pulses on an output; a width of 0 us ends them."""
 
     pin: int
     us: int
     hz: int
-    t: int
 
 
-class ReadChip(_Request):
-    """Read registers of an I2C chip, answered by their bytes."""
+class ReadChip(_PinRequest):
+    """Read registers of an I2C chip, answered by their bytes; an `errno` if no chip answers."""
 
     bus: int
     address: int
@@ -153,14 +165,13 @@ class ReadChip(_Request):
     length: int
 
 
-class WriteChip(_Request):
-    """Write registers of an I2C chip."""
+class WriteChip(_PinRequest):
+    """Write registers of an I2C chip; an `errno` if no chip answers."""
 
     bus: int
     address: int
     register: int
     data: list[int]
-    t: int
 
 
 class ExchangeServoBytes(_Request):
@@ -262,13 +273,11 @@ class ReadWhereabouts(_Request):
     """Ask for the true state of the vehicle, a `Whereabouts`."""
 
 
+PinRequest = ClaimPin | DrivePin | PulsePin | ReadChip | WriteChip
+
 Request = (
     ConnectClient
-    | ClaimPin
-    | DrivePin
-    | PulsePin
-    | ReadChip
-    | WriteChip
+    | PinRequest
     | ExchangeServoBytes
     | WaitForGrant
     | SleepOnBoard
@@ -331,23 +340,5 @@ class GrantTime(_Event, frozen=True):
 BoardEvent = BoardReply | InputEdges | GrantTime
 
 encode = msgspec.msgpack.encode
-_REQUESTS: Final = msgspec.msgpack.Decoder(Request)
-_EVENTS: Final = msgspec.msgpack.Decoder(BoardEvent)
-
-
-def decode_request(data: bytes) -> Request:
-    """Decode a message to the board.
-
-    Raises:
-        msgspec.MsgspecError: If it is malformed.
-    """
-    return _REQUESTS.decode(data)
-
-
-def decode_event(data: bytes) -> BoardEvent:
-    """Decode a message from the board.
-
-    Raises:
-        msgspec.MsgspecError: If it is malformed.
-    """
-    return _EVENTS.decode(data)
+decode_request: Callable[[bytes], Request] = msgspec.msgpack.Decoder(Request).decode
+decode_event: Callable[[bytes], BoardEvent] = msgspec.msgpack.Decoder(BoardEvent).decode

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import errno
 import random
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Literal
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a
+from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a, chips_of
+from shapechanger.twin.messages import (
+    ClaimPin,
+    DrivePin,
+    PinRequest,
+    PulsePin,
+    ReadChip,
+    WriteChip,
+)
+from shapechanger.twin.sensors import PinSensors
 from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
+from shapechanger.worlds.world import World
 
 __all__ = ["Owner", "PinBoard"]
 
@@ -35,7 +45,6 @@ class _Claim:
 
     owner: Owner | None = None
     mode: Literal["input", "output"] = "input"
-    pull: str = "floating"
     hz: float = 0
     phase_ns: int = 0  # Start of a period of its PWM or pulses.
 
@@ -45,30 +54,32 @@ class PinBoard:
 
     Args:
         wiring: What is attached; it gives undriven pins their level.
-        chips: Chips by bus and address.
+        world: What the chips measure.
+        sensors: Sensors on input pins; they see each change of an output.
         ledger: Record of changes.
         seed: Seed of the phase of software PWM.
 
     Attributes:
         levels: State of all outputs.
-        on_output: Called with time, pin and duty at each change of an output.
+        sensors: Sensors on input pins.
         dead_chips: Bus and address of the chips that do not answer.
     """
 
     def __init__(
         self,
         wiring: TwinWiring,
-        chips: Mapping[tuple[int, int], Chip],
+        world: World,
+        sensors: PinSensors,
         ledger: Ledger,
         seed: int,
     ) -> None:
         self._wiring = wiring
-        self._chips = dict(chips)
+        self._chips = chips_of(wiring.plan, world)
         self._ledger = ledger
         self._random = random.Random(f"phase {seed}")
         self._claims: dict[int, _Claim] = {}
         self.levels = Levels()
-        self.on_output: Callable[[int, int, float], None] | None = None
+        self.sensors = sensors
         self.dead_chips: set[tuple[int, int]] = set()
         for address, chip in self._chips.items():
             if isinstance(chip, SimulatedPca9685):
@@ -79,69 +90,32 @@ class PinBoard:
         claim = self._claims.get(pin)
         return None if claim is None else claim.owner
 
-    def claim(
-        self,
-        owner: Owner,
-        pin: int,
-        mode: Literal["input", "output"],
-        pull: str,
-        level: int,
-        t: int,
-    ) -> int:
-        """Claim a pin.
+    def execute(self, owner: Owner, request: PinRequest) -> object:
+        """Execute a request and return its result.
 
         Args:
-            owner: New owner.
-            pin: BCM number.
-            mode: What the pin is from now on.
-            pull: Pull of an input: "up", "down" or "floating".
-            level: First level of an output.
-            t: Time, ns.
-
-        Returns:
-            The level of the pin; for an input the one of its pull and the resistors around it.
+            owner: The process that sends it.
+            request: The request.
 
         Raises:
-            RobotError: If another process holds it.
+            RobotError: If another process holds the pin, or this one has not claimed it.
+            OSError: If no chip answers, with the `errno` of the kernel's driver.
         """
-        claim = self._claims.setdefault(pin, _Claim())
-        if claim.owner is not None and claim.owner != owner:
-            raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
-        claim.owner, claim.mode, claim.pull, claim.hz = owner, mode, pull, 0
-        if mode == "output":
-            self._drive(owner.pid, pin, float(level), 0, t)
-            return level
-        if pin in self.levels.duties:
-            self.levels.release(pin)
-            idle = self._wiring.idle_level(pin)
-            self._ledger.write(
-                t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True
-            )
-            self._notify(t, pin, float(idle))
-        if pull == "floating":
-            return self._wiring.idle_level(pin)
-        return int(pull == "up")
-
-    def drive(self, owner: Owner, pin: int, duty: float, hz: float, t: int) -> None:
-        """Set an output's level, or the duty of its software PWM.
-
-        Raises:
-            RobotError: If the process does not hold the pin as an output.
-        """
-        self._start_pulses(self._output(owner, pin), hz, t)
-        self._drive(owner.pid, pin, duty, hz, t)
-
-    def pulse(self, owner: Owner, pin: int, us: float, hz: float, t: int) -> None:
-        """Send servo pulses on an output.
-
-        Raises:
-            RobotError: If the process does not hold the pin as an output.
-        """
-        self._start_pulses(self._output(owner, pin), hz if us else 0, t)
-        pulse = Pulse(us, hz)
-        if self.levels.pulses.get(pin) != pulse:
-            self.levels.pulse(pin, pulse)
-            self._ledger.write(t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+        match request:
+            case DrivePin():
+                self._start_pulses(self._output(owner, request.pin), request.hz, request.t)
+                self._drive(owner.pid, request.pin, request.duty, request.hz, request.t)
+            case PulsePin():
+                self._pulse(owner, request)
+            case ReadChip():
+                return self._chip(request.bus, request.address).read(
+                    request.register, request.length
+                )
+            case WriteChip():
+                self._write_chip(owner.pid, request)
+            case ClaimPin():
+                return self._claim(owner, request)
+        return None
 
     def leave(self, owner: Owner, t: int, *, died: bool) -> None:
         """Free the pins of a process that has ended; outputs keep their level of that moment.
@@ -166,43 +140,7 @@ class PinBoard:
             claim.hz = 0
             self.levels.drive(pin, duty, t)
             self._ledger.write(t, "pin", pin=pin, duty=duty, hz=0, pid=owner.pid)
-            self._notify(t, pin, duty)
-
-    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
-        """Read bytes of a chip, starting at a register.
-
-        Raises:
-            OSError: If no chip answers, with the `errno` of the kernel's driver.
-        """
-        return self._chip(bus, address).read(register, length)
-
-    def write_chip(
-        self, pid: int, bus: int, address: int, register: int, data: list[int], t: int
-    ) -> None:
-        """Write bytes to a chip, starting at a register.
-
-        Raises:
-            OSError: If no chip answers, with the `errno` of the kernel's driver.
-        """
-        chip = self._chip(bus, address)
-        chip.write(register, data)
-        if isinstance(chip, Tca9548a):
-            return  # It moves nothing, and hundreds of writes a second would fill the ledger.
-        self._ledger.write(
-            t, "i2c", bus=bus, address=address, register=register, data=data, pid=pid
-        )
-        if isinstance(chip, SimulatedPca9685):
-            for channel, pulse in self._update_channels((bus, address), chip):
-                self._ledger.write(
-                    t,
-                    "i2c",
-                    bus=bus,
-                    address=address,
-                    channel=channel,
-                    us=round(pulse.us, 3),
-                    hz=round(pulse.hz, 3),
-                    pid=pid,
-                )
+            self.sensors.output_changed(t, pin, duty)
 
     def encoder(self, joint: str) -> SimulatedAs5600:
         """Return the encoder of a joint.
@@ -216,6 +154,48 @@ class PinBoard:
         if joint not in encoders:
             raise UnknownName("joint with an encoder", joint, encoders)
         return encoders[joint]
+
+    def _claim(self, owner: Owner, request: ClaimPin) -> int:
+        """Return the level of the pin; for an input that of its sensor, pull or resistors."""
+        pin, t = request.pin, request.t
+        claim = self._claims.setdefault(pin, _Claim())
+        if claim.owner is not None and claim.owner != owner:
+            raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
+        claim.owner, claim.mode, claim.hz = owner, request.mode, 0
+        if request.mode == "output":
+            self._drive(owner.pid, pin, float(request.level), 0, t)
+            return request.level
+        idle = self._wiring.idle_level(pin)
+        if pin in self.levels.duties:
+            self.levels.release(pin)
+            self._ledger.write(
+                t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True
+            )
+            self.sensors.output_changed(t, pin, float(idle))
+        if request.pull != "floating":
+            idle = int(request.pull == "up")
+        return self.sensors.levels.get(pin, idle)
+
+    def _pulse(self, owner: Owner, request: PulsePin) -> None:
+        pin, us, hz = request.pin, request.us, request.hz
+        self._start_pulses(self._output(owner, pin), hz if us else 0, request.t)
+        pulse = Pulse(us, hz)
+        if self.levels.pulses.get(pin) != pulse:
+            self.levels.pulse(pin, pulse)
+            self._ledger.write(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+
+    def _write_chip(self, pid: int, request: WriteChip) -> None:
+        t, bus, address = request.t, request.bus, request.address
+        chip = self._chip(bus, address)
+        chip.write(request.register, request.data)
+        if isinstance(chip, Tca9548a):
+            return  # It moves nothing, and hundreds of writes a second would fill the ledger.
+        at = {"bus": bus, "address": address}
+        self._ledger.write(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
+        if isinstance(chip, SimulatedPca9685):
+            for channel, pulse in self._update_channels((bus, address), chip):
+                us, hz = round(pulse.us, 3), round(pulse.hz, 3)
+                self._ledger.write(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
 
     def _update_channels(
         self, at: tuple[int, int], chip: SimulatedPca9685
@@ -244,11 +224,7 @@ class PinBoard:
     def _drive(self, pid: int, pin: int, duty: float, hz: float, t: int) -> None:
         self.levels.drive(pin, duty, t)
         self._ledger.write(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
-        self._notify(t, pin, duty)
-
-    def _notify(self, t: int, pin: int, duty: float) -> None:
-        if self.on_output is not None:
-            self.on_output(t, pin, duty)
+        self.sensors.output_changed(t, pin, duty)
 
     def _chip(self, bus: int, address: int) -> Chip:
         chip = self._chips.get((bus, address))

@@ -1,23 +1,17 @@
-"""The board's server: its clients, what they may do with pins and chips, and the time.
-
-`RealTime` follows the machine's clock. `TwinTime` advances only while a client sleeps, and waits
-for all clients that take part.
-"""
+"""The board's server: its clients, and what they may do with pins and chips."""
 
 from __future__ import annotations
 
 import logging
 import select
 import socket
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import msgspec
 
-from shapechanger.errors import RobotError, ShapechangerError
-from shapechanger.twin.camera import FrontCameraPipe
+from shapechanger.errors import ShapechangerError
 from shapechanger.twin.messages import (
     MAX_EDGES,
     MAX_MESSAGE,
@@ -28,21 +22,20 @@ from shapechanger.twin.messages import (
     ConnectClient,
     DrivePin,
     Edge,
-    GrantTime,
     InputEdges,
     LeaveBoard,
+    PinRequest,
     PulsePin,
     ReadChip,
     Request,
     Role,
-    SleepResult,
     WriteChip,
     decode_request,
     encode,
 )
 from shapechanger.twin.pin_board import Owner, PinBoard
 
-__all__ = ["START_NS", "BoardConnection", "BoardServer", "OwnerGone", "RealTime", "TwinTime"]
+__all__ = ["LATER", "START_NS", "BoardConnection", "BoardServer", "OwnerGone"]
 
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
@@ -50,9 +43,6 @@ START_NS: Final = 1_000_000_000
 _MAX_OUTBOX: Final = 256
 """Messages kept for a client that does not read; beyond it edges are lost, as in the kernel."""
 _READABLE: Final = select.EPOLLIN | select.EPOLLHUP | select.EPOLLERR
-_WORLD_STEP_NS: Final = 10_000_000
-_LOOK_FOR_READER_S: Final = 0.05
-"""Interval of looking for a reader of the pictures while time stands still."""
 
 _log = logging.getLogger(__name__)
 
@@ -172,7 +162,6 @@ class BoardServer:
         listening: Listening socket.
         owner_fd: Descriptor whose end ends the board.
         pins: Pins and chips.
-        input_levels: Levels of the pins that sensors drive, kept up to date by the sensors.
         clock: Kind of clock.
         now_ns: Time of that clock.
         operate: Executes the requests that are not about pins and chips.
@@ -183,7 +172,6 @@ class BoardServer:
         listening: socket.socket,
         owner_fd: int,
         pins: PinBoard,
-        input_levels: Mapping[int, int],
         clock: Literal["real", "twin"],
         now_ns: Callable[[], int],
         operate: Operate,
@@ -195,7 +183,6 @@ class BoardServer:
         self._clock: Literal["real", "twin"] = clock
         self._now_ns = now_ns
         self._operate = operate
-        self._input_levels = input_levels
         self._epoll = select.epoll()
         self._epoll.register(listening, select.EPOLLIN)
         self._epoll.register(owner_fd, select.EPOLLIN)
@@ -231,7 +218,7 @@ class BoardServer:
         """Send the edges of inputs to the clients that claimed them."""
         if edges:
             for connection in self.connections:
-                connection.send_edges(edges, self._input_levels)
+                connection.send_edges(edges, self._pins.sensors.levels)
                 self._watch(connection)
 
     def send(self, connection: BoardConnection, event: BoardEvent) -> None:
@@ -293,27 +280,10 @@ class BoardServer:
 
     def _result(self, connection: BoardConnection, request: Request) -> object:
         match request:
-            case DrivePin():
-                t = self._stamp(request.t)
-                self._pins.drive(connection.owner, request.pin, request.duty, request.hz, t)
-            case PulsePin():
-                t = self._stamp(request.t)
-                self._pins.pulse(connection.owner, request.pin, request.us, request.hz, t)
-            case ReadChip():
-                return self._pins.read_chip(
-                    request.bus, request.address, request.register, request.length
-                )
-            case WriteChip():
-                self._pins.write_chip(
-                    connection.owner.pid,
-                    request.bus,
-                    request.address,
-                    request.register,
-                    request.data,
-                    self._stamp(request.t),
-                )
             case ClaimPin():
                 return self._claim(connection, request)
+            case DrivePin() | PulsePin() | ReadChip() | WriteChip():
+                return self._execute_on_pins(connection, request)
             case ConnectClient():
                 connection.role = request.role
                 connection.owner = Owner(connection, request.pid)
@@ -326,19 +296,21 @@ class BoardServer:
                 return self._operate(connection, request)
         return None
 
-    def _claim(self, connection: BoardConnection, request: ClaimPin) -> int:
-        pin, mode = request.pin, request.mode
-        holder = self._pins.owner(pin)
+    def _execute_on_pins(self, connection: BoardConnection, request: PinRequest) -> object:
+        if self._clock == "twin":
+            request.t = self._now_ns()
+        return self._pins.execute(connection.owner, request)
+
+    def _claim(self, connection: BoardConnection, request: ClaimPin) -> object:
+        holder = self._pins.owner(request.pin)
         other = None if holder is None else holder.connection
         if isinstance(other, BoardConnection) and other is not connection:
             self._execute_all(other)  # It may have ended meanwhile.
-        t = self._stamp(request.t)
-        level = self._pins.claim(connection.owner, pin, mode, request.pull, request.level, t)
-        if mode == "input":
-            connection.inputs.add(pin)
-            level = self._input_levels.get(pin, level)
+        level = self._execute_on_pins(connection, request)
+        if request.mode == "input":
+            connection.inputs.add(request.pin)
         else:
-            connection.inputs.discard(pin)
+            connection.inputs.discard(request.pin)
         return level
 
     def _catch_up(self) -> None:
@@ -354,148 +326,3 @@ class BoardServer:
         if connection.role == "hardware":
             self._pins.leave(connection.owner, self._now_ns(), died=not connection.has_left)
         connection.close()
-
-    def _stamp(self, t: int) -> int:
-        return self._now_ns() if self._clock == "twin" else t
-
-
-class RealTime:
-    """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
-
-    clock: Literal["real", "twin"] = "real"
-
-    def now_ns(self) -> int:
-        """Return the time in nanoseconds."""
-        return time.monotonic_ns()
-
-    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Refuse: real time advances by itself."""
-        raise RobotError("This board runs in real time, which cannot be advanced.")
-
-    def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Refuse: real time is not granted."""
-        raise RobotError("This board runs in real time, which is not granted.")
-
-    def run(
-        self,
-        server: BoardServer,
-        camera: FrontCameraPipe | None,
-        advance: Callable[[int], None],
-        take_picture: Callable[[int], None],
-    ) -> None:
-        """Run until the owner is gone.
-
-        Args:
-            server: Server of the clients.
-            camera: Camera, for the time of its next picture.
-            advance: Advances the world to a time.
-            take_picture: Takes the picture that is due at a time.
-        """
-        step_ns = self.now_ns()
-        while True:
-            due_ns = step_ns if camera is None else min(step_ns, camera.next_ns)
-            server.serve(max(0, due_ns - self.now_ns()) / 1e9)
-            now_ns = self.now_ns()
-            if now_ns >= due_ns:
-                advance(now_ns)
-                step_ns = now_ns + _WORLD_STEP_NS if now_ns >= step_ns else step_ns
-                if camera is not None and now_ns >= camera.next_ns:
-                    take_picture(now_ns)
-
-
-class _Sleeper(NamedTuple):
-    """A client that sleeps, ordered by the end of its sleep and then by arrival."""
-
-    until_ns: int
-    number: int
-    connection: BoardConnection
-    request_id: int
-
-
-class TwinTime:
-    """Time that advances only while a client sleeps, and waits for all that take part.
-
-    Args:
-        tick_hz: Rate of the grants of time, Hz; a client may ask for further ones in between.
-    """
-
-    clock: Literal["real", "twin"] = "twin"
-
-    def __init__(self, tick_hz: float) -> None:
-        self._tick_hz = tick_hz
-        self._now_ns = START_NS
-        self._ticks = 0
-        self._sleepers: list[_Sleeper] = []
-        self._sleeps = 0
-
-    def now_ns(self) -> int:
-        """Return the time in nanoseconds."""
-        return self._now_ns
-
-    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Let a client sleep."""
-        self._sleeps += 1
-        self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, request_id))
-
-    def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Finish the grant of a client, which takes part from now on."""
-        connection.takes_part = True
-        connection.works = False
-        connection.until_ns = until_ns
-
-    def run(
-        self,
-        server: BoardServer,
-        camera: FrontCameraPipe | None,
-        advance: Callable[[int], None],
-        take_picture: Callable[[int], None],
-    ) -> None:
-        """Run until the owner is gone; see `RealTime.run`."""
-        while True:
-            if self._sleepers:
-                server.serve(0.0)
-            else:
-                found = camera is None or camera.find_reader()
-                server.serve(None if found else _LOOK_FOR_READER_S)
-            # Clients that are gone no longer sleep.
-            self._sleepers = [one for one in self._sleepers if one.connection.fileno() >= 0]
-            if not self._sleepers:
-                continue
-            first = min(self._sleepers)
-            if first.until_ns > self._now_ns:
-                self._step(first.until_ns, server, camera, advance, take_picture)
-            if first.until_ns <= self._now_ns:
-                self._sleepers.remove(first)
-                newest_ns = None if camera is None else camera.newest_ns
-                result = SleepResult(self._now_ns, newest_ns)
-                server.reply(first.connection, first.request_id, result)
-
-    def _step(
-        self,
-        end_ns: int,
-        server: BoardServer,
-        camera: FrontCameraPipe | None,
-        advance: Callable[[int], None],
-        take_picture: Callable[[int], None],
-    ) -> None:
-        """Advance to the next time at which anything happens."""
-        participants = [one for one in server.connections if one.takes_part]
-        wanted = [one.until_ns for one in participants if one.until_ns > self._now_ns]
-        grant_ns = min(end_ns, self._next_tick_ns(), *wanted)
-        picture_ns = grant_ns if camera is None else max(camera.next_ns, self._now_ns)
-        self._now_ns = min(grant_ns, picture_ns)
-        advance(self._now_ns)
-        if camera is not None and camera.next_ns <= self._now_ns:
-            take_picture(self._now_ns)
-        if self._now_ns < grant_ns:
-            return
-        for connection in participants:
-            connection.works = True
-            server.send(connection, GrantTime(self._now_ns))
-        while any(one.works and one.fileno() >= 0 for one in participants):
-            server.serve(None)
-
-    def _next_tick_ns(self) -> int:
-        while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= self._now_ns:
-            self._ticks += 1
-        return tick_ns

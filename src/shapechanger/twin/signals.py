@@ -27,7 +27,9 @@ import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
+
+import msgspec
 
 from shapechanger.errors import RobotError
 
@@ -84,9 +86,6 @@ class Transition:
     what: str | None = None
 
 
-_FIELDS: Final = frozenset(Transition.__slots__)
-
-
 class Ledger(Protocol):
     """Record of changes."""
 
@@ -94,18 +93,11 @@ class Ledger(Protocol):
         """Record a change."""
         ...
 
-    def close(self) -> None:
-        """Close the record."""
-        ...
-
 
 class NoLedger:
     """A ledger that keeps nothing."""
 
     def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Do nothing."""
-
-    def close(self) -> None:
         """Do nothing."""
 
 
@@ -139,19 +131,15 @@ def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
         RobotError: If a complete line is malformed.
     """
     text = Path(path).read_text(encoding="utf-8")
-    lines = text.split("\n")[:-1]  # After the last newline there is at most a broken line.
-    transitions = [_read(line, number, path) for number, line in enumerate(lines, 1)]
+    decode = msgspec.json.Decoder(Transition).decode
+    transitions: list[Transition] = []
+    # After the last newline there is at most a broken line.
+    for number, line in enumerate(text.split("\n")[:-1], 1):
+        try:
+            transitions.append(decode(line))
+        except msgspec.MsgspecError as error:
+            raise RobotError(f"Line {number} of {path} is malformed: {error}.") from error
     return sorted(transitions, key=lambda transition: transition.t)
-
-
-def _read(line: str, number: int, path: str | os.PathLike[str]) -> Transition:
-    try:
-        fields = json.loads(line)
-        if "data" in fields:
-            fields["data"] = tuple(fields["data"])
-        return Transition(**{key: fields[key] for key in fields if key in _FIELDS})
-    except (ValueError, TypeError) as error:
-        raise RobotError(f"Line {number} of {path} is malformed: {error}.") from error
 
 
 class Pulse(NamedTuple):

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -59,24 +59,19 @@ class BoardSettings(msgspec.Struct, frozen=True):
     fifo: str
 
 
+@dataclass(frozen=True, slots=True)
 class BoardAt:
     """Paths of a board.
 
-    Args:
-        socket_path: Socket on which it listens; the argument of `HARDWARE`.
-        ledger_path: Its ledger.
-        fifo_path: Pipe of its pictures; None without a camera.
-
     Attributes:
-        socket_path: Socket on which it listens.
+        socket_path: Socket on which it listens; the argument of `HARDWARE`.
         ledger_path: Its ledger.
         fifo_path: Pipe of its pictures; None without a camera.
     """
 
-    def __init__(self, socket_path: str, ledger_path: Path, fifo_path: Path | None) -> None:
-        self.socket_path = socket_path
-        self.ledger_path = ledger_path
-        self.fifo_path = fifo_path
+    socket_path: str
+    ledger_path: Path
+    fifo_path: Path | None
 
     @property
     def hardware(self) -> tuple[str, str]:
@@ -94,24 +89,17 @@ class BoardAt:
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
 
 
+@dataclass(frozen=True, slots=True)
 class RunningBoard(BoardAt):
     """A board that this process has started. It ends with `close`, or with this process.
 
     Attributes:
         process: Process of the board.
+        owner: Our end of the connection that keeps the board running.
     """
 
-    def __init__(
-        self,
-        process: subprocess.Popen[bytes],
-        owner: socket.socket,
-        socket_path: str,
-        ledger_path: Path,
-        fifo_path: Path | None,
-    ) -> None:
-        super().__init__(socket_path, ledger_path, fifo_path)
-        self.process = process
-        self._owner = owner
+    process: subprocess.Popen[bytes]
+    owner: socket.socket
 
     def __enter__(self) -> RunningBoard:
         return self
@@ -121,11 +109,11 @@ class RunningBoard(BoardAt):
 
     def outlive_exec(self) -> None:
         """Keep the board running when this process executes another program."""
-        self._owner.set_inheritable(True)
+        self.owner.set_inheritable(True)
 
     def close(self) -> None:
         """End the board."""
-        self._owner.close()
+        self.owner.close()
         try:
             self.process.wait(_END_S)
         except subprocess.TimeoutExpired:
@@ -208,7 +196,7 @@ def start_board(
             start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
     pipe = None if camera is None else fifo_path
-    board = RunningBoard(process, ours, str(socket_path), ledger_path, pipe)
+    board = RunningBoard(str(socket_path), ledger_path, pipe, process, ours)
     ours.settimeout(_READY_S)
     try:
         ready = ours.recv(1)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
 from shapechanger.link.messages import Event, Lease, Pong
-from shapechanger.robot.daemon.limits import MessageRate, Outbox, SentObservations
+from shapechanger.robot.daemon.session import MessageRate, Outbox, SentObservations
 
 MS = 1_000_000
 

@@ -17,9 +17,10 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.guard import supervisor
-from shapechanger.robot.guard.plan import LimitPlan
+from shapechanger.robot.guard.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
 from shapechanger.robot.guard.supervisor import ProcessCommands, Supervisor
+from shapechanger.robot.hardware import Hardware
 from tests.robot.guard.plans import MS, quick_car
 from tests.robot.guard.running import running
 from tests.robot.guard.waiting import until
@@ -254,11 +255,11 @@ def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
     attempts: list[int | None] = []
     guard = _Stuck(looks=4)
 
-    def safe(plan: ServePlan) -> list[str]:
+    def safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
         attempts.append(guard.code)
         return ["Output drive: GPIO22 is busy"] if len(attempts) == 1 else []
 
-    monkeypatch.setattr(supervisor, "_safe", safe)
+    monkeypatch.setattr(supervisor, "make_safe", safe)
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
     with _supervisor(told) as one:
         one._stop(guard, _Daemon(looks=9))
@@ -270,7 +271,7 @@ def test_a_guard_that_never_ends_is_given_up_when_told_to_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """And the outputs are not said to be safe."""
-    monkeypatch.setattr(supervisor, "_safe", lambda plan: [])
+    monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
     monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
     with _supervisor("ended by SIGTERM") as one:

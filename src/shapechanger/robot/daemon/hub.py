@@ -64,6 +64,7 @@ class SessionHub:
 
     Attributes:
         plan: Description of the robot.
+        now_ns: Returns the robot's time, ns.
         lease: The control lease.
         recorder: Records episodes.
         library: Reads recorded episodes.
@@ -91,17 +92,13 @@ class SessionHub:
         self.newest: NumberedFrame | None = None
         self.frame_arrived = asyncio.Event()
         self.unsettled = False
-        self._now_ns = now_ns
+        self.now_ns = now_ns
         self._order = order
         self._clients: dict[int, ConnectedClient] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
         self._pending = PendingCommands(plan.deadline_ms)
         self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
-
-    def now_ns(self) -> int:
-        """Return the robot's time, ns."""
-        return self._now_ns()
 
     def join(self, member: ConnectedClient) -> None:
         """Add an authenticated client.
@@ -194,26 +191,26 @@ class SessionHub:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
         # Not `give_order`: the sender waits for an observation anyway, so time need not step.
         self._pending.clear_command()
-        self._order(Order(kind="halt", issued_ns=self._now_ns()))
+        self._order(Order(kind="halt", issued_ns=self.now_ns()))
 
     def give_order(self, order: Order) -> None:
         """Pass an order other than a command to the guard, with the current time."""
         self.unsettled = True
-        self._order(replace(order, issued_ns=self._now_ns()))
+        self._order(replace(order, issued_ns=self.now_ns()))
 
     def suggest(self, client: ClientIdentity, values: tuple[float, ...]) -> None:
         """Store the suggestion of a client without the lease."""
-        self._pending.suggest(client, values, self._now_ns())
+        self._pending.suggest(client, values, self.now_ns())
 
     def commanded(self) -> tuple[float, ...]:
         """Return the values of the command in force, or () if there is none."""
         if self.state is None or not self.state.armed:
             return ()
-        return self._pending.commanded(self._now_ns())
+        return self._pending.commanded(self.now_ns())
 
     def suggested(self) -> PendingCommand | None:
         """Return the unexpired suggestion, or None."""
-        return self._pending.suggested(self._now_ns())
+        return self._pending.suggested(self.now_ns())
 
     def command_ns(self) -> int | None:
         """Return the arrival time of the command that the outputs follow, ns, or None."""
@@ -244,7 +241,7 @@ class SessionHub:
             name: Kind of event, such as "armed".
             text: A sentence.
         """
-        self._broadcast(Event(name=name, text=text, at_ns=self._now_ns()))
+        self._broadcast(Event(name=name, text=text, at_ns=self.now_ns()))
 
     def _broadcast(self, message: RobotMessage) -> None:
         for member in list(self._clients.values()):

@@ -37,30 +37,28 @@ class StateReader:
     """
 
     def __init__(self, state_layout: Layout, action_layout: Layout) -> None:
-        self._features = state_layout.features
-        self._places = {name: i for i, name in enumerate(action_layout.names)}
-        self._measured = [f.name for f in self._features if not f.name.endswith(_APPLIED)]
+        features = state_layout.features
+        self._names = [f.name for f in features for _ in range(f.size)]
+        self._places = {f"{name}{_APPLIED}": i for i, name in enumerate(action_layout.names)}
+        self._measured = [f.name for f in features if not f.name.endswith(_APPLIED)]
 
     def values(self, state: GuardState | None) -> tuple[float, ...]:
         """Return the numbers of the state layout, NaN where the value is unknown."""
-        return tuple(
-            self._value(feature.name, state)
-            for feature in self._features
-            for _ in range(feature.size)
-        )
+        if state is None:
+            return (math.nan,) * len(self._names)
+        values: list[float] = []
+        for name in self._names:
+            place = self._places.get(name)
+            if place is not None and place < len(state.applied):
+                values.append(state.applied[place])
+            else:
+                values.append(state.quantities.get(name, math.nan))
+        return tuple(values)
 
     def sources(self, state: GuardState | None) -> dict[str, str]:
         """Return the source of each quantity by name."""
         known = {} if state is None else state.sources
         return {name: ABSENT for name in self._measured if name not in known} | known
-
-    def _value(self, name: str, state: GuardState | None) -> float:
-        if state is None:
-            return math.nan
-        place = self._places.get(name.removesuffix(_APPLIED)) if name.endswith(_APPLIED) else None
-        if place is not None and place < len(state.applied):
-            return state.applied[place]
-        return state.quantities.get(name, math.nan)
 
 
 def build_observation(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
@@ -27,6 +27,7 @@ __all__ = [
     "drives_first",
     "enable_device",
     "make_safe",
+    "noted",
     "preload",
 ]
 
@@ -239,15 +240,11 @@ class OutputBank:
         failures: list[str] = []
         values = output_values(self._plan, self._rest)
         for (output, driver), value in zip(self._drivers, values, strict=True):
-            try:
+            with noted(failures, f"Output {output.name}"):
                 self.values[output.name] = driver.write(value, now_ns)
-            except Exception as error:  # Whatever the error, the next output must rest too.
-                failures.append(_words(output, error))
         for device in self._devices:
-            try:
+            with noted(failures):
                 device.flush(grip=False)
-            except Exception as error:  # As above.
-                failures.append(str(error) or type(error).__name__)
         self.released = False
         return failures
 
@@ -260,10 +257,8 @@ class OutputBank:
         # A released output must not be energised again.
         failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
-            try:
+            with noted(failures, f"Output {output.name}"):
                 driver.close()
-            except Exception as error:  # As above.
-                failures.append(_words(output, error))
         self._drivers.clear()
         return failures
 
@@ -278,8 +273,19 @@ def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
     return found
 
 
-def _words(output: OutputPlan, error: Exception) -> str:
-    return f"Output {output.name}: {str(error) or type(error).__name__}"
+@contextlib.contextmanager
+def noted(failures: list[str], what: str = "") -> Generator[None]:
+    """Note an error in place of raising it: whatever it is, the next output must rest too.
+
+    Args:
+        failures: The list to add it to.
+        what: What failed, if the error does not name it.
+    """
+    try:
+        yield
+    except Exception as error:
+        words = str(error) or type(error).__name__
+        failures.append(f"{what}: {words}" if what else words)
 
 
 # Servos with a watchdog of their own release when the bus is silent; talking to them now would only
@@ -300,21 +306,15 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     for output in drives_first(plan).outputs:
         if output.driver in _STOPS_ITSELF:
             continue
-        try:
+        with noted(failures, f"Output {output.name}"):
             opened.append((output.name, open_output(output, hardware)))
-        except Exception as error:  # Whatever the error, the next output must be made safe too.
-            failures.append(f"Output {output.name}: {str(error) or type(error).__name__}")
     # Closed only when all are at rest: lgpio takes 100 ms for each handle that it closes.
     for name, driver in opened:
-        try:
+        with noted(failures, f"Output {name}"):
             driver.close()
-        except Exception as error:  # As above.
-            failures.append(f"Output {name}: {str(error) or type(error).__name__}")
     if plan.enable_pin is not None:
-        try:
+        with noted(failures, f"Enable pin {plan.enable_pin}"):
             enable_device(plan.enable_pin, hardware).close()
-        except Exception as error:  # As above.
-            failures.append(f"Enable pin {plan.enable_pin}: {str(error) or type(error).__name__}")
     return failures
 
 

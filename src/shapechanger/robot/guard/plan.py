@@ -179,19 +179,19 @@ class GuardPlan:
     @classmethod
     def from_json(cls, text: str) -> GuardPlan:
         """Read the output of `to_json`. The text is trusted and not validated."""
-        data: dict[str, Any] = json.loads(text)
-        return cls(
-            name=data["name"],
-            actions=tuple(ActionPlan(**action) for action in data["actions"]),
-            outputs=tuple(OutputPlan(**output) for output in data["outputs"]),
-            sensors=tuple(SensorPlan(**sensor) for sensor in data["sensors"]),
-            limits=LimitPlan(**data["limits"]),
-            stop=StopPlan(**data["stop"]),
-            enable_pin=data["enable_pin"],
-            stop_pin=data["stop_pin"],
-            tick_hz=data["tick_hz"],
-            enable_hold_ms=data["enable_hold_ms"],
-        )
+        return cls.from_dict(json.loads(text))
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> GuardPlan:
+        """Read the output of `dataclasses.asdict`. It is trusted and not validated."""
+        parts: dict[str, Any] = {
+            "actions": tuple(ActionPlan(**action) for action in data["actions"]),
+            "outputs": tuple(OutputPlan(**output) for output in data["outputs"]),
+            "sensors": tuple(SensorPlan(**sensor) for sensor in data["sensors"]),
+            "limits": LimitPlan(**data["limits"]),
+            "stop": StopPlan(**data["stop"]),
+        }
+        return cls(**data | parts)
 
 
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:
@@ -210,7 +210,8 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
             f"{plan.name} has {len(plan.actions)} actions ({names}), got {len(actions)} numbers."
         )
     named = {action.name: value for action, value in zip(plan.actions, actions, strict=True)}
-    return tuple(
-        max(-1.0, min(1.0, output.offset + sum(w * named[a] for a, w in output.mix.items())))
-        for output in plan.outputs
-    )
+    values: list[float] = []
+    for output in plan.outputs:
+        mixed = output.offset + sum([weight * named[a] for a, weight in output.mix.items()])
+        values.append(max(-1.0, min(1.0, mixed)))
+    return tuple(values)

@@ -199,18 +199,13 @@ class Propulsion:
 
     def push(self, values: Sequence[float]) -> float:
         """Return the forward push, -1 to 1; negative is backward."""
-        return self._mean(self.forward, [value - a.rest for value, a in self._pairs(values)])
+        if not self.forward:
+            return 0.0
+        return sum([values[i] - self._actions[i].rest for i in self.forward]) / len(self.forward)
 
     def speed(self, values: Sequence[float]) -> float | None:
         """Return the speed that the profile gives for this push, m/s; None if it gives none."""
         if not self._known:
             return None
-        speeds = [a.gain * (value - a.rest) for value, a in self._pairs(values)]
-        return self._mean(self._known, speeds)
-
-    def _pairs(self, values: Sequence[float]) -> zip[tuple[float, ActionPlan]]:
-        return zip(values, self._actions, strict=True)
-
-    @staticmethod
-    def _mean(which: Sequence[int], numbers: Sequence[float]) -> float:
-        return sum(numbers[i] for i in which) / len(which) if which else 0.0
+        known = [(self._actions[i], values[i]) for i in self._known]
+        return sum([a.gain * (value - a.rest) for a, value in known]) / len(known)

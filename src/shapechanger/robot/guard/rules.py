@@ -7,11 +7,11 @@ No pins, sockets or clocks, so that every rule can be tested at any time. The gu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.commands import FUTURE_NS, Freshness, aimed, clipped, slewed
 from shapechanger.robot.guard.log import shortened
 from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
@@ -19,6 +19,19 @@ from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Sta
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
 __all__ = ["ARM_WITHIN_NS", "Arming", "OutputDecision", "Rules", "Stopping"]
+
+_NS_PER_MS = 1_000_000
+_SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
+_CLIPPED = "Clipped by the robot's caps."
+
+# Quantities of the sensors whose failure disarms the robot.
+_DISARMING = ("tendons", "joints")
+
+ARM_WITHIN_NS = 1_000_000_000
+"""Age from which an order to arm is refused, ns: the operator may no longer be watching."""
+
+FUTURE_NS = 50_000_000
+"""Tolerance for times in the future, ns. Both processes read one clock, so this is generous."""
 
 
 class Arming:
@@ -72,9 +85,6 @@ class Arming:
         self.emergencies += 1
 
 
-_NS_PER_MS = 1_000_000
-
-
 class Stopping:
     """A stop in progress: propulsion rests at once; other actions hold, ramp to rest and release.
 
@@ -125,12 +135,79 @@ class Stopping:
         return (self.end_ns - now_ns) / self._ramp_ns
 
 
-ARM_WITHIN_NS = 1_000_000_000
-"""Age from which an order to arm is refused, ns: the operator may no longer be watching."""
+class Freshness:
+    """Refuse commands that are repeated, out of order, too old or from the future.
 
-# Quantities of the sensors whose failure disarms the robot.
-_DISARMING = ("tendons", "joints")
-_CLIPPED = "Clipped by the robot's caps."
+    A command replaces its predecessors even when it is refused for another reason, because its
+    sender has superseded them.
+
+    Args:
+        deadline_ms: Longest time for which a command acts, ms.
+    """
+
+    def __init__(self, deadline_ms: int) -> None:
+        self._deadline_ms = deadline_ms
+        self._newest = (-1, -1)
+
+    def refusal(self, order: Order, now_ns: int) -> str:
+        """Return why a command that arrives now is refused, or an empty string."""
+        if (order.session, order.seq) <= self._newest:
+            session, seq = self._newest
+            return (
+                f"Command {order.seq} of session {order.session} is not newer than "
+                f"{seq} of session {session}."
+            )
+        self._newest = (order.session, order.seq)
+        if order.issued_ns > now_ns + FUTURE_NS:
+            return f"Command {order.seq} comes from the future."
+        if now_ns >= self.expiry_ns(order, now_ns):
+            age_ms = (now_ns - order.issued_ns) / _NS_PER_MS
+            limit_ms = min(self._deadline_ms, order.ttl_ms)
+            return f"Command {order.seq} is {age_ms:.0f} ms old; it may act for {limit_ms} ms."
+        return ""
+
+    def expiry_ns(self, order: Order, arrived_ns: int) -> int:
+        """Return the time at which a command expires, ns."""
+        start_ns = min(order.issued_ns, arrived_ns)
+        return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
+
+
+def aimed(action: ActionPlan, value: float) -> float:
+    """Return the target of a command's value: clipped to the caps and rounded to a level."""
+    if action.levels == "three":
+        if value >= action.threshold:
+            return action.high
+        return action.low if value <= -action.threshold else action.rest
+    return max(action.low, min(action.high, value))
+
+
+def clipped(action: ActionPlan, value: float) -> bool:
+    """Return whether a command's value lies outside the caps."""
+    is_inside = action.low - _SAME <= value <= action.high + _SAME
+    return action.levels == "any" and not is_inside
+
+
+def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
+    """Return the next value on the way to the target.
+
+    It jumps towards rest, is limited by the slew away from rest, and pauses at rest for one step
+    when it changes sides. A three-level motor has no slew.
+
+    Args:
+        action: The action.
+        now: Current value.
+        aim: Target value.
+        elapsed_s: Time since the current value was set, s.
+    """
+    is_away, will_be_away = now - action.rest, aim - action.rest
+    if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:
+        return action.rest
+    if abs(will_be_away) <= abs(is_away):
+        return aim
+    if action.levels == "three" or math.isinf(action.slew_per_s):
+        return aim
+    step = action.slew_per_s * elapsed_s
+    return aim if abs(aim - now) <= step else now + math.copysign(step, aim - now)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +261,7 @@ class Rules:
         self._bump = Bump(plan.limits.bump_hold_ms)
         self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
         self._health = RobotHealth(plan)
+        self._measures_distance = any(s.measures == "distance" for s in plan.sensors)
         self._disarming = tuple(s.name for s in plan.sensors if s.measures in _DISARMING)
         self._is_near = False
         self._is_far = True
@@ -265,9 +343,8 @@ class Rules:
         quantities = sensing.quantities
         limit_m = self._plan.limits.stop_distance_m
         self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m
-        measures = any(sensor.measures == "distance" for sensor in self._plan.sensors)
         is_heard = "distance" in quantities and not sensing.silent
-        self._is_far = limit_m <= 0.0 or not measures or is_heard
+        self._is_far = limit_m <= 0.0 or not self._measures_distance or is_heard
         self._bump.sense(quantities, now_ns)
         self._stall.sense(quantities, self._propulsion.push(self._done), now_ns)
         self._health.sense(sensing, now_ns)

@@ -166,15 +166,17 @@ class Sensors:
         failures: dict[str, str] = {}
         slow: set[str] = set()
         silent: set[str] = set()
+        # A twin's clock is paused meanwhile, so that its runs are reproducible on any machine.
+        ended_ns = self._clock.now_ns()
         for name, driver in self._drivers:
-            # A twin's clock is paused meanwhile, so that its runs are reproducible on any machine.
-            began_ns = self._clock.now_ns()
+            began_ns = ended_ns
             measured: dict[str, float] = {}
             try:
                 measured = driver.read(now_ns, direction)
             except (RobotError, OSError) as error:
                 failures[name] = str(error)
-            if self._clock.now_ns() - began_ns > MOST_READ_NS:
+            ended_ns = self._clock.now_ns()
+            if ended_ns - began_ns > MOST_READ_NS:
                 slow.add(name)
                 words = f"It took more than {MOST_READ_NS // 1_000_000} ms to answer."
                 failures[name] = f"{failures.get(name, '')} {words}".lstrip()

@@ -12,7 +12,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,27 +58,15 @@ class ServePlan:
 
     def to_json(self) -> str:
         """Return the plan as JSON."""
-        fields = {
-            "guard": json.loads(self.guard.to_json()),
-            "daemon": self.daemon,
-            "hardware": list(self.hardware),
-            "python": self.python,
-            "patience_ms": self.patience_ms,
-        }
-        return json.dumps(fields)
+        return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> ServePlan:
         """Read the output of `to_json`. The text is trusted and not validated."""
         data: dict[str, Any] = json.loads(text)
         source, argument = data["hardware"]
-        return cls(
-            guard=GuardPlan.from_json(json.dumps(data["guard"])),
-            daemon=data["daemon"],
-            hardware=(source, argument),
-            python=data["python"],
-            patience_ms=data["patience_ms"],
-        )
+        data |= {"guard": GuardPlan.from_dict(data["guard"]), "hardware": (source, argument)}
+        return cls(**data)
 
 
 def plan_fd(plan: ServePlan) -> int:

@@ -21,14 +21,14 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.log import log_to_stderr
-from shapechanger.robot.guard.outputs import make_safe, preload
+from shapechanger.robot.guard.outputs import make_safe, noted, preload
 from shapechanger.robot.guard.priority import SUPERVISOR, run_promptly
 from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, ServePlan, descriptors, read_plan_fd
 from shapechanger.robot.hardware import connect
@@ -184,18 +184,16 @@ _FAILED_TOO_OFTEN: Final = 1
 _CANNOT_START: Final = 2
 _NOT_SAFE: Final = 3
 
-_START_S: Final = (
-    30.0  # To the first heartbeat: a Pi Zero takes several seconds to load the daemon.
-)
+# To the first heartbeat: a Pi Zero takes several seconds to load the daemon.
+_START_S: Final = 30.0
 _DAEMON_SILENCE_S: Final = 2.0
 _END_S: Final = 1.0  # For a process to exit after SIGTERM.
 _REAP_S: Final = 0.05  # For a killed process to disappear; the pins wait no longer.
 _AGAIN_S: Final = 0.1  # Between attempts to put the outputs to rest.
 _UNSAFE_S: Final = 5.0  # For such attempts when there is nothing else to wait for.
 _LOOK_S: Final = 0.02  # Between checks of the heartbeats.
-_PAUSE_NS: Final = (
-    100_000_000  # A longer gap between checks means that the supervisor itself did not run.
-)
+# A longer gap between checks means that the supervisor itself did not run.
+_PAUSE_NS: Final = 100_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -389,7 +387,13 @@ class Supervisor:
             self._pause(_AGAIN_S)
 
     def _make_safe(self) -> None:
-        failures = _collected(lambda: _safe(self._plan))
+        failures: list[str] = []
+        with noted(failures, "The hardware"):  # The children must be ended whatever happens to it.
+            hardware = connect(*self._plan.hardware)
+            try:
+                failures += make_safe(self._plan.guard, hardware)
+            finally:
+                hardware.close()
         self._is_safe = not failures
         self._say_unsafe(failures)
 
@@ -399,22 +403,6 @@ class Supervisor:
             self._failures = failures
             for failure in failures:
                 self._log.error("NOT SAFE: %s", failure)
-
-
-def _safe(plan: ServePlan) -> list[str]:
-    hardware = connect(*plan.hardware)
-    try:
-        return make_safe(plan.guard, hardware)
-    finally:
-        hardware.close()
-
-
-def _collected(work: Callable[[], list[str]]) -> list[str]:
-    """Run `work` and return its failures, including an exception of its own."""
-    try:
-        return work()
-    except Exception as error:  # The children must be ended whatever happens to the pins.
-        return [f"The hardware: {str(error) or type(error).__name__}"]
 
 
 def _words(code: int | None) -> str:
