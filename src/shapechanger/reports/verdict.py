@@ -30,12 +30,9 @@ from shapechanger.transfer.study import Study
 
 __all__ = [
     "ASYMPTOTIC_GAIN",
-    "AUC_RATIO",
     "EXPLANATIONS",
-    "FORWARD_TRANSFER",
     "GOOD",
     "JUMPSTART",
-    "PURE_NUMBER",
     "TIME_TO_THRESHOLD",
     "TOTAL_REWARD_GAIN",
     "ArmRow",
@@ -44,11 +41,9 @@ __all__ = [
     "arm_rows",
     "caveats",
     "direction",
-    "finals",
     "headline_arm",
     "is_flat",
     "measure_rows",
-    "source_takes_all",
     "successes",
     "verdict",
 ]
