@@ -37,6 +37,7 @@ from shapechanger.morphology import (
     Split,
     Stretch,
     from_json,
+    interpolate,
     to_json,
 )
 from shapechanger.morphology.effective import fingerprint
@@ -402,11 +403,13 @@ def test_a_model_of_ones_own_is_edited_like_ours(tmp_path: Path) -> None:
     again.close()
 
 
-def test_body_towards_is_a_path_between_two_envs() -> None:
+def test_interpolated_bodies_are_a_path_between_two_envs() -> None:
     """At its ends are the bodies of the two."""
     with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
-        ends = [one.unwrapped.body_towards(other.unwrapped, alpha) for alpha in (0.0, 1.0)]
-        middle = one.unwrapped.body_towards(other.unwrapped, 0.5)
+        ends = [
+            interpolate(one.unwrapped.body, other.unwrapped.body, alpha) for alpha in (0.0, 1.0)
+        ]
+        middle = interpolate(one.unwrapped.body, other.unwrapped.body, 0.5)
     prints = [fingerprint(_model("shapechanger/Ant-v1", body=body)) for body in ends]
     assert prints == [fingerprint(_model(f"shapechanger/{name}-v1")) for name in ("Ant", "BigAnt")]
     model = _model("shapechanger/Ant-v1", body=middle)

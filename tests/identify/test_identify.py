@@ -270,7 +270,7 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
         assert label(e) in page
         assert interval(e) in page
         assert number(e, e.value) in page
-    for name, why in found.untold:
+    for name, why in found.undetermined:
         assert name in page
         assert why in page
     assert page.count("<img") == 4
@@ -290,6 +290,6 @@ def test_motors_that_are_known_hide_no_joint() -> None:
     found = identify(log, known=with_gears(NOMINAL.replace(most_tension=weak)))
     assert found.parameters.most_tension == weak
     assert found.parameters.motor_kg == truth.motor_kg
-    assert "most_tension" not in dict(found.untold)
+    assert "most_tension" not in dict(found.undetermined)
     np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.3)
     np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.3)

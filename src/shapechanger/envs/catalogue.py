@@ -14,7 +14,6 @@ from shapechanger.errors import UnknownName
 __all__ = [
     "CATALOGUE",
     "FINGER_ENVS",
-    "NAMESPACE",
     "REMOTE_FINGER",
     "REMOTE_VEHICLE",
     "VEHICLE_ENVS",

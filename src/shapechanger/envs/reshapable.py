@@ -26,7 +26,7 @@ from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
+from shapechanger.morphology import Body, compile_body, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
     StartRules,
@@ -365,10 +365,6 @@ class Reshapable(MujocoEnv):
             EmptyShift: If they do not differ and `allow_empty` is false.
         """
         return certify(cast("Wrapped", source), cast("Wrapped", target), allow_empty=allow_empty)
-
-    def body_towards(self, target: Reshapable, alpha: float) -> Body:
-        """Return the body at the fraction `alpha` in [0, 1] of the way to the body of `target`."""
-        return interpolate(self.body, target.body, alpha)
 
     @property
     def reach(self) -> float:

@@ -119,7 +119,7 @@ class IdentifiedFinger:
     Attributes:
         parameters: The finger, as `build_finger` and the env's argument `parameters` take it.
         estimates: Identified parameters with intervals, the moment arms first.
-        untold: Parameters that the log cannot determine, each with a reason for people.
+        undetermined: Parameters that the log cannot determine, each with a reason for people.
         held_out: Validation on the part of the log that was not fitted.
         source: Source named in the log.
         seconds: Length of the log, s.
@@ -127,7 +127,7 @@ class IdentifiedFinger:
 
     parameters: FingerParameters
     estimates: tuple[ParameterEstimate, ...]
-    untold: tuple[tuple[str, str], ...]
+    undetermined: tuple[tuple[str, str], ...]
     held_out: HeldOut
     source: str
     seconds: float
@@ -185,7 +185,7 @@ def identify(
     return IdentifiedFinger(
         parameters=parameters,
         estimates=_estimates(kinematics, motors, dynamics, log),
-        untold=_undetermined(motors, known),
+        undetermined=_undetermined(motors, known),
         held_out=HeldOut(
             t=log.t[last:] - log.t[0],
             measured=log.angles[last:],

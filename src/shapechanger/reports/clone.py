@@ -60,7 +60,7 @@ def write_clone_report(
     data: Dataset,
     judgement: Judgement,
     training: Training | None,
-    told: str,
+    data_note: str,
 ) -> None:
     """Write the page.
 
@@ -71,7 +71,7 @@ def write_clone_report(
         data: The steps that it was evaluated on, which `judgement.worst` indexes.
         judgement: Its evaluation.
         training: How it was trained; None if unknown.
-        told: A sentence on the steps that it was evaluated on.
+        data_note: A sentence on the steps that it was evaluated on.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
@@ -84,7 +84,7 @@ def write_clone_report(
     page = render(
         "clone.html",
         title=name,
-        verdict=_verdict(judgement, told),
+        verdict=_verdict(judgement, data_note),
         cards=_cards(judgement),
         judgement=judgement,
         errors=[
@@ -111,10 +111,11 @@ def write_clone_report(
     write_atomic(path, page.encode())
 
 
-def _verdict(judgement: Judgement, told: str) -> str:
+def _verdict(judgement: Judgement, data_note: str) -> str:
     return (
         f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; always "
-        f"choosing the driver's most frequent action is right on {judgement.always:.1%}. {told}"
+        f"choosing the driver's most frequent action is right on {judgement.always:.1%}. "
+        f"{data_note}"
     )
 
 

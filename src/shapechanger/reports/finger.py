@@ -53,7 +53,7 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
             }
             for e in found.estimates
         ],
-        undetermined=found.untold,
+        undetermined=found.undetermined,
     )
 
 

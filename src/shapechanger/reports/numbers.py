@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from shapechanger.transfer.metrics import Estimate
 
 __all__ = [
-    "CONFIDENCE",
     "UNDEFINED",
-    "SeedMean",
     "count",
     "duration_text",
     "estimate_text",

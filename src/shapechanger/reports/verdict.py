@@ -30,12 +30,9 @@ from shapechanger.transfer.study import Study
 
 __all__ = [
     "ASYMPTOTIC_GAIN",
-    "AUC_RATIO",
     "EXPLANATIONS",
-    "FORWARD_TRANSFER",
     "GOOD",
     "JUMPSTART",
-    "PURE_NUMBER",
     "TIME_TO_THRESHOLD",
     "TOTAL_REWARD_GAIN",
     "ArmRow",
@@ -44,11 +41,9 @@ __all__ = [
     "arm_rows",
     "caveats",
     "direction",
-    "finals",
     "headline_arm",
     "is_flat",
     "measure_rows",
-    "source_takes_all",
     "successes",
     "verdict",
 ]
@@ -276,7 +271,7 @@ def _row(study: Study, kind: RunKind) -> ArmRow:
         first=_spread(np.array([_value(study, r.curve[0]) for r in results])),
         final=_spread(at_the_end),
         final_return=spread_text(
-            np.array([np.mean([e.mean_return for e in _end(study, r)]) for r in results])
+            np.array([float(np.mean([e.mean_return for e in _end(study, r)])) for r in results])
         ),
         length=number(float(np.mean([e.mean_length for e in ends]))),
         success=share_text(successes(study, kind)),

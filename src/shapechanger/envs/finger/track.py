@@ -33,14 +33,7 @@ from shapechanger.tasks.paths import (
     sample,
 )
 
-__all__ = [
-    "PREVIEW_S",
-    "RANDOM",
-    "FingerTrackEnv",
-    "beginning_if_reachable",
-    "draw_path",
-    "require_reachable",
-]
+__all__ = ["PREVIEW_S", "FingerTrackEnv", "draw_path", "require_reachable"]
 
 _CHECK_HZ: Final = 50.0
 # Checked time of an endless path, s.

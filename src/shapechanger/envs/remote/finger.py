@@ -30,7 +30,7 @@ from shapechanger.robot.profile.load import find_profile
 from shapechanger.tasks.finger import FingerSenses
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 
-__all__ = ["NOMINAL_TWIN", "RemoteFingerEnv", "serve_twin"]
+__all__ = ["RemoteFingerEnv"]
 
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""

@@ -32,7 +32,6 @@ from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.effective.contacts import colliding_pairs
 
 __all__ = [
-    "Demand",
     "demand_for",
     "find_fast_model",
     "forget_fast_models",
