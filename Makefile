@@ -4,6 +4,9 @@
 PYTHON ?= python3
 JOBS ?= 2
 
+# Tests of whole programs spend half of their time waiting for these.
+SYSTEM_JOBS ?= $(shell expr $(JOBS) + 1)
+
 VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(BIN)/python
@@ -40,7 +43,7 @@ test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
 	$(PYTEST) -m "not slow and not system" $(addprefix --ignore=,$(COVERING))
 
 test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, browsers, terminals
-	$(PYTEST) -m "system and not slow" --dist loadfile  # Files share their studies and robots.
+	$(PYTEST) -m "system and not slow" -n $(SYSTEM_JOBS)
 
 test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 	$(PYTEST) --cov
@@ -51,7 +54,7 @@ test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and 
 check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(RUN) -m pyright
+	$(RUN) -m pyright --threads $(JOBS)
 
 bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 	$(RUN) -m benchmarks.run

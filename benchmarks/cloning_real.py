@@ -117,7 +117,7 @@ def plain(
     torch.manual_seed(seed)
     seen = _tensor(pictures)
     wanted = torch.as_tensor(targets)
-    network = _Plain(*pictures.shape[1:3], int(targets.max()) + 1)
+    network = _Plain(pictures.shape[1], pictures.shape[2], int(targets.max()) + 1)
     optimizer = torch.optim.Adam(network.parameters(), _RATE)
     for _ in range(epochs):
         for few in torch.randperm(len(seen)).split(_BATCH):

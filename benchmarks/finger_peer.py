@@ -19,7 +19,7 @@ WARM_UP = 300
 
 def _make(kind: str) -> Any:
     if kind == "myosuite":
-        from myosuite.utils import gym
+        from myosuite.utils import gym  # pyright: ignore[reportMissingImports]  # In a venv of its own.
 
         return gym.make("myoFingerReachRandom-v0")
     import gymnasium

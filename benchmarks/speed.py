@@ -30,7 +30,7 @@ PENDULUM_STEPS: Final = 1000
 WARM_UP: Final = 600
 FRAMES: Final = 60
 SLOW_FRAMES: Final = 8
-SIZE: Final = {"width": 128, "height": 128}
+SIZE: Final[dict[str, Any]] = {"width": 128, "height": 128}
 _ANT_FRAME_SKIP: Final = 5
 # Pushes so small that the pole stays up for a while.
 _GENTLE: Final = 0.05
@@ -62,7 +62,7 @@ def _compared(
     ours = gym.make(f"shapechanger/{name}-v1", **arguments)
     theirs = gym.make(f"{name}-v5")
     rng = np.random.default_rng(0)
-    shape = (*ours.action_space.shape,)
+    shape = ours.action_space.shape or ()
     of_steps: list[float] = []
     of_resets: list[float] = []
     with ours, theirs:
@@ -82,7 +82,8 @@ def _compared(
 
 
 def _state(env: gym.Env[Any, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    data: Any = env.unwrapped.data
+    inner: Any = env.unwrapped
+    data = inner.data
     return data.qpos.copy(), data.qvel.copy()
 
 
@@ -126,7 +127,8 @@ def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
 
 def _stopwatch_row() -> Row:
     """What MuJoCo's stopwatch costs where it does not rest, in steps of the physics alone."""
-    model: Any = gym.make("Ant-v5").unwrapped.model
+    ant: Any = gym.make("Ant-v5").unwrapped
+    model = ant.model
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (ANT_STEPS, model.nu))
 

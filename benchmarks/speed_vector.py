@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import mujoco
@@ -58,7 +58,7 @@ class _Fleet:
 
     def bodies(self) -> list[tuple[Any, Any]]:
         """Model and data of each ant."""
-        return [(env.unwrapped.model, env.unwrapped.data) for env in self.envs.envs]
+        return [(env.model, env.data) for env in _unwrapped(self.envs)]
 
     def put_into(self, others: list[tuple[Any, Any]]) -> None:
         """Bring other ants into the states of these."""
@@ -66,6 +66,11 @@ class _Fleet:
             state = np.empty(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
             mujoco.mj_setState(other_model, other_data, state, _STATE)
+
+
+def _unwrapped(envs: Any) -> list[Any]:
+    """The MuJoCo envs of a vector env."""
+    return [env.unwrapped for env in envs.envs]
 
 
 def _timed(work: Callable[[], object], clock: Callable[[], float]) -> float:
@@ -105,10 +110,11 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
     fast model too: what is left to save beside the physics.
     """
     fleet = _Fleet(num_envs)
-    model = gym.make("Ant-v5").unwrapped.model
+    ant: Any = gym.make("Ant-v5").unwrapped
+    model = ant.model
     if fast:
         one: Any = fleet.envs.envs[0].unwrapped
-        model = find_fast_model(ModelWatch(one.model), one.body_spec)
+        model = cast("Any", find_fast_model(ModelWatch(one.model), one.body_spec))
     bare = [(model, mujoco.MjData(model)) for _ in range(num_envs)]
     controls: list[Any] = [data.ctrl for _, data in bare]
     actions = fleet.actions(STEPS)
@@ -147,7 +153,7 @@ def against_sync(num_envs: int) -> Row:
     fleet = _Fleet(num_envs)
     sync = gym.make_vec("Ant-v5", num_envs=num_envs, vectorization_mode="sync")
     sync.reset(seed=0)
-    theirs = [(env.unwrapped.model, env.unwrapped.data) for env in sync.envs]
+    theirs = [(env.model, env.data) for env in _unwrapped(sync)]
     ratios: list[float] = []
     for _ in range(ROUNDS):
         actions = fleet.actions(STEPS)

@@ -29,7 +29,7 @@ def _resident() -> int:
 
 def _make(kind: str, num_envs: int, threads: int) -> Any:
     if kind == "envpool":
-        import envpool
+        import envpool  # pyright: ignore[reportMissingImports]  # In a venv of its own.
 
         return envpool.make_gymnasium(
             "Ant-v5", num_envs=num_envs, batch_size=num_envs, num_threads=threads, seed=0

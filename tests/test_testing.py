@@ -62,7 +62,7 @@ class Walk(gym.Env[np.ndarray, np.ndarray]):
         speed += 0.1 * float(action[0])
         self.state = np.array([x + 0.1 * speed, speed])
         terms = {"reward_forward": speed, "reward_alive": 1.0}
-        return self.seen(), sum(terms.values()), abs(x) > 1.0, False, terms
+        return self.seen(), float(sum(terms.values())), bool(abs(x) > 1.0), False, terms
 
 
 _count = itertools.count()
@@ -109,10 +109,10 @@ class Shared(Walk):
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
         """Write the new state over the old one."""
         memory = self.state
-        _, *rest = super().step(action)
+        _, reward, terminated, truncated, info = super().step(action)
         memory[:] = self.state
         self.state = memory
-        return memory, *rest
+        return memory, reward, terminated, truncated, info
 
 
 class Nameless(Walk):
@@ -187,8 +187,8 @@ class Vague(Walk):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
         """Keep the terms."""
-        *rest, _ = super().step(action)
-        return *rest, {}
+        observation, reward, terminated, truncated, _ = super().step(action)
+        return observation, reward, terminated, truncated, {}
 
 
 class Generous(Walk):
@@ -196,8 +196,8 @@ class Generous(Walk):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
         """Add a gift."""
-        observation, reward, *rest = super().step(action)
-        return observation, reward + 1e-3, *rest
+        observation, reward, terminated, truncated, info = super().step(action)
+        return observation, reward + 1e-3, terminated, truncated, info
 
 
 class Still(Walk):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import gymnasium as gym
@@ -46,7 +47,7 @@ def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str,
 
 
 def _oracle(env: str, mode: str, **arguments: Any) -> FingerOracle:
-    with gym.make(env, actions=mode, **arguments) as made:
+    with contextlib.closing(gym.make(env, actions=mode, **arguments)) as made:
         layout: Any = made.get_wrapper_attr("observation_layout")
         return FingerOracle(layout, mode)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import math
 import pickle
@@ -54,7 +55,7 @@ def _compiled(model: mujoco.MjModel) -> bytes:
 
 
 def _model(env_id: str, **arguments: Any) -> mujoco.MjModel:
-    with gym.make(env_id, **arguments) as env:
+    with contextlib.closing(gym.make(env_id, **arguments)) as env:
         return env.unwrapped.model
 
 

@@ -118,7 +118,8 @@ def _volumes(model: mujoco.MjModel, weights: Array) -> Array:
         kind.mjGEOM_BOX: 8.0 * a * b * c,
     }
     volumes = sum(np.where(model.geom_type == int(t), v, 0.0) for t, v in shapes.items())
-    return np.bincount(model.geom_bodyid, weights * volumes, minlength=model.nbody)
+    masses = np.bincount(model.geom_bodyid, weights * volumes, minlength=model.nbody)
+    return masses.astype(np.float64)
 
 
 @pytest.mark.parametrize("model", _MODELS)

@@ -179,7 +179,7 @@ def expected(
     """
     z = sensed(source, body_map.adapt_observation(observation))
     numbers = computed(source, z, back_to_source(body_map, u))
-    taken = body_map.action_matrix.any(axis=1)
+    taken = np.any(body_map.action_matrix, axis=1)
     rows = np.abs(body_map.action_matrix)
     numbers["mean"] = numbers["mean"] @ body_map.action_matrix.T
     if isinstance(source, PPO):

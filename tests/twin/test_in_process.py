@@ -11,6 +11,7 @@ import simplejpeg
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
+from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.twin.world.vehicle import DrivingWorld
@@ -68,6 +69,19 @@ def test_it_is_armed_from_the_start_and_says_what_it_is() -> None:
     assert robot.welcome.robot == "lab-car"
     assert robot.welcome.clock == "twin"
     assert robot.welcome.image_size is None
+    robot.close()
+
+
+def test_it_can_be_armed_again_after_an_emergency_stop() -> None:
+    """Whoever arms it has seen the stop."""
+    robot = _robot()
+    robot.start()
+    robot._orders.waiting.append(Order("emergency", reason="A hand in the way."))
+    assert robot.step((0.0, 0.5))[0].emergency
+    robot.arm()
+    seen, _ = robot.step((0.0, 0.5))
+    assert seen.armed
+    assert not seen.emergency
     robot.close()
 
 

@@ -113,7 +113,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     def runs(self) -> tuple[Run, ...]:
         """Every run of the study; those that others depend on come first."""
         given = bool(self.source_policy)
-        arms = [arm for arm in EVERY_ARM if arm in self.arms]
+        arms: list[RunKind] = [arm for arm in EVERY_ARM if arm in self.arms]
         wanted: list[RunKind] = ["random", "zero-action", *arms]
         if not given and {"zero-shot", "fine-tune"} & set(self.arms):
             wanted.insert(0, "source")

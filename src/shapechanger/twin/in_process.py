@@ -290,9 +290,10 @@ class InProcessRobot:
             RobotError: If the robot does not arm.
         """
         self._orders.refused = refused = ""  # An earlier refusal is about something else.
+        seen = self._state.emergencies
         for _ in range(_MAX_ARM_TICKS):
             now_ns = self._board.now_ns
-            self._orders.waiting.append(Order(kind="arm", issued_ns=now_ns, person=True))
+            self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
             self._advance(self._tick_ns)
             refused = self.refused
             if self._state.armed and not refused:

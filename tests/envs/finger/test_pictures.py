@@ -27,7 +27,7 @@ def finger() -> Iterator[Any]:
 
 def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Which pixels differ by more than rounding."""
-    return (np.abs(one.astype(int) - other.astype(int)) > 4).any(axis=2)
+    return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
 
 
 def test_a_frame_is_bright_and_shows_the_finger(finger: Any) -> None:

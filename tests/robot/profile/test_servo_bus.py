@@ -19,7 +19,7 @@ _BUS = _TEXT[_TEXT.index("[servo_bus]") : _TEXT.index("[action.FDP]")]
 def test_every_output_knows_its_bus_and_the_sensor_its_tendons() -> None:
     """The guard needs no table but theirs."""
     plan = load_profile(shipped_profiles()["finger"]).guard_plan()
-    assert {output.settings["device"] for output in plan.outputs} == {"/dev/ttyUSB0"}
+    assert {str(output.settings["device"]) for output in plan.outputs} == {"/dev/ttyUSB0"}
     assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]
     sensor, _ = plan.sensors
     assert sensor.measures == "tendons"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import Any, cast
 
 import gymnasium as gym
@@ -140,8 +139,8 @@ class _Episode:
         self.length += 1
         for name, value in info.items():
             # NumPy's float32 is no Python float, and ants report their control cost as one.
-            if name.startswith("reward_") and isinstance(value, Real | np.number):
-                self.terms[name] = self.terms.get(name, 0.0) + float(value)
+            if name.startswith("reward_") and isinstance(value, int | float | np.floating):
+                self.terms[name] = self.terms.get(name, 0.0) + float(cast("float", value))
         if "is_success" in info:
             self.success = bool(info["is_success"])
         for measure in measures:
