@@ -73,7 +73,7 @@ def learned() -> list[Row]:
 
 def trained(name: str, seed: int) -> Path:
     """Train a policy, unless it was; its file."""
-    out = FOLDER / f"{name}-{seed}.zip"
+    out = FOLDER / f"{name}-{seed}.safetensors"
     if out.exists():
         return out
     task = TASKS[name]
@@ -95,7 +95,8 @@ def _reach_row(seeds: range) -> Row:
     shares: list[float] = []
     errors: list[float] = []
     for seed in seeds:
-        infos = _played(load_policy(FOLDER / f"reach-{seed}.zip"), TASKS["reach"].env, TARGETS)
+        policy = load_policy(FOLDER / f"reach-{seed}.safetensors")
+        infos = _played(policy, TASKS["reach"].env, TARGETS)
         shares.append(float(np.mean([info["is_success"] for info in infos])))
         errors.append(1e3 * float(np.median([info["distance"] for info in infos])))
     return Row(
@@ -127,7 +128,7 @@ def _track_row(seeds: range) -> Row:
 
 
 def _tracker(seed: int) -> TrainedPolicy:
-    return load_policy(FOLDER / f"track-{seed}.zip")
+    return load_policy(FOLDER / f"track-{seed}.safetensors")
 
 
 def _played(policy: TrainedPolicy, env: EnvRef, episodes: int) -> list[dict[str, Any]]:

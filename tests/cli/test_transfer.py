@@ -58,7 +58,7 @@ def test_a_study_is_one_command(
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
-    assert "Counted in target steps" in done.stdout
+    assert "over 3,072 target steps fine-tune's return averages" in done.stdout
     report = (out / "report.html").read_text()
     assert "pole: length 0.6 m" in report
     assert 'src="http' not in report
@@ -72,7 +72,7 @@ def test_progress_is_plain_lines_without_a_terminal(
 ) -> None:
     """One line for each run that ends, with the time left, and no control characters."""
     lines = quick[1].stderr.splitlines()
-    assert sum(" ended; " in line for line in lines) == 10
+    assert sum(" ended; " in line for line in lines) == 11
     assert any("s left" in line for line in lines)
     assert "\x1b" not in quick[1].stderr
 
@@ -126,7 +126,7 @@ def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
     )
     assert done.returncode == 2
     assert "Cannot write" in done.stderr
-    assert "policy.zip" in done.stderr
+    assert "policy.safetensors" in done.stderr
     ended = list((tmp_path / "study" / "runs").glob("*/run.json"))
     way_on = "are kept" if ended else "No run had ended; begin again with: shapechanger transfer"
     assert way_on in done.stderr
@@ -136,7 +136,7 @@ def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A policy of the pendulum, with its logs beside it, and what training it printed."""
-    policy = tmp_path_factory.mktemp("trained") / "policy.zip"
+    policy = tmp_path_factory.mktemp("trained") / "policy.safetensors"
     logs = policy.with_name("logs")
     files = ["--out", str(policy), "--tensorboard", str(logs)]
     done = run("train", "InvertedPendulum", "--steps", "3072", *files)

@@ -51,7 +51,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A policy of a pendulum trained with PPO."""
-    path = tmp_path_factory.mktemp("ppo") / "pole.zip"
+    path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
     policy = train(
         SMALL,
         "tiny",
@@ -117,7 +117,9 @@ def test_ppo_refuses_a_clone(clone_file: Path) -> None:
 
 def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
     """And the other way round."""
-    with pytest.raises(StudyError, match=r"pole\.zip was trained with tiny, and cloning starts"):
+    with pytest.raises(
+        StudyError, match=r"pole\.safetensors was trained with tiny, and cloning starts"
+    ):
         _plan(ppo_file)
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 import pickle
+import random
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
+from safetensors import numpy as safetensors
 
 import shapechanger
+from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import CorruptStudy
 from shapechanger.transfer.learners.cloning import load_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
@@ -34,8 +36,8 @@ def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[E
 def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
     """Actions, statistics and card read back as they were."""
     policy, curve = trained(settings)
-    save_policy(policy, tmp_path / "policy.zip")
-    again = load_policy(tmp_path / "policy.zip")
+    save_policy(policy, tmp_path / "policy.safetensors")
+    again = load_policy(tmp_path / "policy.safetensors")
     observations = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_array_equal(again.act(observations), policy.act(observations))
     assert again.card == policy.card
@@ -63,33 +65,95 @@ def test_the_seed_decides_the_training() -> None:
 @pytest.mark.parametrize("kind", ["missing", "text", "zip"])
 def test_what_is_no_policy_is_refused(tmp_path: Path, kind: str) -> None:
     """A missing file, a text, and a zip of something else."""
-    path = tmp_path / "policy.zip"
+    path = tmp_path / "policy.safetensors"
     if kind == "text":
         path.write_text("not a policy")
     if kind == "zip":
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("thesis.tex", "precious")
-    with pytest.raises(CorruptStudy, match=r"policy\.zip"):
+    with pytest.raises(CorruptStudy, match=r"policy\.safetensors"):
         load_policy(path)
 
 
 SHIPPED = Path(shapechanger.__file__).parent / "envs"
 
 
-@pytest.mark.parametrize(
-    "path", sorted(SHIPPED.glob("finger/policies/*.zip")), ids=lambda p: p.stem
-)
-def test_shipped_policies_load_without_trust(path: Path) -> None:
-    """They act the same either way."""
-    safe, trusted = load_policy(path), load_policy(path, trust=True)
-    seen = np.random.default_rng(0).normal(size=(3, safe.card.observation.size))
-    np.testing.assert_array_equal(safe.act(seen), trusted.act(seen))
+@pytest.mark.parametrize("path", POLICIES.values(), ids=POLICIES)
+def test_shipped_policies_load(path: Path) -> None:
+    """They act within the bounds of their actions."""
+    policy = load_policy(path)
+    seen = np.random.default_rng(0).normal(size=(3, policy.card.observation.size))
+    assert np.abs(policy.act(seen)).max() <= 1.0
 
 
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("vehicle/clones/*.zip")), ids=lambda p: p.stem)
 def test_shipped_clones_load(path: Path) -> None:
     """Their weights are read without unpickling."""
     assert load_clone(path).card.framing.width > 0
+
+
+def test_loading_leaves_random_numbers_alone() -> None:
+    """A policy that is loaded in the middle of a training must not repeat its draws."""
+    random.seed(5)
+    before = random.getstate()
+    load_policy(POLICIES["reach"])
+    assert random.getstate() == before
+
+
+@pytest.mark.parametrize("at", [3, 200, -1])
+def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
+    """In its length, its header or its numbers."""
+    content = bytearray(POLICIES["reach"].read_bytes())
+    content[at] ^= 0x01
+    (tmp_path / "bad.safetensors").write_bytes(content)
+    with pytest.raises(CorruptStudy, match=r"bad\.safetensors is not a policy"):
+        load_policy(tmp_path / "bad.safetensors")
+
+
+def test_half_a_file_is_refused(tmp_path: Path) -> None:
+    """A copy that was cut off."""
+    content = POLICIES["reach"].read_bytes()
+    for size in (0, 4, 500, len(content) - 1):
+        (tmp_path / "half.safetensors").write_bytes(content[:size])
+        with pytest.raises(CorruptStudy, match=r"half\.safetensors is not a policy"):
+            load_policy(tmp_path / "half.safetensors")
+
+
+def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:
+    """A policy of the finger with another card, and the hash of its numbers."""
+    content = POLICIES["reach"].read_bytes()
+    length = int.from_bytes(content[:8], "little")
+    metadata = json.loads(content[8 : 8 + length])["__metadata__"]
+    metadata["card"] = json.dumps({**json.loads(metadata["card"]), **card})
+    path = tmp_path / "other.safetensors"
+    path.write_bytes(safetensors.save(safetensors.load(content), metadata=metadata))
+    return path
+
+
+def test_a_card_of_another_body_is_refused(tmp_path: Path) -> None:
+    """Its layouts must have the sizes of its spaces."""
+    card = load_policy(POLICIES["track"]).card
+    path = _changed(tmp_path, {"observation": msgspec.to_builtins(card.observation)})
+    with pytest.raises(CorruptStudy, match="its observation has 38 numbers, and its layout"):
+        load_policy(path)
+
+
+def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
+    """In one sentence."""
+    settings = msgspec.structs.replace(load_policy(POLICIES["reach"]).card.settings, net_arch=(8,))
+    path = _changed(tmp_path, {"settings": msgspec.to_builtins(settings)})
+    with pytest.raises(CorruptStudy, match=r"other\.safetensors is not a policy") as refusal:
+        load_policy(path)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_pickle_is_refused(tmp_path: Path) -> None:
+    """Nothing of it is unpickled, whatever it is called."""
+    trace, bad = tmp_path / "trace", tmp_path / "bad.safetensors"
+    bad.write_bytes(pickle.dumps(Malicious(trace)))
+    with pytest.raises(CorruptStudy, match=r"bad\.safetensors is not a policy"):
+        load_policy(bad)
+    assert not trace.exists()
 
 
 class Malicious:
@@ -101,61 +165,3 @@ class Malicious:
     def __reduce__(self) -> tuple[object, ...]:
         """Call `Path.touch` on unpickling."""
         return Path.touch, (self._trace,)
-
-
-def rewritten(policy: Path, out: Path, change: Callable[[dict[str, bytes]], None]) -> None:
-    """Copy a policy file with changed entries of the model's own zip."""
-    with zipfile.ZipFile(policy) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(io.BytesIO(entries["model.zip"])) as archive:
-        model = {name: archive.read(name) for name in archive.namelist()}
-    change(model)
-    inner = io.BytesIO()
-    with zipfile.ZipFile(inner, "w") as archive:
-        for name, content in model.items():
-            archive.writestr(name, content)
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, content in {**entries, "model.zip": inner.getvalue()}.items():
-            archive.writestr(name, content)
-
-
-def test_a_policy_that_would_run_code_is_refused(tmp_path: Path) -> None:
-    """Nothing of it is unpickled, unless the user trusts it."""
-    trace, bad = tmp_path / "trace", tmp_path / "bad.zip"
-
-    def infect(model: dict[str, bytes]) -> None:
-        data = json.loads(model["data"])
-        pickled = base64.b64encode(pickle.dumps(Malicious(trace))).decode()
-        data["ep_info_buffer"] = {":type:": "x", ":serialized:": pickled}
-        model["data"] = json.dumps(data).encode()
-
-    rewritten(SHIPPED / "finger" / "policies" / "reach.zip", bad, infect)
-    with pytest.raises(CorruptStudy, match=r"bad\.zip contains a pickled reference to .*--trust"):
-        load_policy(bad)
-    assert not trace.exists()
-    load_policy(bad, trust=True)
-    assert trace.exists()
-
-
-def test_an_unknown_entry_is_refused(tmp_path: Path) -> None:
-    """Stable-Baselines3 would load any entry that ends in .pth."""
-    bad = tmp_path / "bad.zip"
-    rewritten(
-        SHIPPED / "finger" / "policies" / "reach.zip", bad, lambda m: m.update({"more.pth": b""})
-    )
-    with pytest.raises(CorruptStudy, match=r"contains the entry 'more\.pth'"):
-        load_policy(bad)
-
-
-def test_a_damaged_pickle_is_refused(tmp_path: Path) -> None:
-    """In one sentence."""
-    bad = tmp_path / "bad.zip"
-
-    def damage(model: dict[str, bytes]) -> None:
-        data = json.loads(model["data"])
-        data["ep_info_buffer"][":serialized:"] = base64.b64encode(b"\x80\x04x").decode()
-        model["data"] = json.dumps(data).encode()
-
-    rewritten(SHIPPED / "finger" / "policies" / "reach.zip", bad, damage)
-    with pytest.raises(CorruptStudy, match="'ep_info_buffer' cannot be unpickled"):
-        load_policy(bad)

@@ -160,7 +160,7 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
 
 def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: Path) -> None:
     """With a source policy no source is trained, and every seed starts from that policy."""
-    policy = policy_path(finished[1], Run("source", 0))
+    policy = policy_path(finished[0].plan, finished[1], Run("source", 0))
     plan = tiny_plan(source_policy=policy)
     study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
     assert not study.of("source")
@@ -170,14 +170,16 @@ def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: P
     assert unchanged.curve[0].mean_return == (finished[0].of("zero-shot")[0].curve[0].mean_return)
     with pytest.raises(StudyError, match="not the one that this study was planned with"):
         run_study(
-            plan, tmp_path / "study", source_policy=policy_path(finished[1], Run("source", 1))
+            plan,
+            tmp_path / "study",
+            source_policy=policy_path(finished[0].plan, finished[1], Run("source", 1)),
         )
 
 
 def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
     """A pendulum's policy is no source for an ant."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
-    policy = policy_path(finished[1], Run("source", 0))
+    policy = policy_path(finished[0].plan, finished[1], Run("source", 0))
     with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
         tiny_plan(task=ants, source_policy=policy)
 
@@ -251,10 +253,10 @@ def test_a_policy_that_was_deleted_is_made_again(
     """A source run without its policy is no finished run."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
-    (out / "runs" / "source-1" / "policy.zip").unlink()
+    (out / "runs" / "source-1" / "policy.safetensors").unlink()
     again = run_study(tiny_plan(), out, executor=Serial())
     assert curves(again) == curves(finished[0])
-    assert (out / "runs" / "source-1" / "policy.zip").exists()
+    assert (out / "runs" / "source-1" / "policy.safetensors").exists()
 
 
 @pytest.mark.parametrize("how", ["another run's", "cut short", "empty"])
@@ -321,7 +323,7 @@ def test_a_disk_that_runs_full_loses_nothing(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", full)
-        with pytest.raises(OutputError, match=r"policy\.zip: No space left"):
+        with pytest.raises(OutputError, match=r"policy\.safetensors: No space left"):
             run_study(tiny_plan(), out, executor=Serial())
     assert (out / "runs" / "scratch-0" / "run.json").exists()
     assert not (out / "runs" / "scratch-1" / "run.json").exists()

@@ -31,6 +31,7 @@ try:
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
     from shapechanger.cli.play import Play
+    from shapechanger.cli.policies import Policies
     from shapechanger.cli.robot import Robot
     from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
@@ -47,6 +48,7 @@ _Command = (
     | Annotated[Play, tyro.conf.subcommand("play")]
     | Annotated[Transfer, tyro.conf.subcommand("transfer")]
     | Annotated[Suite, tyro.conf.subcommand("suite")]
+    | Annotated[Policies, tyro.conf.subcommand("policies")]
     | Annotated[Robot, tyro.conf.subcommand("robot")]
     | Annotated[Demos, tyro.conf.subcommand("demos")]
     | Annotated[Finger, tyro.conf.subcommand("finger")]

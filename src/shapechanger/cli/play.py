@@ -27,8 +27,6 @@ class Play:
     policy: Path | None = None
     """A policy that `train` or a study has written; random actions if not given. One of another
     body acts through the body map of same names."""
-    trust: bool = False
-    """Load the policy even if its file contains something that can run code."""
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     out: Path | None = None
@@ -85,7 +83,7 @@ class Play:
 
         if is_clone(self.policy):
             return env, load_clone(self.policy).predict_many
-        policy = load_policy(self.policy, trust=self.trust)
+        policy = load_policy(self.policy)
         observation, action = layouts_of(env)
         if (observation, action) == (policy.card.observation, policy.card.action):
             return env, policy.act

@@ -33,7 +33,7 @@ class Train:
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     out: Path | None = None
-    """The file to write; results/policies/ENV.zip if not given."""
+    """The file to write; results/policies/ENV.safetensors if not given, ENV.zip for a clone."""
     steps: int | None = None
     """Env steps; the learner's own number if not given."""
     learner: str | None = None
@@ -58,7 +58,8 @@ class Train:
         settings = learner_settings(learner)
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
-        out = self.out or Path("results", "policies", f"{env.id.split('/')[-1]}.zip")
+        suffix = ".safetensors" if isinstance(settings, PpoSettings) else ".zip"
+        out = self.out or Path("results", "policies", env.id.split("/")[-1] + suffix)
         # The policy is written last; check first that it can be.
         with opened(env) as made:
             learner_of(learner, settings).require(env, env_traits(made))

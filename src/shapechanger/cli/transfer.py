@@ -63,8 +63,6 @@ class Transfer:
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
     """A given source policy, instead of training one for each seed."""
-    trust: bool = False
-    """Load the given policy even if it contains something that can run code."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
@@ -126,7 +124,6 @@ class Transfer:
                     plan,
                     out,
                     source_policy=self.source_policy,
-                    trust=self.trust,
                     executor=executor,
                     on_progress=progress,
                     command=_command(),
@@ -189,7 +186,6 @@ class Transfer:
             steps=steps,
             source_steps=self.source_steps,
             source_policy=self.source_policy,
-            trust=self.trust,
             arms=self.arms or default_arms(traits),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),

@@ -9,7 +9,7 @@ import math
 import shutil
 import time
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 
@@ -32,7 +32,6 @@ from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS, Plan, Run
 
 __all__ = [
-    "GivenPolicy",
     "RunResult",
     "adapt_source",
     "learner_of",
@@ -43,21 +42,8 @@ __all__ = [
 
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
-_POLICY: Final = "policy.zip"
 # The adapted source env of a run.
 _SOURCE: Final = "source.json"
-
-
-class GivenPolicy(NamedTuple):
-    """A source policy that a study is given instead of training its own.
-
-    Attributes:
-        path: Its file.
-        trust: Accept content that can run code.
-    """
-
-    path: Path
-    trust: bool = False
 
 
 class RunResult(msgspec.Struct, frozen=True):
@@ -101,7 +87,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
     """
     path = run.folder(study) / _RESULT
     trains = run.kind in ("source", "scratch", "fine-tune", *ADAPTED_SOURCE_ARMS)
-    if not path.exists() or (trains and not policy_path(study, run).exists()):
+    if not path.exists() or (trains and not policy_path(plan, study, run).exists()):
         return None
     remedy = f"delete {path.parent} to repeat that run"
     result = read_json(path, RunResult, remedy)
@@ -113,16 +99,14 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
     return result
 
 
-def perform_run(
-    plan: Plan, run: Run, study: str, given: GivenPolicy | None, report: ReportSteps
-) -> None:
+def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:
     """Perform a run from its start; results of an earlier attempt are deleted.
 
     Args:
         plan: Plan of the study.
         run: The run.
         study: Folder of the study.
-        given: The given source policy; None if the study trains its own.
+        given: File of the given source policy; None if the study trains its own.
         report: Called with the steps done.
 
     Raises:
@@ -152,8 +136,8 @@ def perform_run(
 
     def source_policy() -> object:
         if given is not None:
-            return learner.load(given.path, trust=given.trust)
-        return learner.load(policy_path(Path(study), Run("source", run.index)))
+            return learner.load(given)
+        return learner.load(policy_path(plan, Path(study), Run("source", run.index)))
 
     if run.kind in ("random", "zero-action"):
         on_evaluation(_evaluate_unskilled(plan, run))
@@ -181,7 +165,7 @@ def perform_run(
             on_evaluation=_ignore if run.kind in ADAPTED_SOURCE_ARMS else on_evaluation,
             on_steps=report,
         )
-        learner.save(policy, folder / _POLICY)
+        learner.save(policy, policy_path(plan, Path(study), run))
         if run.kind in ADAPTED_SOURCE_ARMS:
             on_evaluation(learner.evaluate(target, policy, plan.body_map))
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
@@ -231,11 +215,13 @@ def _ignore(evaluation: Evaluation) -> None:
     pass
 
 
-def policy_path(study: Path, run: Run) -> Path:
+def policy_path(plan: Plan, study: Path, run: Run) -> Path:
     """Return the policy file of a run.
 
     Args:
+        plan: Plan of the study.
         study: Folder of the study.
         run: The run.
     """
-    return run.folder(study) / _POLICY
+    is_ppo = isinstance(plan.settings, PpoSettings)
+    return run.folder(study) / ("policy.safetensors" if is_ppo else "policy.zip")

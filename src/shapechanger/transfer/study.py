@@ -28,7 +28,6 @@ from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.ppo import require_budget
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import (
-    GivenPolicy,
     RunResult,
     learner_of,
     load_result,
@@ -172,7 +171,6 @@ def make_plan(
     steps: int | None = None,
     source_steps: int | None = None,
     source_policy: Path | None = None,
-    trust: bool = False,
     arms: Sequence[Arm] = ARMS,
     seed: int = 0,
     rules: Mapping[str, Any] | None = None,
@@ -191,7 +189,6 @@ def make_plan(
         steps: Target steps of a run; None for the learner's default.
         source_steps: Source steps of a source policy; None for the learner's default.
         source_policy: File of a given source policy; None to train one for each seed.
-        trust: Accept content of that file that can run code.
         arms: The arms to compare.
         seed: The seed from which the seeds of all runs are drawn.
         rules: Rules of the body map for entries without a partner, as in `BodyMap.between`.
@@ -229,7 +226,7 @@ def make_plan(
     source_budget = settings.whole_updates(source_steps)
     digest = ""
     if source_policy is not None:
-        origin = learns.origin(source_policy, trust=trust)
+        origin = learns.origin(source_policy)
         if origin.env != task.source:
             raise SpaceMismatch(
                 f"The given policy was trained in {origin.env}, and the source is {task.source}: "
@@ -293,7 +290,6 @@ def run_study(
     out: Path,
     *,
     source_policy: Path | None = None,
-    trust: bool = False,
     executor: Executor | None = None,
     on_progress: OnProgress = lambda name, steps, ended: None,
     command: str = "",
@@ -308,7 +304,6 @@ def run_study(
         plan: The plan.
         out: Folder of the study; made if missing.
         source_policy: The file that `plan.source_policy` is the digest of.
-        trust: Accept content of that file that can run code.
         executor: What runs the runs; None for processes on this machine.
         on_progress: Called with the name of a run, its steps so far and whether it has ended.
         command: The command that repeats the study.
@@ -320,13 +315,12 @@ def run_study(
         ForeignStudy: If `out` holds another study, or something else.
         CorruptStudy: If a file in `out` cannot be read.
     """
-    given = None if source_policy is None else GivenPolicy(source_policy, trust)
     if (_digest(source_policy) if source_policy else "") != plan.source_policy:
         raise StudyError("The source policy is not the one that this study was planned with.")
     shift = (inspect_task(plan.task) if traits is None else traits).shift
     claim_folder(plan, out)
     jobs = [
-        Job(run.name, perform_run, (plan, run, str(out), given), after=_after(plan, run))
+        Job(run.name, perform_run, (plan, run, str(out), source_policy), after=_after(plan, run))
         for run in unfinished_runs(plan, out)
     ]
     if jobs:

@@ -36,9 +36,7 @@ _CRAWLS_MPS: Final = 0.05
 _BRAKES: Final = 0.0
 
 
-def pilot_of(
-    env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int, *, trust: bool = False
-) -> EpisodeDriver:
+def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> EpisodeDriver:
     """Return the requested driver.
 
     Args:
@@ -46,7 +44,6 @@ def pilot_of(
         driver: "expert", or a policy file.
         corrected_by: "expert" to correct the policy, or "".
         seed: Seed of the expert's errors.
-        trust: Load the policy even if its file contains something that can run code.
 
     Raises:
         DemosError: If the driver is unknown, or the env has no expert.
@@ -65,7 +62,7 @@ def pilot_of(
     from shapechanger.transfer.learners.ppo import use_one_thread
 
     use_one_thread()  # Inference on single frames is slower with more threads.
-    act = _policy(Path(driver), env, trust=trust)
+    act = _policy(Path(driver), env)
     if not corrected_by:
         return PolicyPilot(act)
     rule = GateRule()
@@ -84,7 +81,7 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
     return cast("TaskExpert", give(seed))
 
 
-def _policy(path: Path, env: gym.Env[Any, Any], *, trust: bool) -> Act:
+def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
     from shapechanger.transfer.learners.cloning import is_clone, load_clone
 
@@ -100,7 +97,7 @@ def _policy(path: Path, env: gym.Env[Any, Any], *, trust: bool) -> Act:
     from shapechanger.transfer.env_ref import layouts_of
     from shapechanger.transfer.learners.policy_file import load_policy
 
-    policy = load_policy(path, trust=trust)
+    policy = load_policy(path)
     if (policy.card.observation, policy.card.action) != layouts_of(env):
         raise DemosError(
             f"{path} was trained in {policy.card.env}, which senses or moves something else than "
@@ -173,8 +170,6 @@ class RecordDemonstrations:
     """Duration, minutes of the env's time."""
     driver: str = EXPERT
     """"expert", or the file of a policy."""
-    trust: bool = False
-    """Load the policy even if its file contains something that can run code."""
     corrected_by: str = ""
     """"expert" to let it take over where the policy would go wrong. Only what the expert does is
     learned from then."""
@@ -209,7 +204,7 @@ class RecordDemonstrations:
             hz = float(made.metadata.get("render_fps") or 20.0)
             longest = max(1, round(self.episode_s * hz))
             steps = max(1, round(self.minutes * 60.0 * hz))
-            pilot = pilot_of(made, self.driver, self.corrected_by, self.seed, trust=self.trust)
+            pilot = pilot_of(made, self.driver, self.corrected_by, self.seed)
             env = RecordEpisodes(
                 TimeLimit(made, longest), self.out, driver="program", about=self._about(made)
             )

@@ -82,12 +82,11 @@ class Learner(Protocol):
         """
         ...
 
-    def load(self, path: Path, *, trust: bool = False) -> Any:
+    def load(self, path: Path) -> Any:
         """Load a policy.
 
         Args:
             path: The file.
-            trust: Accept content that can run code.
         """
         ...
 
@@ -100,12 +99,11 @@ class Learner(Protocol):
         """
         ...
 
-    def origin(self, path: Path, *, trust: bool = False) -> PolicyOrigin:
+    def origin(self, path: Path) -> PolicyOrigin:
         """Read where a stored policy comes from.
 
         Args:
             path: The file.
-            trust: Accept content that can run code.
 
         Raises:
             StudyError: If another kind of learner trained it.

@@ -1,22 +1,21 @@
 """Trained policies in files.
 
-A file is a zip with Stable-Baselines3's own zip, the normalisation statistics, and a JSON card:
-env, learner, steps, seed, version and both layouts. Stable-Baselines3 pickles some attributes of a
-model. `load_policy` unpickles them itself and accepts only the classes that such a model consists
-of, so that loading a file cannot run code from it.
+A file holds safetensors: the weights, the normalisation statistics and the bounds of the spaces; in
+its metadata a JSON card (env, learner, settings, steps, seed, version, both layouts) and a hash of
+the tensors. Loading a file only reads numbers and JSON, so it cannot run code. Format:
+github.com/huggingface/safetensors (8 bytes of length, a JSON header, then the numbers).
 """
 
 from __future__ import annotations
 
-import base64
-import io
+import hashlib
 import json
-import pickle
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
+import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,9 @@ from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.settings import PpoSettings
 
 try:
+    import torch
+    from safetensors import SafetensorError
+    from safetensors import numpy as safetensors
     from stable_baselines3 import PPO
     from stable_baselines3.common.running_mean_std import RunningMeanStd
 except ImportError as error:
@@ -36,47 +38,22 @@ except ImportError as error:
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act
 
-__all__ = ["Normalisation", "PolicyCard", "TrainedPolicy", "load_policy", "save_policy"]
+__all__ = [
+    "Normalisation",
+    "PolicyCard",
+    "TrainedPolicy",
+    "load_policy",
+    "ppo_arguments",
+    "save_policy",
+]
 
-_CARD: Final = "card.json"
-_MODEL: Final = "model.zip"
-_STATISTICS: Final = "normalisation.npz"
-# Entries of Stable-Baselines3's zip. It reads the `.pth` ones with `weights_only=True`.
-_MODEL_ENTRIES: Final = frozenset(
-    {
-        "_stable_baselines3_version",
-        "data",
-        "policy.optimizer.pth",
-        "policy.pth",
-        "pytorch_variables.pth",
-        "system_info.txt",
-    }
-)
-_PICKLED: Final = ":serialized:"
-# Classes and functions that the pickled attributes of a PPO model with an MlpPolicy refer to.
-_KNOWN_SAFE: Final = frozenset(
-    {
-        ("collections", "deque"),
-        ("gymnasium.spaces.box", "Box"),
-        ("numpy", "dtype"),
-        ("numpy", "ndarray"),
-        ("numpy._core.multiarray", "_reconstruct"),
-        ("numpy._core.multiarray", "scalar"),
-        ("numpy._core.numeric", "_frombuffer"),
-        ("numpy.core.multiarray", "_reconstruct"),
-        ("numpy.core.multiarray", "scalar"),
-        ("numpy.core.numeric", "_frombuffer"),
-        ("numpy.random._pcg64", "PCG64"),
-        ("numpy.random._pickle", "__bit_generator_ctor"),
-        ("numpy.random._pickle", "__generator_ctor"),
-        ("numpy.random.bit_generator", "SeedSequence"),
-        ("numpy.random.bit_generator", "__pyx_unpickle_SeedSequence"),
-        ("stable_baselines3.common.buffers", "RolloutBuffer"),
-        ("stable_baselines3.common.policies", "ActorCriticPolicy"),
-        ("stable_baselines3.common.utils", "ConstantSchedule"),
-        ("stable_baselines3.common.utils", "FloatSchedule"),
-    }
-)
+_CARD: Final = "card"
+_HASH: Final = "sha256"
+_WEIGHTS: Final = "policy."
+_STATISTICS: Final = "normalisation."
+_SPACES: Final = "spaces."
+# Length of the JSON header, little-endian.
+_LENGTH_BYTES: Final = 8
 
 
 class PolicyCard(msgspec.Struct, frozen=True):
@@ -121,7 +98,8 @@ class TrainedPolicy:
     """A policy with its normalisation and card.
 
     Attributes:
-        model: Stable-Baselines3's model.
+        model: Stable-Baselines3's model. One that was loaded has the weights and settings of the
+            trained one, and a new optimiser.
         normalisation: The statistics that it was trained with; None if it is not normalised.
         card: Its provenance.
     """
@@ -163,116 +141,142 @@ def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArr
     return np.clip(scaled, -_CLIP, _CLIP).astype(np.float32)
 
 
+def ppo_arguments(settings: PpoSettings) -> dict[str, Any]:
+    """Return the arguments of Stable-Baselines3's PPO that do not depend on the network."""
+    return {
+        "n_steps": settings.n_steps,
+        "batch_size": settings.batch_size,
+        "n_epochs": settings.n_epochs,
+        "learning_rate": settings.learning_rate,
+        "gamma": settings.gamma,
+        "gae_lambda": settings.gae_lambda,
+        "clip_range": settings.clip_range,
+        "ent_coef": settings.ent_coef,
+        "device": "cpu",
+    }
+
+
 def save_policy(policy: TrainedPolicy, path: Path) -> None:
-    """Write a policy to one file.
+    """Write a policy to one file of safetensors.
 
     Args:
         policy: The policy.
-        path: The file.
+        path: The file, such as `Ant-v1.safetensors`.
 
     Raises:
         OutputError: If it cannot be written.
     """
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
-        model = io.BytesIO()
-        policy.model.save(model)
-        archive.writestr(_MODEL, model.getvalue())
-        archive.writestr(_CARD, msgspec.json.encode(policy.card))
-        if policy.normalisation is not None:
-            statistics = io.BytesIO()
-            arrays = {
-                f"{side}_{name}": getattr(getattr(policy.normalisation, side), name)
-                for side in ("observation", "reward")
-                for name in ("mean", "var", "count")
-            }
-            np.savez(statistics, **arrays)
-            archive.writestr(_STATISTICS, statistics.getvalue())
-    write_atomic(path, content.getvalue())
+    tensors: dict[str, NDArray[Any]] = {
+        _WEIGHTS + name: value.detach().cpu().numpy()
+        for name, value in policy.model.policy.state_dict().items()
+    }
+    for side in ("observation", "action"):
+        space = cast("gym.spaces.Box", getattr(policy.model, f"{side}_space"))
+        tensors |= {f"{_SPACES}{side}.low": space.low, f"{_SPACES}{side}.high": space.high}
+    if policy.normalisation is not None:
+        for side in ("observation", "reward"):
+            statistics = getattr(policy.normalisation, side)
+            for name in ("mean", "var", "count"):
+                tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
+    # Safetensors keeps the bytes of an array as they lie in memory.
+    tensors = {name: np.asarray(value, order="C") for name, value in tensors.items()}
+    card = msgspec.json.encode(policy.card).decode()
+    metadata = {_CARD: card, _HASH: _digest(tensors)}
+    write_atomic(path, safetensors.save(tensors, metadata=metadata))
 
 
-def load_policy(path: Path, *, trust: bool = False) -> TrainedPolicy:
+def load_policy(path: Path) -> TrainedPolicy:
     """Read what `save_policy` wrote.
 
     Args:
         path: The file.
-        trust: Unpickle whatever the file contains, which can run code. By default a file with
-            anything else than a model that `save_policy` writes is refused.
 
     Raises:
-        CorruptStudy: If the file is missing, is no such policy, or is refused.
+        CorruptStudy: If the file is missing, is no such policy, or has been changed.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            card = msgspec.json.decode(archive.read(_CARD), type=PolicyCard)
-            content = archive.read(_MODEL)
-            attributes = None if trust else _unpickle_safely(content)
-            model = cast("Any", PPO).load(
-                io.BytesIO(content), device="cpu", custom_objects=attributes
-            )
-            normalisation = None
-            if _STATISTICS in archive.namelist():
-                normalisation = _read_statistics(archive.read(_STATISTICS))
+        content = path.read_bytes()
+        metadata = _metadata(content)
+        card = msgspec.json.decode(metadata[_CARD], type=PolicyCard)
+        tensors = safetensors.load(content)
+        if _digest(tensors) != metadata[_HASH]:
+            raise ValueError("its numbers do not have the hash of its card")
+        return TrainedPolicy(_model(card, tensors), _read_statistics(tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
-    except _UntrustedContent as error:
+    except (
+        OSError,
+        KeyError,
+        ValueError,
+        RuntimeError,  # Weights of other shapes than the card's.
+        SafetensorError,
+        msgspec.MsgspecError,
+    ) as error:
+        reason = str(error).partition("\n")[0].rstrip(".:")
         raise CorruptStudy(
-            f"{path} contains {error}, which a policy of `shapechanger train` or a study never "
-            "does, and loading it could run code from the file: load it with --trust (trust=True) "
-            "only if you trust its author."
+            f"{path} is not a policy that `shapechanger train` or a study has written ({reason})."
         ) from error
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile, msgspec.MsgspecError) as error:
-        raise CorruptStudy(
-            f"{path} is not a policy that `shapechanger train` or a study has written ({error})."
-        ) from error
-    return TrainedPolicy(model, normalisation, card)
 
 
-class _UntrustedContent(Exception):
-    """A policy file contains something that `save_policy` does not write."""
+def _metadata(content: bytes) -> dict[str, str]:
+    """Return the metadata of safetensors."""
+    length = int.from_bytes(content[:_LENGTH_BYTES], "little")
+    if length > len(content):
+        raise ValueError("it is no file of safetensors")
+    header = json.loads(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
+    return msgspec.convert(header["__metadata__"], dict[str, str])
 
 
-class _SafeUnpickler(pickle.Unpickler):
-    """Unpickler that refers to the classes of a PPO model only."""
-
-    def find_class(self, module: str, name: str, /) -> Any:
-        if (module, name) not in _KNOWN_SAFE:
-            raise _UntrustedContent(f"a pickled reference to {module}.{name}")
-        return super().find_class(module, name)
-
-
-def _unpickle_safely(content: bytes) -> dict[str, Any]:
-    """Unpickle the pickled attributes of a model, so that Stable-Baselines3 need not.
-
-    Raises:
-        _UntrustedContent: If the zip has other entries, or a pickle refers to another class.
-    """
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        for name in archive.namelist():
-            if name not in _MODEL_ENTRIES:
-                raise _UntrustedContent(f"the entry {name!r}")
-        attributes: dict[str, Any] = json.loads(archive.read("data"))
-    unpickled: dict[str, Any] = {}
-    for name, value in attributes.items():
-        if isinstance(value, dict) and _PICKLED in value:
-            text = cast("dict[str, str]", value)[_PICKLED]
-            try:
-                unpickled[name] = _SafeUnpickler(io.BytesIO(base64.b64decode(text))).load()
-            except _UntrustedContent:
-                raise
-            except Exception as error:  # A damaged pickle can raise anything.
-                raise ValueError(f"its attribute {name!r} cannot be unpickled: {error}") from error
-    return unpickled
+def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
+    """SHA-256 over names, types, shapes and numbers."""
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        array = tensors[name]
+        digest.update(f"{name} {array.dtype} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
-def _read_statistics(content: bytes) -> Normalisation:
-    with np.load(io.BytesIO(content)) as arrays:
+def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> PPO:
+    """Build the model that the card describes, with the weights of the file."""
+    settings = card.settings
+    model: Any = PPO(
+        "MlpPolicy",
+        None,  # pyright: ignore[reportArgumentType]  # Its spaces follow.
+        policy_kwargs={
+            "net_arch": list(settings.net_arch),
+            "log_std_init": settings.log_std_init,
+        },
+        _init_setup_model=False,
+        **ppo_arguments(settings),
+    )
+    for side, layout in (("observation", card.observation), ("action", card.action)):
+        low, high = (tensors[f"{_SPACES}{side}.{end}"] for end in ("low", "high"))
+        if low.shape != (layout.size,):
+            raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
+        setattr(model, f"{side}_space", gym.spaces.Box(low, high, dtype=low.dtype.type))
+    model.n_envs = settings.n_envs
+    model._setup_model()
+    weights = {
+        name.removeprefix(_WEIGHTS): torch.from_numpy(value.copy())  # pyright: ignore[reportUnknownMemberType]
+        for name, value in tensors.items()
+        if name.startswith(_WEIGHTS)
+    }
+    model.policy.load_state_dict(weights)
+    model.num_timesteps = card.steps
+    return model
 
-        def statistics(side: str) -> RunningMeanStd:
-            result = RunningMeanStd(shape=arrays[f"{side}_mean"].shape)
-            result.mean = arrays[f"{side}_mean"]
-            result.var = arrays[f"{side}_var"]
-            result.count = float(arrays[f"{side}_count"])
-            return result
 
-        return Normalisation(statistics("observation"), statistics("reward"))
+def _read_statistics(tensors: Mapping[str, NDArray[Any]]) -> Normalisation | None:
+    if f"{_STATISTICS}observation.mean" not in tensors:
+        return None
+
+    def statistics(side: str) -> RunningMeanStd:
+        mean, var, count = (
+            tensors[f"{_STATISTICS}{side}.{name}"] for name in ("mean", "var", "count")
+        )
+        result = RunningMeanStd(shape=mean.shape)
+        result.mean, result.var, result.count = mean, var, float(count)
+        return result
+
+    return Normalisation(statistics("observation"), statistics("reward"))

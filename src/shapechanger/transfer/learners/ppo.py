@@ -24,6 +24,7 @@ from shapechanger.transfer.learners.policy_file import (
     TrainedPolicy,
     actor,
     load_policy,
+    ppo_arguments,
     save_policy,
 )
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
@@ -120,15 +121,15 @@ class PpoLearner:
             for one in envs:
                 one.close()
 
-    def load(self, path: Path, *, trust: bool = False) -> TrainedPolicy:
+    def load(self, path: Path) -> TrainedPolicy:
         """Load a policy."""
-        return load_policy(path, trust=trust)
+        return load_policy(path)
 
     def save(self, policy: TrainedPolicy, path: Path) -> None:
         """Write a policy to a file."""
         save_policy(policy, path)
 
-    def origin(self, path: Path, *, trust: bool = False) -> PolicyOrigin:
+    def origin(self, path: Path) -> PolicyOrigin:
         """Read where a policy comes from.
 
         Raises:
@@ -141,7 +142,7 @@ class PpoLearner:
                 f"{path} is a clone, and {self._name} does not learn from pictures: give "
                 f"--learner cloning or sac, or a policy trained with {self._name}."
             )
-        card = load_policy(path, trust=trust).card
+        card = load_policy(path).card
         return PolicyOrigin(card.env, card.steps)
 
 
@@ -351,22 +352,6 @@ def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
     return DummyVecEnv([env.make for _ in range(num_envs)])
 
 
-def _arguments(settings: PpoSettings, tensorboard: Path | None) -> dict[str, Any]:
-    """Return the arguments of PPO that do not depend on the shape of the network."""
-    return {
-        "n_steps": settings.n_steps,
-        "batch_size": settings.batch_size,
-        "n_epochs": settings.n_epochs,
-        "learning_rate": settings.learning_rate,
-        "gamma": settings.gamma,
-        "gae_lambda": settings.gae_lambda,
-        "clip_range": settings.clip_range,
-        "ent_coef": settings.ent_coef,
-        "device": "cpu",
-        "tensorboard_log": str(tensorboard) if tensorboard else None,
-    }
-
-
 def _fresh_model(envs: VecEnv, settings: PpoSettings, seed: int, tensorboard: Path | None) -> PPO:
     return PPO(
         "MlpPolicy",
@@ -376,7 +361,8 @@ def _fresh_model(envs: VecEnv, settings: PpoSettings, seed: int, tensorboard: Pa
             "net_arch": list(settings.net_arch),
             "log_std_init": settings.log_std_init,
         },
-        **_arguments(settings, tensorboard),
+        tensorboard_log=str(tensorboard) if tensorboard else None,
+        **ppo_arguments(settings),
     )
 
 
@@ -399,7 +385,8 @@ def _transplanted_model(
         envs,
         normalisation=None if statistics is None else statistics.observation,
         seed=seed,
-        **_arguments(settings, tensorboard),
+        tensorboard_log=str(tensorboard) if tensorboard else None,
+        **ppo_arguments(settings),
     )
 
 

@@ -113,23 +113,22 @@ class CameraLearner:
         del body_map
         return evaluate_clone(env, policy, self._settings)
 
-    def load(self, path: Path, *, trust: bool = False) -> CameraPolicy:
-        """Load a clone, which never contains code."""
-        del trust
+    def load(self, path: Path) -> CameraPolicy:
+        """Load a clone."""
         return load_clone(path)
 
     def save(self, policy: CameraPolicy, path: Path) -> None:
         """Write a clone to a file."""
         policy.save(path)
 
-    def origin(self, path: Path, *, trust: bool = False) -> PolicyOrigin:
+    def origin(self, path: Path) -> PolicyOrigin:
         """Read where a clone comes from.
 
         Raises:
             StudyError: If the policy is no clone, or sees other pictures.
         """
         if not is_clone(path):
-            card = load_policy(path, trust=trust).card
+            card = load_policy(path).card
             raise StudyError(
                 f"{path} was trained with {card.learner}, and {self._name} starts from "
                 f"demonstrations: give --learner {card.learner}, or a clone."

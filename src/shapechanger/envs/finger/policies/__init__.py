@@ -12,6 +12,6 @@ __all__ = ["POLICIES"]
 _FOLDER: Final = Path(__file__).parent
 
 POLICIES: Final[Mapping[str, Path]] = MappingProxyType(
-    {task: _FOLDER / f"{task}.zip" for task in ("reach", "track")}
+    {task: _FOLDER / f"{task}.safetensors" for task in ("reach", "track")}
 )
 """File of the policy by what it does: "reach" for `Finger-v1`, "track" for `FingerTrack-v1`."""

@@ -1,0 +1,173 @@
+"""`shapechanger policies`: show a policy's card, and convert a policy of Stable-Baselines3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import msgspec
+import tyro
+
+from shapechanger.cli.console import plain_console
+from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.errors import CorruptStudy, StudyError
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.learners.settings import PpoSettings
+
+__all__ = ["Policies"]
+
+
+@dataclass(frozen=True)
+class Show:
+    """Print where a policy comes from, and what it senses and does."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy, such as results/policies/Ant-v1.safetensors."""
+
+    def run(self) -> None:
+        """Print the card."""
+        from shapechanger.transfer.learners.policy_file import load_policy
+
+        policy = load_policy(self.file)
+        card, console = policy.card, plain_console()
+        lines = {
+            "env": str(card.env),
+            "learner": card.learner,
+            "steps": f"{card.steps:,}",
+            "seed": str(card.seed),
+            "version": card.version,
+            "normalised": "no" if policy.normalisation is None else "yes",
+            "observation": ", ".join(card.observation.names),
+            "action": ", ".join(card.action.names),
+        }
+        for name, text in lines.items():
+            console.print(f"{name:12} {text}", soft_wrap=True)
+        for name, value in msgspec.structs.asdict(card.settings).items():
+            console.print(f"  {name:16} {value}", soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class Convert:
+    """Convert a zip of Stable-Baselines3's PPO; loading it can run code from it."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A zip that PPO.save wrote."""
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    """Id of the env that it was trained in; its layouts must fit the policy's spaces."""
+    out: Path
+    """The file to write, such as mine.safetensors."""
+    body: str = ""
+    """Body that it was trained in: its name, or edits as JSON."""
+    trust: bool = False
+    """Needed, because the zip holds pickled objects: give it only if you trust its author."""
+
+    def run(self) -> None:
+        """Convert the policy.
+
+        Raises:
+            StudyError: If it is not trusted, or its network is of another kind.
+            CorruptStudy: If the file is no such zip.
+        """
+        import shapechanger
+        from shapechanger.transfer.body_map.envs import check_size
+        from shapechanger.transfer.env_ref import layouts_of
+        from shapechanger.transfer.learners.policy_file import (
+            PolicyCard,
+            TrainedPolicy,
+            save_policy,
+        )
+        from shapechanger.transfer.transplant.model import check_supported
+
+        if not self.trust:
+            raise StudyError(
+                f"{self.file} may run code when it is loaded, because Stable-Baselines3 pickles: "
+                "give --trust if you trust its author."
+            )
+        model = _load_zip(self.file)
+        check_supported(model)
+        env = env_ref(self.env, self.body)
+        with opened(env) as made:
+            observation, action = layouts_of(made)
+        check_size("observation of the policy", model.observation_space, observation)
+        check_size("action of the policy", model.action_space, action)
+        card = PolicyCard(
+            env,
+            observation,
+            action,
+            "converted",
+            _settings(model),
+            int(model.num_timesteps),
+            int(model.seed or 0),
+            shapechanger.__version__,
+        )
+        save_policy(TrainedPolicy(model, None, card), self.out)
+        plain_console().print(f"wrote {self.out}", soft_wrap=True)
+
+
+def _load_zip(path: Path) -> Any:
+    """Load a model with Stable-Baselines3.
+
+    Raises:
+        CorruptStudy: If it cannot be loaded.
+    """
+    from stable_baselines3 import PPO
+
+    try:
+        return cast("Any", PPO).load(path, device="cpu")
+    except FileNotFoundError:
+        raise CorruptStudy(f"There is no policy file {path}.") from None
+    except Exception as error:  # A damaged pickle can raise anything.
+        raise CorruptStudy(f"{path} is no zip of Stable-Baselines3's PPO ({error}).") from error
+
+
+def _settings(model: Any) -> PpoSettings:
+    """The settings of a model.
+
+    Raises:
+        StudyError: If its two networks differ, or have another activation than tanh.
+    """
+    from torch import nn
+
+    from shapechanger.transfer.learners.settings import PpoSettings
+
+    widths = model.policy.net_arch
+    of_each: Any = widths if "pi" in widths else {"pi": widths, "vf": widths}
+    actor: list[int] = list(of_each["pi"])
+    critic: list[int] = list(of_each["vf"])
+    if actor != critic or model.policy.activation_fn is not nn.Tanh:
+        raise StudyError(
+            f"The actor has layers {actor} and the critic {critic}, with "
+            f"{model.policy.activation_fn.__name__}: both must be the same, with Tanh."
+        )
+    update = model.n_envs * model.n_steps
+    return PpoSettings(
+        n_envs=model.n_envs,
+        n_steps=model.n_steps,
+        batch_size=model.batch_size,
+        n_epochs=model.n_epochs,
+        learning_rate=float(model.lr_schedule(1.0)),
+        gamma=model.gamma,
+        gae_lambda=model.gae_lambda,
+        clip_range=float(model.clip_range(1.0)),
+        ent_coef=model.ent_coef,
+        net_arch=tuple(actor),
+        steps=max(int(model.num_timesteps), update),
+        eval_every=update,
+        eval_episodes=5,
+    )
+
+
+@dataclass(frozen=True)
+class Policies:
+    """Inspect and convert policies."""
+
+    command: (
+        Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[Convert, tyro.conf.subcommand("convert")]
+    )
+
+    def run(self) -> None:
+        """Run the subcommand."""
+        self.command.run()

@@ -1,0 +1,80 @@
+"""`shapechanger policies`: cards, and policies that Stable-Baselines3 has written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+from torch import nn
+
+from shapechanger.cli import main
+from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.transfer.learners.policy_file import load_policy
+
+
+def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments: object) -> PPO:
+    model = PPO("MlpPolicy", gym.make(env), n_steps=32, batch_size=32, seed=3, **arguments)
+    model.save(path)
+    return model
+
+
+def test_a_card_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    """Where it learned, and what it senses."""
+    main(["policies", "show", str(POLICIES["reach"])])
+    said = capsys.readouterr().out
+    assert "shapechanger/Finger-v1" in said
+    assert "307,200" in said
+    assert "PIP_flexion" in said or "angle" in said
+
+
+def test_a_zip_of_stable_baselines3_is_converted(tmp_path: Path) -> None:
+    """The same actions, from a file that cannot run code."""
+    model = _zip(tmp_path / "mine.zip", policy_kwargs={"net_arch": [8, 8]})
+    out = tmp_path / "mine.safetensors"
+    convert = ["policies", "convert", str(tmp_path / "mine.zip"), "InvertedPendulum"]
+    main([*convert, "--out", str(out), "--trust"])
+    policy = load_policy(out)
+    seen = np.random.default_rng(0).normal(size=(20, 4))
+    np.testing.assert_array_equal(policy.act(seen), model.predict(seen, deterministic=True)[0])
+    assert policy.card.env.id == "shapechanger/InvertedPendulum-v1"
+    assert policy.card.settings.net_arch == (8, 8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "env", "trust", "words"),
+    [
+        ({}, "InvertedPendulum", False, "give --trust if you trust its author"),
+        ({}, "Ant", True, "observation of the policy"),
+        ({"policy_kwargs": {"activation_fn": nn.ReLU}}, "InvertedPendulum", True, "with Tanh"),
+        (
+            {"policy_kwargs": {"net_arch": {"pi": [8], "vf": [9]}}},
+            "InvertedPendulum",
+            True,
+            "both must be the same",
+        ),
+        (None, "InvertedPendulum", True, "There is no policy file"),
+    ],
+)
+def test_what_cannot_be_converted_gets_one_sentence(
+    arguments: dict[str, object] | None,
+    env: str,
+    trust: bool,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """And nothing is written."""
+    if arguments is not None:
+        _zip(tmp_path / "mine.zip", **arguments)
+    out = tmp_path / "mine.safetensors"
+    convert = ["policies", "convert", str(tmp_path / "mine.zip"), env, "--out", str(out)]
+    with pytest.raises(SystemExit) as stop:
+        main([*convert, *(["--trust"] if trust else [])])
+    message = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert words in message
+    assert message.count("\n") == 1
+    assert not out.exists()
