@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from gpiozero import PinInvalidState, PinSetInput
 from gpiozero.pins.pi import PiFactory, PiPin
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
-from shapechanger.twin.messages import ClaimPin, DrivePin
-
-if TYPE_CHECKING:
-    from shapechanger.twin.hardware import BoardPins
+from shapechanger.twin.messages import BoardPins, ClaimPin, DrivePin
 
 __all__ = ["TwinPin", "TwinPinFactory"]
 

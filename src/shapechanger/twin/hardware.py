@@ -3,62 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
-from shapechanger.twin.messages import ClaimPin, PinRequest, PulsePin, ReadChip, WriteChip
+from shapechanger.twin.messages import (
+    BoardPins,
+    ClaimPin,
+    PulsePin,
+    ReadChip,
+    WriteChip,
+)
 
 if TYPE_CHECKING:  # The SDK of the servos is an extra of its own.
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
     from shapechanger.twin.servos.port import ServoPort
 
-__all__ = ["BoardPins", "TwinBus", "TwinHardware", "TwinServoPins", "connect"]
+__all__ = ["TwinBus", "TwinHardware", "TwinServoPins", "connect"]
 
 _POLL_NS: Final = 2_000_000
 """A servo bus that was asked less than this ago has nothing new; asking costs a busy board time."""
-
-
-class BoardPins(Protocol):
-    """Pins and chips of a board: in this process, or over the socket of another.
-
-    Attributes:
-        levels: Level of each pin that is claimed as an input.
-        on_edge: Called with pin, level and time of each edge.
-    """
-
-    levels: dict[int, int]
-    on_edge: Callable[[int, int, int], None] | None
-
-    @property
-    def closed(self) -> bool:
-        """True if `close` was called."""
-        ...
-
-    def post(self, request: PinRequest) -> None:
-        """Send a request that has no result."""
-        ...
-
-    def ask(self, request: PinRequest, kind: Any = None) -> Any:
-        """Send a request and return its result.
-
-        Args:
-            request: The request.
-            kind: Type of the result.
-
-        Raises:
-            RobotError: If the board refuses it.
-            OSError: If no chip answers.
-        """
-        ...
-
-    def drain(self) -> None:
-        """Receive everything that has arrived, without waiting."""
-        ...
-
-    def close(self) -> None:
-        """Let go of everything."""
-        ...
 
 
 class TwinBus:

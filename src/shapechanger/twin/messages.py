@@ -9,7 +9,7 @@ operator are answered after every request that a robot's process sent before the
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import msgspec
 
@@ -18,6 +18,7 @@ __all__ = [
     "MAX_MESSAGE",
     "BoardEvent",
     "BoardGreeting",
+    "BoardPins",
     "BoardReply",
     "BreakCamera",
     "BreakChip",
@@ -342,3 +343,45 @@ BoardEvent = BoardReply | InputEdges | GrantTime
 encode = msgspec.msgpack.encode
 decode_request: Callable[[bytes], Request] = msgspec.msgpack.Decoder(Request).decode
 decode_event: Callable[[bytes], BoardEvent] = msgspec.msgpack.Decoder(BoardEvent).decode
+
+
+class BoardPins(Protocol):
+    """Pins and chips of a board: in this process, or over the socket of another.
+
+    Attributes:
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called with pin, level and time of each edge.
+    """
+
+    levels: dict[int, int]
+    on_edge: Callable[[int, int, int], None] | None
+
+    @property
+    def closed(self) -> bool:
+        """True if `close` was called."""
+        ...
+
+    def post(self, request: PinRequest) -> None:
+        """Send a request that has no result."""
+        ...
+
+    def ask(self, request: PinRequest, kind: Any = None) -> Any:
+        """Send a request and return its result.
+
+        Args:
+            request: The request.
+            kind: Type of the result.
+
+        Raises:
+            RobotError: If the board refuses it.
+            OSError: If no chip answers.
+        """
+        ...
+
+    def drain(self) -> None:
+        """Receive everything that has arrived, without waiting."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything."""
+        ...

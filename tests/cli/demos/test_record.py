@@ -75,7 +75,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
         (["Car", "--options", "[1]"], "a JSON object"),
         (["Car", "--options", '{"colour": 3}'], "colour"),
         (["Car", "--seed", "-1"], "A seed is"),
-        (["Ant", "--put-back"], "is no vehicle"),
+        (["Ant", "--put-back"], "are for vehicles"),
     ],
 )
 def test_what_cannot_be_recorded_is_one_sentence(

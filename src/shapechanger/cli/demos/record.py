@@ -20,8 +20,6 @@ from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
 
 if TYPE_CHECKING:
-    import gymnasium as gym
-
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
     from shapechanger.demos.recording import RecordEpisodes
@@ -233,7 +231,7 @@ class RecordDemonstrations:
                 more["put_back"] = True
         elif self.lenses or self.put_back:
             raise DemosError(
-                f"{ref.id} is no vehicle that could be put back or has a lens; these are: "
+                f"--put-back and --lens are for vehicles, and {ref.id} is not one of them: "
                 f"{', '.join(VEHICLE_ENVS)}."
             )
         return EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})

@@ -21,7 +21,7 @@ from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
-    from shapechanger.demos.episodes import Episode, Step
+    from shapechanger.demos.episodes import Step
     from shapechanger.demos.recording import Seen
     from shapechanger.link.messages import Welcome
     from shapechanger.remote.client import RobotClient
@@ -144,8 +144,6 @@ class _Apart:
 
     def look(self, episode: Episode, step: Step, seen: Seen, *, states: bool) -> None:
         """Compare the observation before a step with the recorded one."""
-        from shapechanger.demos.dataset import decode_picture
-
         if states:
             self._states.append(np.abs(np.array(seen.state) - np.array(step.state)))
         jpeg = episode.jpeg(step)
@@ -250,9 +248,9 @@ def play_on_robot(episode: Episode, name: str) -> None:
     ):
         _require_fit(episode, robot.welcome)
         console.print(
-            f"{episode.seconds:.1f} s of {episode.path.name}, blindly: nobody looks where "
-            f"{robot.welcome.robot} drives. It begins where it stands now.\n"
-            "E arms it and begins · any other key leaves; while it plays, any key stops it.",
+            f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
+            f"{robot.welcome.robot} starts from where it stands now.\n"
+            "E arms it and starts · any other key cancels; during the replay, any key stops it.",
             soft_wrap=True,
         )
         if not _agreed(robot, terminal):

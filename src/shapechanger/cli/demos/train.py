@@ -18,7 +18,6 @@ from shapechanger.cli.env_arguments import require_seed
 from shapechanger.errors import OutputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
     from rich.console import Console
 

@@ -404,7 +404,7 @@ class Calibration:
 def _number(value: object) -> float:
     if isinstance(value, int | float):
         return float(value)
-    raise RobotError(f"{value!r} is no number.")
+    raise RobotError(f"Expected a number, got {value!r}.")
 
 
 def ask_for_wheels_up() -> None:

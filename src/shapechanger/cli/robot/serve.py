@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 import tyro
@@ -35,10 +35,6 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.start import BoardAt, RunningBoard, start_board
 from shapechanger.twin.world.place import Place
 from shapechanger.worlds.course import HOME, require_element
-
-if TYPE_CHECKING:
-    from shapechanger.robot.profile.profile import Profile
-    from shapechanger.twin.start import BoardAt
 
 __all__ = [
     "Serve",
@@ -110,7 +106,6 @@ class Serve:
         """Become the robot's supervisor; return only on an error."""
         from shapechanger.cli.robot.safe_pins import require_pins
         from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
-        from shapechanger.robot.profile.load import find_profile, load_profile
 
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
@@ -151,7 +146,6 @@ class Serve:
         """
         from shapechanger.link.address import Address
         from shapechanger.link.authentication import fingerprint_hex
-        from shapechanger.remote.known_robots import KnownRobot
 
         # With any free port, or without TLS, the address is passed on by the caller.
         if not self.port or self.insecure or not can_be_known(name):
@@ -176,11 +170,11 @@ class Serve:
         }
         for option, given in asked.items():
             if given and not self.twin:
-                raise RobotError(f"{option} means something with --twin only.")
+                raise RobotError(f"{option} needs --twin.")
         if self.finger_seed is not None and not self.gap:
-            raise RobotError("--finger-seed says which finger of a --gap it is: give that, too.")
+            raise RobotError("--finger-seed selects a finger of a --gap: give --gap, too.")
         if self.gap and self.world:
-            raise RobotError("A finger of a --gap is in no --world: give one of them.")
+            raise RobotError("A finger of a --gap has no --world: give only one of them.")
         if not 0 <= self.port <= _LAST_PORT:
             raise RobotError(
                 f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}."
@@ -228,7 +222,7 @@ def _require_free(host: str, port: int) -> None:
             listener.listen(1)
     except OSError as error:
         raise RobotError(
-            f"{host} port {port} cannot be listened at: {error.strerror or error}. "
+            f"Cannot listen at {host} port {port}: {error.strerror or error}. "
             "Does the robot run already?"
         ) from error
 

@@ -88,7 +88,7 @@ class Lock(Edit, frozen=True):
     position: float | None = None
 
     def check(self) -> None:
-        """Refuse a position that is no number."""
+        """Refuse a position that is not a finite number."""
         if self.position is not None and not math.isfinite(self.position):
             raise MorphologyError(f"A joint cannot be locked at {self.position}.")
 

@@ -236,7 +236,7 @@ class AddLimb(Edit, frozen=True):
     size: float = 1.0
 
     def check(self) -> None:
-        """Refuse an absurd size, no suffix, or an angle that is no number."""
+        """Refuse an absurd size, an empty suffix, or an angle that is not a finite number."""
         require_factor("The size of a limb", self.size)
         if not self.suffix or not math.isfinite(self.angle):
             raise MorphologyError(f"A copied limb needs a suffix and a finite angle, got {self}.")

@@ -295,7 +295,7 @@ class StartHeight(Edit, frozen=True):
     to: float
 
     def check(self) -> None:
-        """Refuse a height that is no number."""
+        """Refuse a height that is not a finite number."""
         if not abs(self.to) <= _LARGEST_HEIGHT_M:  # Also refuses NaN.
             raise MorphologyError(
                 f"A start height is at most {_LARGEST_HEIGHT_M:g} m, got {self.to}."
