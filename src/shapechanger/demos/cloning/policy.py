@@ -171,9 +171,15 @@ class CameraPolicy:
         Returns:
             Shape (n, classes), each row with sum 1; or shape (n, m).
         """
+        out = self.logits(pictures, states)
+        return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
+
+    def logits(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> Tensor:
+        """Return the outputs of the last layer, shape (n, outputs); see `outputs`."""
         with torch.inference_mode():
-            out = self.network.hands(self._perceived(pictures, states))
-            return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
+            return self.network.hands(self._perceived(pictures, states))
 
     def features(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
