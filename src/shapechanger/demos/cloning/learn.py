@@ -438,7 +438,7 @@ def _begin_with_mean(network: CameraNetwork, wanted: NDArray[np.float32]) -> Non
 def _normalise(network: CameraNetwork, states: NDArray[np.float32]) -> None:
     """Initialise the normalisation of states to the mean and spread of their finite values."""
     known = np.where(np.isfinite(states), states, np.nan)
-    there: NDArray[np.bool_] = np.isfinite(known).any(axis=0)
+    there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
     middle, spread = np.zeros(known.shape[1]), np.ones(known.shape[1])
     middle[there] = np.nanmean(known[:, there], axis=0)
     found = np.nanstd(known[:, there], axis=0)
