@@ -1,7 +1,7 @@
 """Behaviour cloning: driving policies learned from pictures, states and the actions of a driver.
 
 ```
-train.clone          learn steering and throttle from arrays of pictures
+learn.clone          learn steering and throttle from arrays of pictures
 learn.learn          learn any actions from any demonstrations (`shapechanger demos train`)
 policy.CameraPolicy  predict, save and load
 judge.judge          compare a policy with a driver on held-out steps

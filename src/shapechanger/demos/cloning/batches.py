@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -14,21 +15,13 @@ from torch.nn import functional
 from shapechanger.demos.cloning.demonstrations import Examples
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
 
-__all__ = ["Batch", "Batches", "augmented", "plain"]
+__all__: list[str] = []
 
 _BRIGHTEST: Final = 255.0
 
 
 def plain(pictures: Tensor, index: Tensor) -> Tensor:
-    """Return pictures without augmentation.
-
-    Args:
-        pictures: uint8, shape (n, height, width, 3).
-        index: Indices of the pictures, shape (batch,).
-
-    Returns:
-        In [0, 1], shape (batch, 3, height, width).
-    """
+    """Return pictures without augmentation; arguments and shape are those of `augmented`."""
     return pictures[index].permute(0, 3, 1, 2).float() / _BRIGHTEST
 
 
@@ -87,21 +80,19 @@ def _factors(shape: tuple[int, ...], largest: float, generator: torch.Generator)
 
 def _blur(seen: Tensor, share: float, generator: torch.Generator) -> None:
     """Blur the first few pictures; a batch is in random order."""
-    count = _first_few(len(seen), share, generator)
-    if count:
+    if count := _few(len(seen), share, generator):
         seen[:count] = functional.avg_pool2d(seen[:count], 3, 1, 1, count_include_pad=False)
 
 
 def _sprinkle(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
     """Add noise as of a camera in the dark to the last few pictures; some are blurred and noisy."""
-    count = _first_few(len(seen), augmentation.noisy, generator)
-    if count:
+    if count := _few(len(seen), augmentation.noisy, generator):
         strength = augmentation.noise * torch.rand((count, 1, 1, 1), generator=generator)
         last = seen[-count:]
         last.add_(strength * torch.randn(last.shape, generator=generator))
 
 
-def _first_few(n: int, share: float, generator: torch.Generator) -> int:
+def _few(n: int, share: float, generator: torch.Generator) -> int:
     """Return a number of pictures that is right on average even for small batches."""
     return math.floor(n * share + float(torch.rand((), generator=generator)) * (share > 0.0))
 
@@ -154,29 +145,18 @@ class Batches:
     def draw(self) -> Batch:
         """Return the next batch."""
         parts = [source.draw(self._settings, self._generator) for source in self._sources]
-        if len(parts) == 1:
-            return parts[0]
-        return Batch(
-            _joined([part.pictures for part in parts]),
-            _joined([part.states for part in parts]),
-            torch.cat([part.targets for part in parts]),
-        )
+        pictures, states, targets = (_joined(few) for few in zip(*parts, strict=True))
+        return Batch(pictures, states, cast("Tensor", targets))
 
 
 class _Source:
     """Examples in an order that is shuffled again whenever it ends."""
 
     def __init__(self, shown: Examples, index: NDArray[np.intp], at_a_time: int) -> None:
-        # PyTorch does not accept read-only arrays, such as memory-mapped files.
-        self.pictures = (
-            None
-            if shown.pictures is None
-            else torch.as_tensor(np.require(shown.pictures, requirements=["C", "W"]))
-        )
-        self.states = _tensor(shown.states)
-        self.turned_states = _tensor(shown.turned_states)
-        self.targets = torch.as_tensor(shown.targets)
-        self.turned_targets = torch.as_tensor(shown.turned_targets)
+        self._pictures, self._states = _tensor(shown.pictures), _tensor(shown.states)
+        self._turned_states = _tensor(shown.turned_states)
+        self._targets = torch.as_tensor(shown.targets)
+        self._turned_targets = torch.as_tensor(shown.turned_targets)
         self.size = len(index)
         self._index = torch.as_tensor(index)
         self._at_a_time = at_a_time
@@ -185,25 +165,22 @@ class _Source:
     def draw(self, settings: CloneSettings, generator: torch.Generator) -> Batch:
         """Return the next examples, augmented."""
         few = self._next(generator)
-        if self.pictures is None:
+        if self._pictures is None:
             share = settings.augmentation.mirror
             seen, turned = None, torch.rand(len(few), generator=generator) < share
         else:
-            seen, turned = augmented(self.pictures, few, settings.augmentation, generator)
-        targets = _either(turned, self.turned_targets[few], self.targets[few])
+            seen, turned = augmented(self._pictures, few, settings.augmentation, generator)
         states = None
-        if self.states is not None:
-            mirrored = self.states if self.turned_states is None else self.turned_states
-            states = _either(turned, mirrored[few], self.states[few])
-        return Batch(seen, states, targets)
+        if self._states is not None and self._turned_states is not None:
+            states = _either(turned, self._turned_states[few], self._states[few])
+        return Batch(seen, states, _either(turned, self._turned_targets[few], self._targets[few]))
 
     def _next(self, generator: torch.Generator) -> Tensor:
         """Return the next indices; with too few examples, some repeat within a batch."""
         while len(self._waiting) < self._at_a_time:
             order = torch.randperm(self.size, generator=generator)
             self._waiting = torch.cat((self._waiting, self._index[order]))
-        few = self._waiting[: self._at_a_time]
-        self._waiting = self._waiting[self._at_a_time :]
+        few, self._waiting = self._waiting.tensor_split([self._at_a_time])
         return few
 
 
@@ -212,10 +189,11 @@ def _either(turned: Tensor, mirrored: Tensor, plain: Tensor) -> Tensor:
     return torch.where(turned if plain.ndim == 1 else turned[:, None], mirrored, plain)
 
 
-def _joined(parts: list[Tensor | None]) -> Tensor | None:
+def _joined(parts: Sequence[Tensor | None]) -> Tensor | None:
     there = [part for part in parts if part is not None]
-    return torch.cat(there) if there else None
+    return torch.cat(there) if len(there) > 1 else there[0] if there else None
 
 
-def _tensor(values: NDArray[np.float32] | None) -> Tensor | None:
-    return None if values is None else torch.as_tensor(values)
+def _tensor(values: NDArray[Any] | None) -> Tensor | None:
+    # PyTorch does not accept read-only arrays, such as memory-mapped files.
+    return None if values is None else torch.as_tensor(np.require(values, requirements=["C", "W"]))

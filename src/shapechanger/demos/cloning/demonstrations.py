@@ -14,17 +14,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.layout import Layout
 
-__all__ = [
-    "STEERING",
-    "Examples",
-    "Mirror",
-    "SplitBy",
-    "held_out",
-    "judged_steps",
-    "mirror_of",
-    "steering_examples",
-    "stretch",
-]
+__all__ = ["SplitBy", "judged_steps"]
 
 # Parts of names, between slashes. In the mirror image, the first change their sign and the second
 # do not. Positive yaw is to the left, and y points to the left.
@@ -35,6 +25,10 @@ _KEPT: Final = frozenset(
 )
 _SIDES: Final = {"left": "right", "right": "left"}
 _SIDE: Final = re.compile(r"(?<![a-z])(left|right)(?![a-z])")
+_ROUNDING: Final = 1e-5  # Of actions in single precision.
+
+SplitBy = Literal["time", "episode"]
+"""Hold out the end of the recording by time, or whole episodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +69,7 @@ def mirror_of(layout: Layout) -> Mirror:
     Raises:
         CloningError: If the mirror image of a value is unknown; the message is part of a sentence.
     """
-    order: list[int] = []
-    signs: list[float] = []
-    rightward: list[float] = []
+    values: list[tuple[int, float, float]] = []
     names = layout.names
     for place, feature in enumerate(layout):
         parts = set(feature.name.split("/"))
@@ -85,23 +77,15 @@ def mirror_of(layout: Layout) -> Mirror:
         if feature.shape:
             raise CloningError(f"the mirror image of the array {feature.name} is unknown")
         if other != feature.name and other in names:
-            order.append(names.index(other))
-            signs.append(1.0)
-            rightward.append(1.0 if _SIDE.findall(feature.name) == ["right"] else -1.0)
+            rightward = 1.0 if _SIDE.findall(feature.name) == ["right"] else -1.0
+            values.append((names.index(other), 1.0, rightward))
         elif parts & _NEGATED and feature.low == -feature.high:
-            order.append(place)
-            signs.append(-1.0)
-            rightward.append(1.0)
+            values.append((place, -1.0, 1.0))
         elif parts & _KEPT:
-            order.append(place)
-            signs.append(1.0)
-            rightward.append(0.0)
+            values.append((place, 1.0, 0.0))
         else:
             raise CloningError(f"the mirror image of {feature.name} is unknown")
-    return Mirror(tuple(order), tuple(signs), tuple(rightward))
-
-
-_ROUNDING: Final = 1e-5  # Of actions in single precision.
+    return Mirror(*zip(*values, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +112,9 @@ class Examples:
 
     def part(self, which: NDArray[np.bool_]) -> Examples:
         """Return the examples selected by a mask of shape (n,)."""
+        arrays = {name: getattr(self, name) for name in self.__slots__}
         return replace(
-            self,
-            pictures=None if self.pictures is None else self.pictures[which],
-            states=None if self.states is None else self.states[which],
-            targets=self.targets[which],
-            turned_states=None if self.turned_states is None else self.turned_states[which],
-            turned_targets=self.turned_targets[which],
+            self, **{n: array[which] for n, array in arrays.items() if array is not None}
         )
 
 
@@ -198,10 +178,6 @@ def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]
         end += length
         mask[end - math.floor(share * length) : end] = True
     return mask
-
-
-SplitBy = Literal["time", "episode"]
-"""Hold out the end of the recording by time, or whole episodes."""
 
 
 def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:

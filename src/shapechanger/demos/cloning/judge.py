@@ -17,21 +17,19 @@ from shapechanger.layout import Layout
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-__all__ = [
-    "MOST_CLASSES",
-    "TOLERANCE",
-    "AskedHead",
-    "Bin",
-    "Goal",
-    "Judgement",
-    "class_numbers",
-    "goal_of",
-    "in_thirds",
-    "judge",
-    "macro_f1",
-    "named",
-]
+__all__ = ["Bin", "Judgement", "class_numbers", "goal_of", "judge", "macro_f1", "named"]
 
+AskedHead = Literal["auto", "class", "regression"]
+"""Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
+
+_MOST_CLASSES: Final = 16  # More different actions are continuous.
+_MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
+_ROUNDING: Final = 1e-4  # Of actions in single precision.
+# Maximum error of a value within the tolerance, as a share of half its range.
+_TOLERANCE: Final = 0.1
+_BINS: Final = 10
+_WORST: Final = 12
+_MAX_POINTS: Final = 2000  # Enough for a chart.
 _WORDS: Final = {
     "steering": ("left", "straight", "right"),
     "throttle": ("back", "still", "forward"),
@@ -49,8 +47,7 @@ def in_thirds(actions: NDArray[np.float64], layout: Layout) -> tuple[list[str], 
     Returns:
         The names of the classes, and the class index of each action, shape (n,).
     """
-    low = np.where(np.isfinite(layout.low), layout.low, actions.min(axis=0))
-    high = np.where(np.isfinite(layout.high), layout.high, actions.max(axis=0))
+    low, high = _ranges(actions, layout)
     share = (actions - low) / np.where(high > low, high - low, 1.0)
     third = (share > 1.0 / 3.0).astype(np.int64) + (share > 2.0 / 3.0)
     found, numbers = np.unique(third, axis=0, return_inverse=True)
@@ -62,19 +59,17 @@ def in_thirds(actions: NDArray[np.float64], layout: Layout) -> tuple[list[str], 
     return names, numbers.reshape(-1).astype(np.int64)
 
 
+def _ranges(
+    actions: NDArray[np.floating], layout: Layout
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the bounds of each value; the extreme action replaces a missing bound."""
+    low = np.where(np.isfinite(layout.low), layout.low, actions.min(axis=0))
+    return low, np.where(np.isfinite(layout.high), layout.high, actions.max(axis=0))
+
+
 def _word(name: str, third: int) -> str:
     words = _WORDS.get(name.split("/")[-1])
     return words[third] if words else f"{name} {_PLACES[third]}"
-
-
-AskedHead = Literal["auto", "class", "regression"]
-"""Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
-
-MOST_CLASSES: Final = 16
-"""Maximum number of classes; more different actions are continuous."""
-
-_MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
-_ROUNDING: Final = 1e-4  # Of actions in single precision.
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,11 +122,11 @@ def goal_of(
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
-    few = len(different) <= MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
-    if asked == "class" and len(different) > MOST_CLASSES:
+    few = len(different) <= _MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
+    if asked == "class" and len(different) > _MOST_CLASSES:
         raise CloningError(
-            f"There are {len(different)} different actions, but at most {MOST_CLASSES} classes are "
-            "supported: choose the head regression."
+            f"There are {len(different)} different actions, but at most {_MOST_CLASSES} classes "
+            "are supported: choose the head regression."
         )
     if len(np.unique(actions, axis=0)) < 2 and asked != "regression":
         raise CloningError(
@@ -142,8 +137,7 @@ def goal_of(
         order = np.argsort(-counts, kind="stable")
         classes = tuple(tuple(map(float, different[i])) for i in order)
         return Goal("class", classes, tuple(named(np.asarray(c), layout) for c in classes))
-    low = np.where(np.isfinite(layout.low), layout.low, both.min(axis=0))
-    high = np.where(np.isfinite(layout.high), layout.high, both.max(axis=0))
+    low, high = _ranges(both, layout)
     high = np.where(high > low, high, low + 1.0)  # For a constant value.
     return Goal("regression", low=tuple(map(float, low)), high=tuple(map(float, high)))
 
@@ -179,14 +173,6 @@ def named(action: NDArray[np.floating], layout: Layout) -> str:
     return ", ".join(f"{part} {value:g}" for part, value in zip(parts, action, strict=True))
 
 
-TOLERANCE: Final = 0.1
-"""Maximum error of a value within the tolerance, as a share of half its range."""
-
-_BINS: Final = 10
-_WORST: Final = 12
-_MAX_POINTS: Final = 2000  # Enough for a chart.
-
-
 class Bin(msgspec.Struct, frozen=True):
     """Steps with similar confidence.
 
@@ -220,7 +206,7 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
         numbers: Names of the values of an action.
         errors: Mean absolute error of each value, in its unit.
         within: Share of steps with every value within the tolerance.
-        tolerance: The tolerance, see `TOLERANCE`.
+        tolerance: Maximum error of such a value, as a share of half its range.
         worst: Indices of the steps with the largest errors, worst first.
         done: Actions of the policy at some steps, in time; () for classes.
         wanted: Actions of the driver at the same steps.
@@ -267,27 +253,34 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
     done = policy.predict_many(pictures, states).astype(np.float64)
     layout = data.action_layout
     apart = np.abs(done - wanted)
-    half = 0.5 * (_bound(layout.high, wanted, done, 1.0) - _bound(layout.low, wanted, done, -1.0))
+    both = np.concatenate((wanted, done))
+    low, high = _ranges(both, layout)
+    half = 0.5 * (high - low)
     relative = apart / np.where(half > 0.0, half, 1.0)
     calibration: tuple[Bin, ...] = ()
     ece: float | None = None
     if policy.card.classes:
-        names = list(policy.card.class_names)
         did, truth = out.argmax(axis=1), class_numbers(wanted, policy.card.classes)
-        names, truth = _with_others(names, truth, wanted, data)
+        names = list(policy.card.class_names)
+        for step in np.flatnonzero(truth < 0):  # Actions that are unknown to the policy.
+            name = named(wanted[step], layout)
+            if name not in names:
+                names.append(name)
+            truth[step] = names.index(name)
         calibration, ece = _calibration(out, did == truth)
         # The probability of an unknown action is 0.
         known = np.where(truth < out.shape[1], truth, 0)
         given = np.where(truth < out.shape[1], out[np.arange(len(out)), known], 0.0)
         wrongness = 1.0 - given + (did != truth)
     else:
-        both = np.concatenate((wanted, done))
         names, numbers = in_thirds(both, layout)
         truth, did = numbers[: len(wanted)], numbers[len(wanted) :]
         wrongness = relative.max(axis=1)
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
-    shown = _some(len(wanted)) if not policy.card.classes else np.zeros(0, np.int64)
+    # Evenly spaced steps, in order.
+    points = 0 if policy.card.classes else min(len(wanted), _MAX_POINTS)
+    shown = np.unique(np.linspace(0, len(wanted) - 1, points).round().astype(np.int64))
     return Judgement(
         head=policy.card.head,
         steps=len(wanted),
@@ -300,8 +293,8 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         ece=ece,
         numbers=layout.names,
         errors=tuple(map(float, apart.mean(axis=0))),
-        within=float((relative <= TOLERANCE).all(axis=1).mean()),
-        tolerance=TOLERANCE,
+        within=float((relative <= _TOLERANCE).all(axis=1).mean()),
+        tolerance=_TOLERANCE,
         worst=tuple(map(int, chosen[np.argsort(-wrongness, kind="stable")[:_WORST]])),
         done=tuple(tuple(map(float, row)) for row in done[shown]),
         wanted=tuple(tuple(map(float, row)) for row in wanted[shown]),
@@ -322,30 +315,6 @@ def macro_f1(done: NDArray[np.int64], truth: NDArray[np.int64]) -> float:
     return float(np.mean(scores))
 
 
-def _bound(
-    bound: NDArray[np.float64],
-    wanted: NDArray[np.float64],
-    done: NDArray[np.float64],
-    sign: float,
-) -> NDArray[np.float64]:
-    """Return the bound of each range; the extreme value replaces a missing bound."""
-    farthest = sign * np.maximum((sign * wanted).max(axis=0), (sign * done).max(axis=0))
-    return np.where(np.isfinite(bound), bound, farthest)
-
-
-def _with_others(
-    names: list[str], truth: NDArray[np.int64], wanted: NDArray[np.float64], data: Dataset
-) -> tuple[list[str], NDArray[np.int64]]:
-    """Add classes for actions of the driver that are unknown to the policy."""
-    names, truth = list(names), truth.copy()
-    for step in np.flatnonzero(truth < 0):
-        name = named(wanted[step], data.action_layout)
-        if name not in names:
-            names.append(name)
-        truth[step] = names.index(name)
-    return names, truth
-
-
 def _calibration(
     out: NDArray[np.float32], right: NDArray[np.bool_]
 ) -> tuple[tuple[Bin, ...], float]:
@@ -358,8 +327,3 @@ def _calibration(
         if inside.any()
     )
     return bins, sum(b.steps * abs(b.sure - b.right) for b in bins) / len(out)
-
-
-def _some(n: int) -> NDArray[np.int64]:
-    """Return evenly spaced steps, in order."""
-    return np.unique(np.linspace(0, n - 1, min(n, _MAX_POINTS)).round().astype(np.int64))

@@ -1,9 +1,11 @@
-"""Behaviour cloning from any demonstrations: pictures or states, keys or continuous actions."""
+"""Behaviour cloning: steering from pictures, or any actions from any demonstrations."""
 
 from __future__ import annotations
 
+import copy
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, cast
@@ -13,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.demonstrations import Examples, Mirror, mirror_of, stretch
+from shapechanger.demos.cloning.demonstrations import (
+    Examples,
+    Mirror,
+    held_out,
+    mirror_of,
+    steering_examples,
+    stretch,
+)
 from shapechanger.demos.cloning.judge import AskedHead, Goal, goal_of
 from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -25,25 +34,15 @@ try:
     from torch import Tensor
     from torch.nn import functional
 
-    from shapechanger.demos.cloning.batches import Batch, Batches
+    from shapechanger.demos.cloning.batches import Batches
     from shapechanger.demos.cloning.network import CameraNetwork, joined
-    from shapechanger.demos.cloning.train import HUBER_BETA, fit
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-__all__ = [
-    "DEMOS",
-    "MANY",
-    "Inputs",
-    "MemberCheck",
-    "Training",
-    "best_temperature",
-    "learn",
-    "settings_for",
-]
+__all__ = ["DEMOS", "Inputs", "MemberCheck", "Training", "clone", "learn", "settings_for"]
 
 Inputs = Literal["auto", "picture", "state", "both"]
 """Inputs of a policy; "auto" takes pictures if there are any, and states otherwise."""
@@ -72,12 +71,16 @@ DEMOS: Final = CloneSettings(
 )
 """Settings for few demonstrations."""
 
-MANY: Final = 3000
-"""Number of steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network
-on colours and finer pictures learns from them; with fewer it would learn irrelevant details.
-"""
-
+# Steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network on colours
+# and finer pictures learns from them; with fewer it would learn irrelevant details.
+_MANY: Final = 3000
+# Error at which the loss changes from quadratic to linear. An error of a tenth of the steering's
+# range is a mistake, and one mistake of the driver should not outweigh ten small errors.
+_HUBER_BETA: Final = 0.1
 _MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
+_MAX_GRADIENT: Final = 1.0
+# The average of early steps forgets faster: step / (step + 10).
+_AVERAGE_FROM: Final = 10.0
 # The previous action nearly always predicts the next one: a clone that sees it learns to repeat
 # itself instead of looking.
 _APPLIED: Final = "/applied"
@@ -94,7 +97,7 @@ def settings_for(steps: int) -> CloneSettings:
     minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
     see docs/cloning.md.
     """
-    return DEMOS if steps < MANY else CloneSettings(held_out=0.0)
+    return DEMOS if steps < _MANY else CloneSettings(held_out=0.0)
 
 
 class MemberCheck(msgspec.Struct, frozen=True):
@@ -104,7 +107,7 @@ class MemberCheck(msgspec.Struct, frozen=True):
         member: Index of the member.
         step: Number of its training steps so far.
         loss: Mean loss of the batches since the last validation; NaN at the start.
-        error: Loss on the stretch of time held out for early stopping; NaN without one.
+        error: Error on the steps held out for early stopping, smaller is better; NaN without any.
     """
 
     member: int
@@ -118,11 +121,11 @@ class Training:
     """Course of a training.
 
     Attributes:
-        checks: Validations of all members, in order.
+        checks: Validations of all members, in order; the first of each is from before training.
         steps: Step of each member at which it was best, which was kept.
         learned: Number of demonstrated steps learned from.
         mirrored: Share of examples that were mirrored.
-        mirror_note: Reason for that share, in a sentence.
+        mirror_note: Reason for that share, in a sentence; "" for a share that the settings state.
         seconds: Duration, s.
     """
 
@@ -132,6 +135,84 @@ class Training:
     mirrored: float
     mirror_note: str
     seconds: float
+
+
+def clone(
+    pictures: NDArray[np.uint8],
+    actions: NDArray[np.floating],
+    *,
+    settings: CloneSettings | None = None,
+    seed: int,
+    episodes: Sequence[int] = (),
+    start: CameraPolicy | None = None,
+    rehearsal: tuple[NDArray[np.uint8], NDArray[np.floating]] | None = None,
+    on_check: Callable[[MemberCheck], None] = lambda check: None,
+) -> tuple[CameraPolicy, Training]:
+    """Learn the steering and throttle of a driver from pictures, with one network.
+
+    Equal arguments give an equal policy on the same machine with the same number of threads.
+
+    Args:
+        pictures: Shape (n, H, W, 3), raw or prepared.
+        actions: Steering and throttle in [-1, 1], shape (n, 2).
+        settings: Hyperparameters; None for the defaults. `members`, `dropout` and `smoothing` are
+            ignored.
+        seed: Seed of all randomness.
+        episodes: Number of pictures of each episode, in order; () for a single episode. The end of
+            each one is used for early stopping, by the sum of the mean absolute errors.
+        start: Policy to train further, which is not changed; None to start from scratch.
+        rehearsal: Pictures and actions that `start` was trained on, mixed in so that they are not
+            forgotten.
+        on_check: Called after each validation.
+
+    Returns:
+        The policy that was best on the held-out pictures, or the last one without them, and the
+        course of the training.
+
+    Raises:
+        CloningError: If there are no examples, or an array is invalid.
+    """
+    began = time.monotonic()
+    settings = CloneSettings() if settings is None else settings
+    framing = settings.framing if start is None else start.card.framing
+    shown = steering_examples(pictures, actions, framing)
+    kept_back = held_out(len(shown), episodes, settings.held_out)
+    again = None if rehearsal is None else steering_examples(*rehearsal, framing)
+    policy = CameraPolicy.fresh(settings, seed) if start is None else start.copy()
+    if start is None:
+        _begin_with_mean(policy.network, shown.targets[~kept_back])
+    exam = shown.part(kept_back)
+    weights = torch.tensor([1.0, settings.throttle_weight])
+
+    def loss(out: Tensor, wanted: Tensor) -> Tensor:
+        return (_huber(out, wanted, reduction="none") * weights).mean()
+
+    def error(network: CameraNetwork) -> float:
+        done = CameraPolicy(network, policy.card).predict_many(exam.pictures)
+        return sum(np.abs(done - exam.targets).mean(axis=0).tolist())
+
+    checks, best = _fit(
+        policy.network,
+        Batches(shown, ~kept_back, again, settings, seed),
+        loss,
+        error if len(exam) else None,
+        msgspec.structs.replace(settings, dropout=0.0),
+        settings.learning_rate if start is None else settings.further_rate,
+        0,
+        on_check,
+    )
+    card = msgspec.structs.replace(
+        policy.card, seeds=(*policy.card.seeds, seed), steps=best, settings=settings
+    )
+    training = Training(
+        checks=tuple(checks),
+        steps=(best,),
+        learned=int((~kept_back).sum()),
+        mirrored=settings.augmentation.mirror,
+        mirror_note="",
+        seconds=time.monotonic() - began,
+    )
+    return CameraPolicy(policy.network, card), training
 
 
 def learn(
@@ -153,7 +234,7 @@ def learn(
     Args:
         data: The demonstrations.
         learned: Mask of the steps to learn from, shape (n,); None for all.
-        settings: Hyperparameters; None for those of `settings_for`.
+        settings: Hyperparameters; None for those of `settings_for`. `throttle_weight` is ignored.
         head: Kind of output.
         inputs: Inputs of the policy.
         seed: Seed of all randomness.
@@ -170,118 +251,33 @@ def learn(
     if not which.any():
         raise CloningError("There is no step to learn from.")
     settings = settings_for(int(which.sum())) if settings is None else settings
-    pictures = None if data.pictures is None else data.pictures[which]
-    states = None if data.states is None else data.states[which]
     actions = data.actions[which]
     if not np.isfinite(actions).all():
         first = int(np.flatnonzero(~np.isfinite(data.actions).all(axis=1) & which)[0])
         raise CloningError(f"Action {first} must be finite, got {data.actions[first].tolist()}.")
-    sees, feels = _senses(pictures, states, inputs)
-    mirror, felt_mirror, share, note = _mirrors(data, actions, feels)
+    sees, feels = _senses(data, inputs)
+    mirror, state_mirror, share, note = _mirrors(data, actions, feels)
     settings = msgspec.structs.replace(
         settings, augmentation=msgspec.structs.replace(settings.augmentation, mirror=share)
     )
-    goal = goal_of(actions, data.action_layout, head, mirror(actions) if mirror and share else None)
+    turned = mirror(actions) if mirror and share else actions
+    goal = goal_of(actions, data.action_layout, head, turned if mirror and share else None)
     unseen = _unseen(data) if feels else ()
-    card = _card(data, goal, settings, sees, feels, unseen)
-    felt = _felt(states, data, unseen) if feels else None
+    states = None
+    if feels and data.states is not None and data.state_layout is not None:
+        states = data.states[which].astype(np.float32)
+        for name in unseen:
+            states[:, data.state_layout.slices[name]] = np.nan
     shown = Examples(
-        prepare(pictures, settings.framing) if sees and pictures is not None else None,
-        felt,
+        prepare(data.pictures[which], settings.framing)
+        if sees and data.pictures is not None
+        else None,
+        states,
         goal.targets(actions),
-        None if felt is None else (felt_mirror(felt) if felt_mirror else felt),
-        goal.targets(mirror(actions) if mirror and share else actions),
+        states if states is None or state_mirror is None else state_mirror(states),
+        goal.targets(turned),
     )
-    members: list[CameraNetwork] = []
-    checks: list[MemberCheck] = []
-    steps: list[int] = []
-    held_out: list[tuple[Tensor, Tensor]] = []
-    for member in range(settings.members):
-        network, own, best, left_out = _one(shown, card, goal, settings, seed, member, on_check)
-        members.append(network)
-        checks += own
-        steps.append(best)
-        held_out.append(left_out)
-    whole = joined(msgspec.structs.replace(card, members=len(members)), members)
-    if goal.head == "class":
-        _calibrate(whole, held_out)
-    card = msgspec.structs.replace(
-        card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
-    )
-    training = Training(
-        tuple(checks), tuple(steps), len(actions), share, note, time.monotonic() - began
-    )
-    return CameraPolicy(whole, card), training
-
-
-def _senses(
-    pictures: NDArray[np.uint8] | None, states: NDArray[np.float32] | None, inputs: Inputs
-) -> tuple[bool, bool]:
-    """Return whether the policy uses pictures, and whether it uses states."""
-    if inputs == "auto":
-        inputs = "picture" if pictures is not None else "state"
-    sees, feels = inputs in {"picture", "both"}, inputs in {"state", "both"}
-    if sees and pictures is None:
-        raise CloningError("These demonstrations have no pictures to learn from.")
-    if feels and (states is None or not states.shape[1]):
-        raise CloningError("These demonstrations have no state to learn from.")
-    return sees, feels
-
-
-def _mirrors(
-    data: Dataset, actions: NDArray[np.float32], feels: bool
-) -> tuple[Mirror | None, Mirror | None, float, str]:
-    """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
-    try:
-        mirror = mirror_of(data.action_layout)
-        layout = data.state_layout
-        felt = mirror_of(layout) if feels and layout is not None else None
-    except CloningError as reason:
-        return None, None, 0.0, f"No picture is mirrored, because {reason}."
-    even = mirror.even(actions)
-    share = 0.5 * even
-    note = (
-        f"{share:.1%} of the pictures are mirrored, because the driver steered to one side "
-        f"{even:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
-        "the wrong side."
-    )
-    return mirror, felt, share, note
-
-
-def _unseen(data: Dataset) -> tuple[str, ...]:
-    """Return the names of the state values to ignore."""
-    layout = data.state_layout
-    names = () if layout is None else layout.names
-    unseen = tuple(name for name in names if name.endswith(_APPLIED))
-    if len(unseen) == len(names):
-        raise CloningError(
-            "The state contains only the previous action, from which nothing can be learned."
-        )
-    return unseen
-
-
-def _felt(
-    states: NDArray[np.float32] | None, data: Dataset, unseen: tuple[str, ...]
-) -> NDArray[np.float32] | None:
-    """Return the states, with NaN for ignored values."""
-    if states is None or data.state_layout is None:
-        return None
-    felt = states.astype(np.float32)
-    for name in unseen:
-        felt[:, data.state_layout.slices[name]] = np.nan
-    return felt
-
-
-def _card(
-    data: Dataset,
-    goal: Goal,
-    settings: CloneSettings,
-    sees: bool,
-    feels: bool,
-    unseen: tuple[str, ...],
-) -> CloneCard:
-    """Return the card of one member."""
-    return CloneCard(
+    card = CloneCard(
         framing=settings.framing,
         channels=settings.channels,
         features=settings.features,
@@ -297,9 +293,76 @@ def _card(
         low=goal.low,
         high=goal.high,
     )
+    members = [
+        _train_member(shown, card, goal, settings, seed, member, on_check)
+        for member in range(settings.members)
+    ]
+    networks, checks, steps, logits, wanted = (list(each) for each in zip(*members, strict=True))
+    whole = joined(msgspec.structs.replace(card, members=len(members)), networks)
+    if goal.head == "class":
+        # Scale the logits so that confidence matches accuracy on held-out steps.
+        temperature = best_temperature(torch.cat(logits), torch.cat(wanted))
+        with torch.no_grad():
+            whole.hands.weight.div_(temperature)
+            whole.hands.bias.div_(temperature)
+    card = msgspec.structs.replace(
+        card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
+    )
+    training = Training(
+        checks=tuple(check for own in checks for check in own),
+        steps=tuple(steps),
+        learned=len(actions),
+        mirrored=share,
+        mirror_note=note,
+        seconds=time.monotonic() - began,
+    )
+    return CameraPolicy(whole, card), training
 
 
-def _one(
+def _senses(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
+    """Return whether the policy uses pictures, and whether it uses states."""
+    if inputs == "auto":
+        inputs = "picture" if data.pictures is not None else "state"
+    sees, feels = inputs in {"picture", "both"}, inputs in {"state", "both"}
+    if sees and data.pictures is None:
+        raise CloningError("These demonstrations have no pictures to learn from.")
+    if feels and (data.states is None or not data.states.shape[1]):
+        raise CloningError("These demonstrations have no state to learn from.")
+    return sees, feels
+
+
+def _mirrors(
+    data: Dataset, actions: NDArray[np.float32], feels: bool
+) -> tuple[Mirror | None, Mirror | None, float, str]:
+    """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
+    try:
+        mirror = mirror_of(data.action_layout)
+        layout = data.state_layout
+        of_states = mirror_of(layout) if feels and layout is not None else None
+    except CloningError as reason:
+        return None, None, 0.0, f"No picture is mirrored, because {reason}."
+    even = mirror.even(actions)
+    share = 0.5 * even
+    note = (
+        f"{share:.1%} of the pictures are mirrored, because the driver steered to one side "
+        f"{even:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
+        "the wrong side."
+    )
+    return mirror, of_states, share, note
+
+
+def _unseen(data: Dataset) -> tuple[str, ...]:
+    """Return the names of the state values to ignore."""
+    names = () if data.state_layout is None else data.state_layout.names
+    unseen = tuple(name for name in names if name.endswith(_APPLIED))
+    if len(unseen) == len(names):
+        raise CloningError(
+            "The state contains only the previous action, from which nothing can be learned."
+        )
+    return unseen
+
+
+def _train_member(
     shown: Examples,
     card: CloneCard,
     goal: Goal,
@@ -307,7 +370,7 @@ def _one(
     seed: int,
     member: int,
     on_check: Callable[[MemberCheck], None],
-) -> tuple[CameraNetwork, list[MemberCheck], int, tuple[Tensor, Tensor]]:
+) -> tuple[CameraNetwork, list[MemberCheck], int, Tensor, Tensor]:
     """Train one member.
 
     Returns:
@@ -316,84 +379,149 @@ def _one(
     """
     seed = seed * settings.members + member
     kept_back = stretch(len(shown), member, settings.members, settings.held_out)
-    exam = shown.part(kept_back)
     policy = CameraPolicy.blank(card, seed)
-    _begin_with(policy.network, shown.part(~kept_back), goal)
-    batches = Batches(shown, ~kept_back, None, settings, seed)
+    learned = shown.part(~kept_back)
+    if goal.head == "class":
+        counts = np.bincount(learned.targets, minlength=len(goal.classes)) + 1.0
+        with torch.no_grad():
+            policy.network.hands.weight.zero_()
+            policy.network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
+    else:
+        _begin_with_mean(policy.network, learned.targets)
+    if learned.states is not None:
+        _normalise(policy.network, learned.states)
+    exam = shown.part(kept_back)
     wanted = torch.as_tensor(exam.targets)
+
+    def loss(out: Tensor, wanted: Tensor, smoothing: float = settings.smoothing) -> Tensor:
+        if goal.head == "class":
+            return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
+        return _huber(out, wanted)
+
+    def logits(network: CameraNetwork) -> Tensor:
+        return CameraPolicy(network, card).logits(exam.pictures, exam.states)
+
+    def error(network: CameraNetwork) -> float:
+        return float(loss(logits(network), wanted, smoothing=0.0))
+
     # Dropout draws from the global generator; earlier draws must not matter.
     fork = cast(
         "AbstractContextManager[None]",
         torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
     )
-
-    def loss(network: CameraNetwork, batch: Batch) -> Tensor:
-        found = network.perceive(batch.pictures, batch.states)
-        out = network.hands(functional.dropout(found, settings.dropout))
-        return _loss(out, batch.targets, goal, settings.smoothing)
-
-    def judge(network: CameraNetwork, step: int, loss: float) -> MemberCheck:
-        error = float("nan")
-        if len(exam):
-            error = float(_loss(_outputs(network, card, exam), wanted, goal, 0.0))
-        return MemberCheck(member, step, loss, error)
-
     with fork:
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
-        checks, best, _ = fit(
-            policy.network, batches, loss, judge, settings, settings.learning_rate, on_check
+        checks, best = _fit(
+            policy.network,
+            Batches(shown, ~kept_back, None, settings, seed),
+            loss,
+            error if len(exam) else None,
+            settings,
+            settings.learning_rate,
+            member,
+            on_check,
         )
-    left_out = _outputs(policy.network, card, exam), wanted
-    return policy.network, checks, checks[best].step, left_out
+    return policy.network, checks, best, logits(policy.network), wanted
 
 
-def _outputs(network: CameraNetwork, card: CloneCard, exam: Examples) -> Tensor:
-    """Return the outputs of a network, shape (n, outputs)."""
-    policy = CameraPolicy(network, card)
-    found = torch.as_tensor(policy.features(exam.pictures, exam.states))
-    with torch.inference_mode():
-        return network.hands(found)
+def _huber(out: Tensor, wanted: Tensor, reduction: str = "mean") -> Tensor:
+    return functional.smooth_l1_loss(torch.tanh(out), wanted, reduction=reduction, beta=_HUBER_BETA)
 
 
-def _loss(out: Tensor, wanted: Tensor, goal: Goal, smoothing: float) -> Tensor:
-    if goal.head == "class":
-        return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
-    return functional.smooth_l1_loss(torch.tanh(out), wanted, beta=HUBER_BETA)
-
-
-def _begin_with(network: CameraNetwork, shown: Examples, goal: Goal) -> None:
-    """Initialise the output to the average action, and the normalisation of states."""
+def _begin_with_mean(network: CameraNetwork, wanted: NDArray[np.float32]) -> None:
+    """Initialise the output to the mean action."""
+    mean = torch.as_tensor(wanted.mean(axis=0)).clamp(-_MAX_INITIAL, _MAX_INITIAL)
     with torch.no_grad():
-        if goal.head == "class":
-            counts = np.bincount(shown.targets, minlength=len(goal.classes)) + 1.0
-            network.hands.weight.zero_()
-            network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
-        else:
-            mean = torch.as_tensor(shown.targets.mean(axis=0))
-            network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
-        if network.nerves is not None and shown.states is not None:
-            known = np.where(np.isfinite(shown.states), shown.states, np.nan)
-            there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
-            for name, values in (
-                ("middle", np.zeros(known.shape[1])),
-                ("spread", np.ones(known.shape[1])),
-            ):
-                found = np.nanmean(known[:, there], axis=0)
-                if name == "spread":
-                    found = np.nanstd(known[:, there], axis=0)
-                    found = np.where(found > _MIN_SPREAD, found, 1.0)
-                values[there] = found
-                getattr(network.nerves, name).copy_(torch.as_tensor(values))
+        network.hands.bias.copy_(torch.atanh(mean))
 
 
-def _calibrate(network: CameraNetwork, held_out: list[tuple[Tensor, Tensor]]) -> None:
-    """Scale the logits so that confidence matches accuracy on held-out steps."""
-    temperature = best_temperature(
-        torch.cat([out for out, _ in held_out]), torch.cat([wanted for _, wanted in held_out])
-    )
+def _normalise(network: CameraNetwork, states: NDArray[np.float32]) -> None:
+    """Initialise the normalisation of states to the mean and spread of their finite values."""
+    known = np.where(np.isfinite(states), states, np.nan)
+    there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
+    middle, spread = np.zeros(known.shape[1]), np.ones(known.shape[1])
+    middle[there] = np.nanmean(known[:, there], axis=0)
+    found = np.nanstd(known[:, there], axis=0)
+    spread[there] = np.where(found > _MIN_SPREAD, found, 1.0)
     with torch.no_grad():
-        network.hands.weight.div_(temperature)
-        network.hands.bias.div_(temperature)
+        for name, values in (("middle", middle), ("spread", spread)):
+            getattr(network.nerves, name).copy_(torch.as_tensor(values))
+
+
+def _fit(
+    network: CameraNetwork,
+    batches: Batches,
+    loss: Callable[[Tensor, Tensor], Tensor],
+    error: Callable[[CameraNetwork], float] | None,
+    settings: CloneSettings,
+    rate: float,
+    member: int,
+    on_check: Callable[[MemberCheck], None],
+) -> tuple[list[MemberCheck], int]:
+    """Train a network in place, and restore its best weights at the end.
+
+    Args:
+        network: The network.
+        batches: The training data.
+        loss: Returns the loss of outputs, given the targets.
+        error: Validates a network; None without held-out data.
+        settings: Number of steps, validations, and patience.
+        rate: Maximum learning rate.
+        member: Index of the network.
+        on_check: Called after each validation.
+
+    Returns:
+        The validations in order, and the step of the best one.
+    """
+    optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
+    total = settings.steps(batches.size)
+    every = max(total // settings.checks, 1)
+    # Validated and kept: the network itself, or the average of its weights.
+    kept = copy.deepcopy(network) if settings.averaging else network
+    checks: list[MemberCheck] = []
+    losses: list[float] = []
+    best, best_weights = -1, dict[str, Tensor]()
+    step = worse = 0
+    while True:
+        if step % every == 0 or step == total:
+            mean_loss = sum(losses) / len(losses) if losses else math.nan
+            now = error(kept.eval()) if error else math.nan
+            checks.append(MemberCheck(member, step, mean_loss, now))
+            on_check(checks[-1])
+            losses.clear()
+            worse += 1
+            # NaN without held-out data: keep the last.
+            if best < 0 or not now >= checks[best].error:
+                best, worse = len(checks) - 1, 0
+                best_weights = {name: w.clone() for name, w in kept.state_dict().items()}
+            if step == total or worse >= settings.patience:
+                break
+        for group in optimizer.param_groups:
+            group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
+        network.train()
+        batch = batches.draw()
+        found = network.perceive(batch.pictures, batch.states)
+        batch_loss = loss(network.hands(functional.dropout(found, settings.dropout)), batch.targets)
+        optimizer.zero_grad()
+        batch_loss.backward()  # pyright: ignore[reportUnknownMemberType]
+        torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
+        optimizer.step()  # pyright: ignore[reportUnknownMemberType]
+        losses.append(batch_loss.item())
+        step += 1
+        if settings.averaging:
+            share = min(settings.averaging, step / (step + _AVERAGE_FROM))
+            with torch.no_grad():
+                for old, new in zip(kept.parameters(), network.parameters(), strict=True):
+                    old.lerp_(new, 1.0 - share)
+    network.load_state_dict(best_weights)
+    network.eval()
+    return checks, checks[best].step
+
+
+def _share_of_rate(step: int, total: int, warm_up: int) -> float:
+    """Return the learning rate schedule: a linear warm-up, and half a cosine down to 0."""
+    rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
+    return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
 
 
 def best_temperature(logits: Tensor, wanted: Tensor) -> float:

@@ -7,6 +7,7 @@ a policy, and must not change.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, cast
 
 import torch
@@ -16,16 +17,7 @@ from torch.nn import functional
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CHANNELS, Framing
 
-__all__ = [
-    "ACTIONS",
-    "DIRECTIONS",
-    "CameraNetwork",
-    "EdgeEyes",
-    "Eyes",
-    "Nerves",
-    "edges",
-    "joined",
-]
+__all__: list[str] = []
 
 DIRECTIONS: Final = 6
 """Number of edge directions over half a turn: 30 degrees each."""
@@ -41,26 +33,42 @@ _MIN_SPREAD: Final = 0.02
 _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more information.
 
 
+def _convolutions(
+    channels: tuple[int, ...], features: int, before: int, size: tuple[int, int], first: int
+) -> tuple[nn.Sequential, nn.Linear]:
+    """Return convolutions, each of which halves rows and columns, and a layer to the features.
+
+    Args:
+        channels: Filters of each convolution.
+        features: Number of features.
+        before: Number of colours or directions.
+        size: Rows and columns.
+        first: Side of the first filters, pixels.
+    """
+    layers: list[nn.Module] = []
+    height, width = size
+    for i, after in enumerate(channels):
+        side = 3 if i else first
+        layers += [nn.Conv2d(before, after, side, stride=2, padding=side // 2), nn.ReLU()]
+        height, width, before = (height + 1) // 2, (width + 1) // 2, after
+    return nn.Sequential(*layers), nn.Linear(before * height * width, features)
+
+
 class EdgeEyes(nn.Module):
     """Encoder of a picture by its edges.
 
     Args:
         framing: Size of the pictures.
-        channels: Filters of each convolution after the edges; each one halves rows and columns.
+        channels: Filters of each convolution after the edges.
         features: Number of features.
     """
 
     def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
         super().__init__()
-        height, width = max(framing.height // _CELL, 1), max(framing.width // _CELL, 1)
-        self._cells = height, width
-        layers: list[nn.Module] = []
-        before = DIRECTIONS
-        for after in channels:
-            layers += [nn.Conv2d(before, after, 3, stride=2, padding=1), nn.ReLU()]
-            height, width, before = (height + 1) // 2, (width + 1) // 2, after
-        self.filters = nn.Sequential(*layers)
-        self.boiled_down = nn.Linear(before * height * width, features)
+        self._cells = max(framing.height // _CELL, 1), max(framing.width // _CELL, 1)
+        self.filters, self.boiled_down = _convolutions(
+            channels, features, DIRECTIONS, self._cells, first=3
+        )
 
     def forward(self, pictures: Tensor) -> Tensor:
         """Return the features, shape (n, features).
@@ -94,15 +102,11 @@ def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
     return torch.sqrt(pooled / (pooled.mean(dim=(1, 2, 3), keepdim=True) + _MIN_EDGE))
 
 
-ACTIONS: Final = 2
-"""Steering and throttle."""
-
-
 class Eyes(nn.Module):
     """Encoder of a picture by its colours.
 
     Each picture is normalised by its own mean and standard deviation, so that neither daylight nor
-    exposure matters. Each convolution halves rows and columns.
+    exposure matters.
 
     Args:
         framing: Size of the pictures.
@@ -112,23 +116,13 @@ class Eyes(nn.Module):
 
     def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
         super().__init__()
-        layers: list[nn.Module] = []
-        height, width = framing.height, framing.width
-        before = CHANNELS
-        for i, after in enumerate(channels):
-            # The first filters are wider, to find edges.
-            size = 3 if i else 5
-            layers += [nn.Conv2d(before, after, size, stride=2, padding=size // 2), nn.ReLU()]
-            height, width, before = (height + 1) // 2, (width + 1) // 2, after
-        self.filters = nn.Sequential(*layers)
-        self.boiled_down = nn.Linear(before * height * width, features)
+        # The first filters are wider, to find edges.
+        self.filters, self.boiled_down = _convolutions(
+            channels, features, CHANNELS, (framing.height, framing.width), first=5
+        )
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Return the features, shape (n, features).
-
-        Args:
-            pictures: In [0, 1], shape (n, 3, height, width).
-        """
+        """Return the features; shapes are those of `EdgeEyes`."""
         # Colours are last in memory, so that each picture is one row: several times faster than
         # over three dimensions.
         rows = pictures.permute(0, 2, 3, 1).flatten(1)
@@ -184,7 +178,11 @@ class CameraNetwork(nn.Module):
 
     def __init__(self, card: CloneCard) -> None:
         super().__init__()
-        eyes = [_eyes(card) for _ in range(card.members if card.eyes != "none" else 0)]
+        kind = EdgeEyes if card.eyes == "edges" else Eyes
+        eyes = [
+            kind(card.framing, card.channels, card.features)
+            for _ in range(card.members if card.eyes != "none" else 0)
+        ]
         nerves = [
             Nerves(card.state_size, card.nerves) for _ in range(card.members if card.nerves else 0)
         ]
@@ -208,15 +206,6 @@ class CameraNetwork(nn.Module):
         if self.nerves is not None:
             found.append(self.nerves(states))
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
-
-    def forward(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """Return the outputs, shape (n, outputs): before the tanh, or logits of the classes.
-
-        Args:
-            pictures: As in `perceive`.
-            states: As in `perceive`.
-        """
-        return self.hands(self.perceive(pictures, states))
 
 
 def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
@@ -244,13 +233,7 @@ def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
     return network
 
 
-def _eyes(card: CloneCard) -> nn.Module:
-    if card.eyes == "edges":
-        return EdgeEyes(card.framing, card.channels, card.features)
-    return Eyes(card.framing, card.channels, card.features)
-
-
-def _one_or_several(parts: list[nn.Module] | list[Nerves]) -> nn.Module | None:
+def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
     if len(parts) < 2:
         return parts[0] if parts else None
     return _Several(parts)

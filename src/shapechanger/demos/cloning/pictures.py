@@ -26,7 +26,7 @@ CHANNELS: Final = 3
 
 _CHUNK: Final = 256  # Pictures at a time, to bound the memory of the sums.
 # A mean in single precision may miss a half by a rounding error, and is still rounded up.
-_HALF: Final = 0.5 + 1e-4
+HALF: Final = 0.5 + 1e-4
 
 
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
@@ -115,7 +115,7 @@ def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]
     for i, picture in enumerate(pictures):  # One at a time: they may be large.
         low = of_rows @ picture.reshape(height, -1).astype(np.float32)
         narrow = of_columns @ low.reshape(framing.height, width, CHANNELS)
-        small[i] = np.floor(narrow + _HALF)
+        small[i] = np.floor(narrow + HALF)
     return small
 
 

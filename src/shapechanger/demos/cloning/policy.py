@@ -116,19 +116,14 @@ class CameraPolicy:
     def predict(
         self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return the action for a picture and a state.
+        """Return the action for one picture and state, as `predict_many` does for several.
 
         Args:
-            picture: Red, green and blue, shape (H, W, 3), raw or prepared; None for a policy
-                without pictures.
-            state: Shape (k,), NaN for unknown values; None for a policy without a state.
+            picture: Red, green and blue, shape (H, W, 3).
+            state: Shape (k,).
 
         Returns:
-            Action in the order of its layout. For a vehicle: steering (-1 is left) and throttle (1
-            is forward), each in [-1, 1], shape (2,).
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
+            Action, shape (m,). For a vehicle: steering (-1 is left) and throttle (1 is forward).
         """
         return self.predict_many(
             None if picture is None else picture[np.newaxis],
@@ -162,52 +157,40 @@ class CameraPolicy:
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return the outputs of the network: class probabilities, or actions scaled to [-1, 1].
+        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
 
-        Args:
-            pictures: As in `predict_many`.
-            states: As in `predict_many`.
-
-        Returns:
-            Shape (n, classes), each row with sum 1; or shape (n, m).
+        Arguments and errors are those of `predict_many`.
         """
+        out = self.logits(pictures, states)
+        return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
+
+    def logits(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> Tensor:
+        """Return the outputs of the last layer, from which `outputs` are computed."""
         with torch.inference_mode():
-            out = self.network.hands(self._perceived(pictures, states))
-            return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
+            return self.network.hands(torch.as_tensor(self.features(pictures, states)))
 
     def features(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return the features in front of the last layer.
+        """Return the features in front of the last layer, each at least 0, shape (n, n_features).
 
-        Args:
-            pictures: As in `predict_many`.
-            states: As in `predict_many`.
-
-        Returns:
-            Features, each at least 0, shape (n, n_features).
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
+        Arguments and errors are those of `predict_many`.
         """
-        with torch.inference_mode():
-            return self._perceived(pictures, states).numpy()
-
-    def _perceived(
-        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
-    ) -> Tensor:
         small = self._seen(pictures)
         felt = self._felt(states)
         n = len(small) if small is not None else len(felt) if felt is not None else 0
         found = torch.empty(n, self.n_features)
-        for start in range(0, n, _CHUNK):
-            some = slice(start, start + _CHUNK)
-            part = None if small is None else torch.as_tensor(small[some].copy())
-            found[some] = self.network.perceive(
-                None if part is None else plain(part, torch.arange(len(part))),
-                None if felt is None else felt[some],
-            )
-        return found
+        with torch.inference_mode():
+            for start in range(0, n, _CHUNK):
+                some = slice(start, start + _CHUNK)
+                part = None if small is None else torch.as_tensor(small[some].copy())
+                found[some] = self.network.perceive(
+                    None if part is None else plain(part, torch.arange(len(part))),
+                    None if felt is None else felt[some],
+                )
+        return found.numpy()
 
     def _seen(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
         if self.card.eyes == "none":

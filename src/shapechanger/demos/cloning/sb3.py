@@ -18,8 +18,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.network import ACTIONS, CameraNetwork
-from shapechanger.demos.cloning.pictures import PolicyError, area_shares
+from shapechanger.demos.cloning.network import CameraNetwork
+from shapechanger.demos.cloning.pictures import HALF, PolicyError, area_shares
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import MissingExtra
 
@@ -30,30 +30,14 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = [
-    "IMAGE",
-    "LOG_STD",
-    "STATE",
-    "ChosenActions",
-    "ClonedPerception",
-    "ClonedPolicy",
-    "NormedReLU",
-    "SeenByPolicy",
-    "as_ppo",
-    "as_sac",
-    "from_sb3",
-    "to_sb3",
-]
+__all__ = ["as_ppo", "as_sac", "from_sb3", "to_sb3"]
 
-IMAGE: Final = "image"
-STATE: Final = "state"
-
+_IMAGE: Final = "image"
+_STATE: Final = "state"
 # Logarithm of the initial standard deviation of an action before it is squashed. A larger one would
 # drown the actions of the clone in noise.
-LOG_STD: Final = -2.0
-
+_LOG_STD: Final = -2.0
 _BRIGHTEST: Final = 255.0
-_HALF: Final = 0.5 + 1e-4  # As in `pictures`.
 # Raw pictures are large: SAC's default of a million would take 50 GB and more.
 _BUFFER: Final = 10_000
 
@@ -98,6 +82,13 @@ class NormedReLU(nn.Module):
         return functional.relu(functional.layer_norm(x, x.shape[-1:]))
 
 
+# No layer between features and actions, as in the policy.
+_SAC_NETWORKS: Final[dict[str, Any]] = {
+    "net_arch": {"pi": [], "qf": [256, 256]},
+    "activation_fn": NormedReLU,
+}
+
+
 def to_sb3(
     policy: CameraPolicy,
     env: gym.Env[Any, Any],
@@ -124,25 +115,15 @@ def to_sb3(
         CloningError: If the pictures have an invalid size.
     """
     actions = cast("Any", env).action_space
-    if not isinstance(actions, spaces.Box) or actions.shape != (ACTIONS,):
+    if not isinstance(actions, spaces.Box) or actions.shape != (2,):
         raise PolicyError(f"The actions of the policy have 2 values, but the env takes {actions}.")
-    low, high = _bounds(actions)
+    low, high = cast("Any", actions).low, cast("Any", actions).high
     if not ((low == -1.0).all() and (high == 1.0).all()):
         raise PolicyError(f"Steering and throttle are in [-1, 1], but the env takes {actions}.")
-    kwargs = {
-        # No layer between features and actions, as in the policy.
-        "net_arch": {"pi": [], "qf": [256, 256]},
-        "activation_fn": NormedReLU,
-        **settings.pop("policy_kwargs", {}),
-    }
+    kwargs = _SAC_NETWORKS | settings.pop("policy_kwargs", {})
     seen = SeenByPolicy(env, policy)
     model = learner("MlpPolicy", seen, seed=seed, policy_kwargs=kwargs, **settings)
-    hands = cast("nn.Linear", model.actor.mu)
-    hands.load_state_dict(policy.network.hands.state_dict())
-    spread = cast("nn.Linear", model.actor.log_std)
-    with torch.no_grad():
-        spread.weight.zero_()
-        spread.bias.fill_(LOG_STD)
+    _begin_actor(model, policy)
     return model
 
 
@@ -158,8 +139,13 @@ def from_sb3(model: SAC, policy: CameraPolicy) -> CameraPolicy:
     return learned
 
 
-def _bounds(space: Any) -> tuple[NDArray[Any], NDArray[Any]]:
-    return space.low, space.high
+def _begin_actor(model: SAC, policy: CameraPolicy) -> None:
+    """Give the actor of a learner the mean action of a policy, and little noise."""
+    actor = cast("Any", model.actor)
+    actor.mu.load_state_dict(policy.network.hands.state_dict())
+    with torch.no_grad():
+        actor.log_std.weight.zero_()
+        actor.log_std.bias.fill_(_LOG_STD)
 
 
 class ClonedPerception(BaseFeaturesExtractor):
@@ -180,7 +166,7 @@ class ClonedPerception(BaseFeaturesExtractor):
         self._unseen = [known.state_layout.slices[n] for n in known.unseen if known.state_layout]
         if known.eyes != "none":
             space = observation_space
-            image = space[IMAGE] if isinstance(space, spaces.Dict) else space
+            image = space[_IMAGE] if isinstance(space, spaces.Dict) else space
             _, height, width = cast("tuple[int, int, int]", image.shape)  # Channels first in SB3.
             self._first = min(round(height * known.framing.top), height - 1)
             rows = area_shares(height - self._first, known.framing.height)
@@ -193,7 +179,7 @@ class ClonedPerception(BaseFeaturesExtractor):
     def forward(self, observations: Tensor | dict[str, Tensor]) -> Tensor:
         """Return the features, shape (n, features)."""
         if isinstance(observations, dict):
-            pictures, states = observations[IMAGE], observations[STATE]
+            pictures, states = observations[_IMAGE], observations[_STATE]
         else:
             pictures = observations if self.eyes is not None else None
             states = observations if self.nerves is not None else None
@@ -207,7 +193,7 @@ class ClonedPerception(BaseFeaturesExtractor):
         """Reduce raw pictures in the same way as `pictures.prepare`."""
         rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
         seen = rows @ pictures[:, :, self._first :] @ columns.T
-        return torch.floor(seen + _HALF) / _BRIGHTEST
+        return torch.floor(seen + HALF) / _BRIGHTEST
 
 
 class _Between(nn.Module):
@@ -276,20 +262,12 @@ def as_sac(
             "head regression."
         )
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
-    kwargs = _perception(policy) | {
-        "net_arch": {"pi": [], "qf": [256, 256]},
-        "activation_fn": NormedReLU,
-        "share_features_extractor": True,
-    }
-    kind = "MultiInputPolicy" if _has_both(policy) else "MlpPolicy"
+    kwargs = _perception(policy) | _SAC_NETWORKS | {"share_features_extractor": True}
     env = _Spaces(policy, size)
+    kind = "MultiInputPolicy" if isinstance(env.observation_space, spaces.Dict) else "MlpPolicy"
     model = SAC(kind, env, seed=seed, policy_kwargs=kwargs, **settings)
-    actor = cast("Any", model.actor)
-    actor.mu.load_state_dict(policy.network.hands.state_dict())
-    with torch.no_grad():
-        actor.log_std.weight.zero_()
-        actor.log_std.bias.fill_(LOG_STD)
-    for owner in (actor, model.critic, model.critic_target):
+    _begin_actor(model, policy)
+    for owner in (model.actor, model.critic, model.critic_target):
         _copy_encoders(cast("Any", owner).features_extractor, policy)
     return model
 
@@ -311,7 +289,7 @@ def as_ppo(
     settings = {"device": "cpu", **settings}
     kwargs = _perception(policy) | {"net_arch": {"pi": [], "vf": [64, 64]}, "ortho_init": False}
     if not policy.card.classes:
-        kwargs["log_std_init"] = LOG_STD
+        kwargs["log_std_init"] = _LOG_STD
     model = PPO(ClonedPolicy, _Spaces(policy, size), seed=seed, policy_kwargs=kwargs, **settings)
     acting = cast("Any", model.policy)
     net = acting.action_net if policy.card.classes else acting.action_net[0]
@@ -329,9 +307,9 @@ class _Spaces(gym.Env[Any, Any]):
         if card.eyes != "none":
             if size is None:
                 raise PolicyError("The size of the pictures is needed for this policy.")
-            parts[IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
+            parts[_IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
         if card.nerves:
-            parts[STATE] = spaces.Box(-np.inf, np.inf, (card.state_size,), np.float32)
+            parts[_STATE] = spaces.Box(-np.inf, np.inf, (card.state_size,), np.float32)
         self.observation_space = (
             spaces.Dict(parts) if len(parts) > 1 else next(iter(parts.values()))
         )
@@ -350,10 +328,6 @@ def _perception(policy: CameraPolicy) -> dict[str, Any]:
         "features_extractor_kwargs": {"card": msgspec.json.encode(card).decode()},
         "normalize_images": False,
     }
-
-
-def _has_both(policy: CameraPolicy) -> bool:
-    return policy.card.eyes != "none" and bool(policy.card.nerves)
 
 
 def _copy_encoders(perception: ClonedPerception, policy: CameraPolicy) -> None:

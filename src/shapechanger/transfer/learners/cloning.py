@@ -12,9 +12,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import WEIGHTS, CameraPolicy
-from shapechanger.demos.cloning.train import clone
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
 from shapechanger.transfer.files import make_folder
