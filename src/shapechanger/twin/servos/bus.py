@@ -7,7 +7,7 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.twin.servos.motor import EndStops, Load
-from shapechanger.twin.servos.protocol import BROADCAST, Packet, Parser, crc16, pack, status
+from shapechanger.twin.servos.protocol import BROADCAST, Packet, Parser, status
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 
 __all__ = ["SimulatedBus"]
@@ -15,7 +15,6 @@ __all__ = ["SimulatedBus"]
 _STATUS: Final = 0x55
 _SYNC_READ: Final = 0x82
 _SYNC_WRITE: Final = 0x83
-_FAST_SYNC_READ: Final = 0x8A
 _PING: Final = 0x01
 _CRC_ERROR: Final = 3
 
@@ -109,7 +108,7 @@ class SimulatedBus:
             return
         for servo in awake:
             servo.feed_watchdog()
-        if packet.instruction in (_SYNC_READ, _FAST_SYNC_READ):
+        if packet.instruction == _SYNC_READ:
             self._sync_read(packet)
         elif packet.instruction == _SYNC_WRITE:
             self._sync_write(packet)
@@ -137,23 +136,14 @@ class SimulatedBus:
         at, length, ids = _where(packet.parameters)
         if packet.id != BROADCAST or len(set(ids)) != len(ids):
             return
-        is_fast = packet.instruction == _FAST_SYNC_READ
-        blocks: list[bytes] = []
         for servo_id in ids:
             servo = self.servos.get(servo_id)
             if servo is None or not servo.is_awake or servo.faults.mute:
                 break
-            if is_fast and not servo.plan.fast:
-                break
             answer = servo.read(at, length)
-            if is_fast:
-                blocks.append(bytes([answer.error, servo_id]) + answer.data.ljust(length, b"\0"))
-                continue
             self._answer(servo, status(servo_id, answer.error, answer.data))
             if servo.faults.late_ns:
                 break
-        if blocks:
-            self._out += _fast_status(blocks, len(ids), length)
 
     def _answer(self, servo: SimulatedServo, data: bytes) -> None:
         faults = servo.faults
@@ -175,17 +165,3 @@ def _where(parameters: bytes) -> tuple[int, int, bytes]:
     """Return address and length of a sync instruction, and what follows them."""
     at, length = (int.from_bytes(parameters[i : i + 2], "little") for i in (0, 2))
     return (at, length, parameters[4:]) if len(parameters) >= 4 else (0, 0, b"")
-
-
-def _fast_status(blocks: Sequence[bytes], count: int, length: int) -> bytes:
-    """Return the common answer, cut off after the last block if a servo is missing.
-
-    Each block ends with the CRC of everything before it, as in the manual's figures. Assumed:
-    nothing is stuffed, because the SDK removes no stuffing here.
-    """
-    whole = pack(BROADCAST, _STATUS, b"")[:5]
-    whole += (1 + count * (length + 4)).to_bytes(2, "little") + bytes([_STATUS])
-    for block in blocks:
-        whole += block
-        whole += crc16(whole).to_bytes(2, "little")
-    return whole

@@ -69,7 +69,6 @@ class ServoPlan:
         tendon: Its tendon.
         angle: Angle of the spool at power-on, with the tendon just taut, rad.
         firmware: Version of its firmware.
-        fast: Whether it supports the fast sync read.
         on_trip: Effect of its watchdog; see the module.
     """
 
@@ -78,7 +77,6 @@ class ServoPlan:
     tendon: Tendon = field(default_factory=Tendon)
     angle: float = 1.0
     firmware: int = 52
-    fast: bool = True
     on_trip: Literal["coast", "release"] = "coast"
 
 

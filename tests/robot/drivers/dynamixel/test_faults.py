@@ -246,24 +246,3 @@ def test_a_goal_that_a_servo_does_not_take_is_noticed() -> None:
     rig.twin("PI").write = lambda at, data: None if at == 102 else taken(at, data)  # type: ignore[method-assign]
     state = rig.run(8.0, 8)
     assert "Servo PI (id 7) has a goal of 136 counts, and was sent 273" in state.reason
-
-
-def test_the_fast_way_is_given_up_where_it_does_not_work() -> None:
-    """A servo too old for it is read the plain way, without a fault."""
-    plans = [ServoPlan(i, MODEL, fast=i != 4) for i in range(1, 8)]
-    rig = Rig(settings(fast=True), plans).start()
-    state = rig.run(4.0, 5)
-    assert set(state.servos) == set(NAMES)
-    rig.port.sent.clear()
-    rig.run(4.0)
-    assert 0x8A not in [p[7] for p in rig.port.sent]
-    assert state.reason == ""
-
-
-def test_the_fast_way_says_the_same() -> None:
-    """All of them in one packet."""
-    plain, fast = Rig().start(), Rig(settings(fast=True)).start()
-    said = [rig.run(6.0, 30) for rig in (plain, fast)]
-    assert said[0] == said[1]
-    assert 0x8A in [p[7] for p in fast.port.sent]
-    assert 0x8A not in [p[7] for p in plain.port.sent]

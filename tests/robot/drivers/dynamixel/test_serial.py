@@ -53,10 +53,9 @@ def test_stuffed_bytes_come_back_as_they_were(pty: ServoPty) -> None:
     port.closePort()
 
 
-@pytest.mark.parametrize("fast", [False, True])
-def test_the_driver_pulls_over_a_real_serial_port(pty: ServoPty, fast: bool) -> None:
+def test_the_driver_pulls_over_a_real_serial_port(pty: ServoPty) -> None:
     """From the first ping to the last byte."""
-    bus = ServoBus(_settings(pty, fast=fast))
+    bus = ServoBus(_settings(pty))
     bus.set_up()
     bus.hold()
     for i in range(20):

@@ -180,7 +180,7 @@ class ServoBus:
         self._servos = {servo.name: servo for servo in settings.servos}
         self._registers = RegisterBus(open_port(settings), settings.device)
         self._ids = {servo.id: servo for servo in settings.servos}
-        self._poller = ServoPoller(self._registers, tuple(self._ids), fast=settings.fast)
+        self._poller = ServoPoller(self._registers, tuple(self._ids))
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
         self._zeros: dict[str, int] = {}
         self._mode: Mode = "off"

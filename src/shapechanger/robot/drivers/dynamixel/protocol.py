@@ -261,9 +261,6 @@ _RX_CORRUPT: Final = -3002
 _MAX_DAMAGED: Final = 8
 # A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
-_BROADCAST: Final = 0xFE
-# Bytes of error, id and CRC in each block of a fast answer.
-_FAST_EXTRA: Final = 4
 
 _REFUSALS: Final = {
     1: "it could not do it",
@@ -381,15 +378,8 @@ class RegisterBus:
                 return
         raise RobotError(f"The bus at {self._device} does not take what is written to it.")
 
-    def sync_read(
-        self, register: Register, ids: Sequence[int], *, fast: bool = False
-    ) -> dict[int, ServoReply]:
+    def sync_read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read a register of several servos with one packet.
-
-        Args:
-            register: The register.
-            ids: Ids of the servos.
-            fast: Whether to use the fast sync read.
 
         Returns:
             The answers by id, without servos that did not answer.
@@ -399,10 +389,10 @@ class RegisterBus:
         """
         with self._request():
             result = self._sdk.syncReadTx(
-                self._port, register.address, register.size, list(ids), len(ids), fast
+                self._port, register.address, register.size, list(ids), len(ids), False
             )
             if result == _SUCCESS:
-                return self._fast(register, ids) if fast else self._plain(register, ids)
+                return self._answers(register, ids)
         raise RobotError(f"The bus at {self._device} does not take what is written to it.")
 
     def close(self) -> None:
@@ -410,7 +400,7 @@ class RegisterBus:
         with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
             self._port.closePort()
 
-    def _plain(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
+    def _answers(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
         # keeps no error byte; so the packets are received one by one here.
         heard: dict[int, ServoReply] = {}
@@ -427,18 +417,6 @@ class RegisterBus:
             if len(heard) == len(ids):
                 break
         return heard
-
-    def _fast(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
-        size = register.size + _FAST_EXTRA
-        raw, result, _ = self._sdk.fastSyncReadRx(self._port, _BROADCAST, size * len(ids))
-        # The last block's CRC is the packet's.
-        if result != _SUCCESS or len(raw) != size * len(ids):
-            return {}
-        blocks = [raw[i * size : (i + 1) * size] for i in range(len(ids))]
-        # It is undocumented whether servos stuff bytes here; if they did, the ids would not match.
-        if [block[1] for block in blocks] != list(ids):
-            return {}
-        return {block[1]: ServoReply(block[0], bytes(block[2:-2])) for block in blocks}
 
     def _receive(self) -> tuple[list[int], int]:
         try:
@@ -467,34 +445,26 @@ class RegisterBus:
         return RobotError(f"Servo {servo_id} at {self._device} does not answer.")
 
 
-# Failed cycles in a row after which the fast sync read is abandoned.
-_MAX_FAST_FAILURES: Final = 3
-
-
 class ServoPoller:
     """Reads a register of all servos in each cycle, although some may not answer.
 
     In a sync read each servo waits for the one before it, so a silent one may silence those behind
     it. The first missing servo becomes a suspect, and the others are read once more without it.
-    Suspects are read alone, one per cycle. So a cycle waits for at most two timeouts, or three
-    while the fast sync read is tried, whatever is missing.
+    Suspects are read alone, one per cycle. So a cycle waits for at most two timeouts, whatever is
+    missing.
 
     Args:
         bus: The bus.
         ids: Ids of the servos.
-        fast: Whether to try the fast sync read.
 
     Attributes:
         suspects: Servos that did not answer when they were last read.
-        fast: Whether the fast sync read is still tried.
     """
 
-    def __init__(self, bus: RegisterBus, ids: Sequence[int], *, fast: bool) -> None:
+    def __init__(self, bus: RegisterBus, ids: Sequence[int]) -> None:
         self._bus = bus
         self._ids = tuple(ids)
-        self._fast_failures = 0
         self.suspects: list[int] = []
-        self.fast = fast
 
     @property
     def trusted(self) -> tuple[int, ...]:
@@ -508,7 +478,7 @@ class ServoPoller:
             RobotError: If the bus is gone.
         """
         asked = self.trusted
-        heard = self._read(register, asked)
+        heard = self._bus.sync_read(register, asked) if asked else {}
         missing = [one for one in asked if one not in heard]
         if missing:
             first, *behind = missing
@@ -521,14 +491,3 @@ class ServoPoller:
             if not answer:
                 self.suspects.append(suspect)
         return heard
-
-    def _read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
-        if not ids:
-            return {}
-        if self.fast:
-            if heard := self._bus.sync_read(register, ids, fast=True):
-                self._fast_failures = 0
-                return heard
-            self._fast_failures += 1
-            self.fast = self._fast_failures < _MAX_FAST_FAILURES
-        return self._bus.sync_read(register, ids)

@@ -270,7 +270,6 @@ class BusSettings:
         slack_share: Share of the speed without load at which a servo that winds in has lost its
             tendon.
         slack_ms: Time for which it must wind in so fast, ms.
-        fast: Whether to try the fast sync read, with the plain one as a fallback.
     """
 
     device: str
@@ -284,7 +283,6 @@ class BusSettings:
     margin_c: float = 5.0
     slack_share: float = 0.7
     slack_ms: int = 100
-    fast: bool = False
 
     def __post_init__(self) -> None:
         if not self.servos:
