@@ -134,7 +134,7 @@ def test_help(run: Run, command: str) -> None:
         ("serve finger --gap real-like", "--gap needs --twin"),
         ("serve finger --twin --port 0 --finger-seed 3", "selects a finger of a --gap"),
         ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
-        ("serve finger --twin --port 0 --gap wide --world room", "give one of them"),
+        ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
         ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
         ("home finger", "`shapechanger robot init finger` writes one of your own"),
         ("home test-car.toml --straight", "no tendons on a servo bus"),
