@@ -13,9 +13,9 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.settings import PpoSettings
-from shapechanger.transfer.methods import RunResult
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
-from shapechanger.transfer.plan import ARMS, Arm, Plan, Run, RunKind, TransferTask
+from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
+from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
 
 STEPS = np.linspace(0, 10_240, 11)
@@ -60,9 +60,7 @@ def same_body() -> BodyMap:
     return BodyMap.identity(layout, Layout((Feature("slide/motor", "1", -1.0, 1.0),)))
 
 
-def results(
-    kind: RunKind, returns: NDArray[np.float64], terms: Sequence[str] = ()
-) -> list[RunResult]:
+def results(kind: str, returns: NDArray[np.float64], terms: Sequence[str] = ()) -> list[RunResult]:
     """The runs of one kind, from returns of shape (seeds, evaluations)."""
     return [
         RunResult(
@@ -89,7 +87,7 @@ def make_study(
     fine_tune: NDArray[np.float64] | None = None,
     zero_shot: NDArray[np.float64] | None = None,
     random: NDArray[np.float64] | None = None,
-    arms: tuple[Arm, ...] = ARMS,
+    arms: tuple[str, ...] = ARMS,
     source_steps: int = 2048,
     given: bool = False,
     terms: Sequence[str] = (),
@@ -103,7 +101,7 @@ def make_study(
     """A study in which transfer helps, unless other curves are given."""
     scratch = rising(0.0, 1000.0, 3000.0) if scratch is None else scratch
     seeds = scratch.shape[0]
-    drawn: dict[RunKind, NDArray[np.float64]] = {
+    drawn: dict[str, NDArray[np.float64]] = {
         "source": rising(0.0, 1000.0, 2500.0, seeds, seed=1),
         "random": np.linspace(5.0, 15.0, seeds)[:, np.newaxis] if random is None else random,
         "scratch": scratch,
@@ -115,7 +113,7 @@ def make_study(
         ),
     }
     drawn["zero-action"] = drawn["random"][:1]
-    wanted: list[RunKind] = [*([] if given else ["source"]), "random", "zero-action", *arms]
+    wanted: list[str] = [*([] if given else ["source"]), "random", "zero-action", *arms]
     plan = Plan(
         task=TransferTask(
             source or EnvRef("shapechanger/Ant-v1"), target or EnvRef("shapechanger/BigAnt-v1")
@@ -142,7 +140,7 @@ def make_study(
     )
 
 
-def _summaries(plan: Plan, drawn: dict[RunKind, NDArray[np.float64]]) -> dict[Arm, Summary]:
+def _summaries(plan: Plan, drawn: dict[str, NDArray[np.float64]]) -> dict[str, Summary]:
     """The measures, with few resamples."""
     scratch = LearningCurves(STEPS, drawn["scratch"])
     ends = {arm: float(drawn[arm][:, -plan.last_k :].mean()) for arm in plan.arms}

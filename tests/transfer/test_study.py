@@ -29,8 +29,8 @@ from shapechanger.transfer.env_ref import EnvRef, certify_shift
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
-from shapechanger.transfer.methods import policy_path
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import (
     STUDY_FILE,
     Study,

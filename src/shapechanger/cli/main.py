@@ -30,6 +30,7 @@ try:
     from shapechanger.cli.demos import Demos
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
+    from shapechanger.cli.methods import Methods
     from shapechanger.cli.play import Play
     from shapechanger.cli.policies import Policies
     from shapechanger.cli.robot import Robot
@@ -48,6 +49,7 @@ _Command = (
     | Annotated[Play, tyro.conf.subcommand("play")]
     | Annotated[Transfer, tyro.conf.subcommand("transfer")]
     | Annotated[Suite, tyro.conf.subcommand("suite")]
+    | Annotated[Methods, tyro.conf.subcommand("methods")]
     | Annotated[Policies, tyro.conf.subcommand("policies")]
     | Annotated[Robot, tyro.conf.subcommand("robot")]
     | Annotated[Demos, tyro.conf.subcommand("demos")]

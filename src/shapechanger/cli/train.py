@@ -50,7 +50,7 @@ class Train:
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
         from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
-        from shapechanger.transfer.methods import learner_of
+        from shapechanger.transfer.runs import learner_of
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))

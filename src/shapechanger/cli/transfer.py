@@ -78,10 +78,10 @@ class Transfer:
     such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
-    arms: tuple[Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"], ...] = ()
-    """Arms to compare; scratch is required. The default is scratch, zero-shot and fine-tune;
-    where the target is the same task in another finger, also what is learned in a source that was
-    randomised, and in one that was identified by the target's motion."""
+    arms: tuple[str, ...] = ()
+    """Methods to compare; scratch is required. `shapechanger methods` lists them, and module:name
+    is one that a module of your own registers. The default is scratch, zero-shot and fine-tune;
+    where the target is the same task in another finger, also randomised and identified."""
     rule: tuple[str, ...] = ()
     """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
     "foot_*/motor=copy ankle_*/motor", "*/contact/*=zero", "ankle_4/angle=hold"."""
@@ -212,11 +212,7 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
     """Return the number of steps of each run for the progress; an evaluation counts as one."""
-    from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS
-
-    steps = {"scratch": plan.steps, "fine-tune": plan.steps}
-    steps |= dict.fromkeys(("source", *ADAPTED_SOURCE_ARMS), plan.source_steps)
-    return {run.name: steps.get(run.kind, 1) for run in runs}
+    return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
 
 
 def _split_rule(text: str) -> tuple[str, str]:

@@ -26,7 +26,7 @@ from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology import Body, compile_body, reshape, to_json
+from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
     StartRules,
@@ -365,6 +365,23 @@ class Reshapable(MujocoEnv):
             EmptyShift: If they do not differ and `allow_empty` is false.
         """
         return certify(cast("Wrapped", source), cast("Wrapped", target), allow_empty=allow_empty)
+
+    @property
+    def family_name(self) -> str:
+        """Name of the family of bodies."""
+        return self.family.name
+
+    def arguments_towards(self, target: Reshapable, alpha: float) -> dict[str, Any]:
+        """Return arguments that make a body on the way to the body of another env.
+
+        Args:
+            target: An env of the same family.
+            alpha: The part of the way, 0 to 1.
+
+        Raises:
+            MorphologyError: If `alpha` lies outside [0, 1].
+        """
+        return {"body": to_json(interpolate(self.body, target.body, alpha))}
 
     @property
     def reach(self) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra
 from shapechanger.reports.numbers import t_interval
-from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS, RunKind
+from shapechanger.transfer.methods import load_method
 
 try:
     import matplotlib.style
@@ -40,12 +40,15 @@ __all__ = [
 ]
 
 # Okabe & Ito (2008), distinguishable with any colour vision; the green is darker than theirs, so
-# that a thin line of it is visible on white. Purple and grey are not theirs.
+# that a thin line of it is visible on white. Purple, the dark yellow and grey are not theirs.
 _BLUE: Final = "#0072B2"
 _ORANGE: Final = "#D55E00"
 _GREEN: Final = "#007A5A"
 _PINK: Final = "#CC79A7"
 _PURPLE: Final = "#4B2A84"
+_SKY: Final = "#56B4E9"
+_YELLOW: Final = "#C79A00"
+_BLACK: Final = "#000000"
 _GREY: Final = "#555555"
 _MEMBER_COLOURS: Final = (_BLUE, _ORANGE, _GREEN, _PINK, _GREY)
 
@@ -81,14 +84,33 @@ class _LineStyle(NamedTuple):
     marker: str
 
 
-_LINE_STYLES: Final[dict[RunKind, _LineStyle]] = {
+_LINE_STYLES: Final[dict[str, _LineStyle]] = {
     "scratch": _LineStyle(_BLUE, "-", "o"),
     "fine-tune": _LineStyle(_ORANGE, "-", "s"),
     "zero-shot": _LineStyle(_GREEN, "--", ""),
     "randomised": _LineStyle(_PINK, "-.", ""),
     "identified": _LineStyle(_PURPLE, (0, (6, 2)), ""),
+    "frozen-trunk": _LineStyle(_SKY, "-.", "^"),
+    "kickstart": _LineStyle(_YELLOW, "-", "v"),
+    "evolution": _LineStyle(_BLACK, "-", "d"),
     "random": _LineStyle(_GREY, ":", ""),
 }
+
+
+# Those of methods that are not shipped, in their order in the study.
+_OTHER_STYLES: Final = (
+    _LineStyle(_YELLOW, (0, (1, 1)), "D"),
+    _LineStyle(_BLACK, (0, (4, 1, 1, 1)), "P"),
+    _LineStyle(_SKY, (0, (3, 1)), "X"),
+)
+
+
+def _line_style(study: Study, kind: str) -> _LineStyle:
+    """Return the style of a kind of run."""
+    if kind in _LINE_STYLES:
+        return _LINE_STYLES[kind]
+    others = [arm for arm in study.plan.arms if arm not in _LINE_STYLES]
+    return _OTHER_STYLES[others.index(kind) % len(_OTHER_STYLES)]
 
 
 def learning_curves(study: Study, counting: Counting) -> str:
@@ -236,16 +258,17 @@ def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
             transform=axes.get_xaxis_transform(),
         )
     for arm in study.plan.arms:
-        start = 0.0 if arm == "scratch" else source_steps
-        if arm == "zero-shot" or arm in ADAPTED_SOURCE_ARMS:
+        method = load_method(arm)
+        start = source_steps if method.uses_source else 0.0
+        if not method.learns_on_target:
             _draw_level(axes, study, arm, start, start + last)
         else:
             _draw_curves(axes, study, arm, start)
 
 
-def _draw_curves(axes: Axes, study: Study, kind: RunKind, start: float) -> None:
+def _draw_curves(axes: Axes, study: Study, kind: str, start: float) -> None:
     """Draw an arm that is trained on the target."""
-    style, curves = _LINE_STYLES[kind], study.curves(kind)
+    style, curves = _line_style(study, kind), study.curves(kind)
     steps = curves.steps + start
     spread = t_interval(curves.returns)
     axes.plot(steps, curves.returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
@@ -268,9 +291,9 @@ def _draw_curves(axes: Axes, study: Study, kind: RunKind, start: float) -> None:
     )
 
 
-def _draw_level(axes: Axes, study: Study, kind: RunKind, start: float, end: float) -> None:
+def _draw_level(axes: Axes, study: Study, kind: str, start: float, end: float) -> None:
     """Draw a policy that is not trained on the target as a level with its interval."""
-    style, returns = _LINE_STYLES[kind], study.curves(kind).returns[:, :1]
+    style, returns = _line_style(study, kind), study.curves(kind).returns[:, :1]
     spread = t_interval(returns)
     if returns.size >= _BAND_SEEDS:
         axes.fill_between(

@@ -32,7 +32,6 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.settings import CloningSettings, SacSettings, Settings
 from shapechanger.transfer.metrics import Summary
-from shapechanger.transfer.plan import Arm
 from shapechanger.transfer.study import Study
 
 __all__ = ["Pictures", "report_html", "write_report"]
@@ -174,7 +173,7 @@ def _defined(row: MeasureRow) -> bool:
     return {row.target, row.total} != {UNDEFINED}
 
 
-def _measure_table(arm: Arm, rows: tuple[MeasureRow, ...], notes: list[str]) -> dict[str, Any]:
+def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> dict[str, Any]:
     """The defined measures of one arm, and why the others are undefined."""
     cells: list[tuple[str, ...]] = []
     undefined: dict[str, list[str]] = {}

@@ -17,7 +17,6 @@ from shapechanger.reports.numbers import (
     spread_text,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.methods import RunResult
 from shapechanger.transfer.metrics import (
     Estimate,
     Measures,
@@ -25,7 +24,8 @@ from shapechanger.transfer.metrics import (
     Summary,
     TimeToThreshold,
 )
-from shapechanger.transfer.plan import EVERY_ARM, Arm, RunKind
+from shapechanger.transfer.plan import NO_SKILL, SOURCE
+from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
 
 __all__ = [
@@ -91,7 +91,7 @@ class MeasureRow(NamedTuple):
         note: A remark; may be empty.
     """
 
-    arm: Arm
+    arm: str
     measure: str
     unit: str
     target: str
@@ -109,7 +109,7 @@ def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
     return tuple(rows)
 
 
-def _rows_of(arm: Arm, summary: Summary) -> list[MeasureRow]:
+def _rows_of(arm: str, summary: Summary) -> list[MeasureRow]:
     """Rows of one arm, gains first."""
     ours, total = _named(summary.in_target_steps), _named(summary.in_total_steps)
     rows: list[MeasureRow] = []
@@ -147,7 +147,7 @@ def _named(measures: Measures) -> dict[str, Estimate]:
 
 
 def _measure_row(
-    arm: Arm, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
+    arm: str, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
 ) -> MeasureRow:
     """One row; what both ways of counting share appears once."""
     methods = [estimate.method for estimate in (target, total)]
@@ -171,7 +171,7 @@ def _merge_notes(target: str, total: str) -> str:
 
 
 def _reached(
-    arm: Arm, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
+    arm: str, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
 ) -> str:
     """Describe how many seeds reached a threshold and how soon; empty if undefined."""
     if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
@@ -196,8 +196,6 @@ def _seeds(reach: ReachTimes, n_seeds: int) -> str:
 GOOD: Final = 0.9
 """Share of the way from what takes no skill to the best run that counts as having learnt."""
 
-_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", "zero-action", *EVERY_ARM)
-
 
 class ArmRow(NamedTuple):
     """Summary of the runs of one kind.
@@ -218,7 +216,7 @@ class ArmRow(NamedTuple):
         terms: For each reward term its mean sum over an episode at the end.
     """
 
-    kind: RunKind
+    kind: str
     seeds: int
     first: str
     final: str
@@ -236,10 +234,12 @@ def arm_rows(study: Study) -> tuple[ArmRow, ...]:
     The end of a run is the mean of its last evaluations, as many as the plan says; for a source
     policy it is the last one, because that is the policy that is transferred.
     """
-    return tuple(_row(study, kind) for kind in _KINDS if study.of(kind))
+    return tuple(
+        _row(study, kind) for kind in (SOURCE, *NO_SKILL, *study.plan.arms) if study.of(kind)
+    )
 
 
-def successes(study: Study, kind: RunKind) -> NDArray[np.float64]:
+def successes(study: Study, kind: str) -> NDArray[np.float64]:
     """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
     ends = [[e.success for e in _end(study, result)] for result in study.of(kind)]
     if any(share is None for end in ends for share in end):
@@ -247,7 +247,7 @@ def successes(study: Study, kind: RunKind) -> NDArray[np.float64]:
     return np.array([float(np.mean(np.array(end, np.float64))) for end in ends])
 
 
-def finals(study: Study, kind: RunKind) -> NDArray[np.float64]:
+def finals(study: Study, kind: str) -> NDArray[np.float64]:
     """Final value of each run, shape (n_seeds,)."""
     ends = (_end(study, result) for result in study.of(kind))
     return np.array([float(np.mean([_value(study, e) for e in end])) for end in ends])
@@ -261,7 +261,7 @@ def _value(study: Study, evaluation: Evaluation) -> float:
         return float("nan")
 
 
-def _row(study: Study, kind: RunKind) -> ArmRow:
+def _row(study: Study, kind: str) -> ArmRow:
     results = study.of(kind)
     ends = [evaluation for result in results for evaluation in _end(study, result)]
     at_the_end = finals(study, kind)
@@ -291,7 +291,7 @@ def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
     return result.curve[-1 if result.run.kind == "source" else -study.plan.last_k :]
 
 
-def _good(study: Study, kind: RunKind) -> str:
+def _good(study: Study, kind: str) -> str:
     """Number of runs that ever came close to the best one, as in `4 of 5`."""
     if kind == "source":
         return ""
@@ -376,7 +376,7 @@ def is_flat(study: Study) -> bool:
     return max(end, best) - start <= _FLAT * max(abs(end), abs(best))
 
 
-def headline_arm(study: Study) -> Arm:
+def headline_arm(study: Study) -> str:
     """The arm that the verdict is about."""
     return "fine-tune" if "fine-tune" in study.summaries else next(iter(study.summaries))
 

@@ -18,6 +18,7 @@ from shapechanger.tasks.measure import RETURN, Measure
 __all__ = [
     "EnvRef",
     "EnvTraits",
+    "HasBodyFamily",
     "HasDemonstrator",
     "HasHeldOutStarts",
     "SourceAdaptation",
@@ -104,6 +105,25 @@ class HasHeldOutStarts(Protocol):
 
 
 @runtime_checkable
+class HasBodyFamily(Protocol):
+    """An env whose body is one of a continuous family."""
+
+    @property
+    def family_name(self) -> str:
+        """Name of the family, such as "ant"."""
+        ...
+
+    def arguments_towards(self, target: Any, alpha: float) -> dict[str, Any]:
+        """Return arguments that make a body on the way to the body of another env.
+
+        Args:
+            target: An env of the same family.
+            alpha: The part of the way, 0 to 1.
+        """
+        ...
+
+
+@runtime_checkable
 class SourceAdaptation(Protocol):
     """A target env that can adapt its source env to itself."""
 
@@ -138,6 +158,7 @@ class EnvTraits:
         individual: Name of the argument that selects one of several individuals; may be empty.
         has_demonstrator: Whether it has an expert for its task.
         adapts_source: Whether it can adapt its source.
+        family: Name of the continuous family that its body belongs to; may be empty.
         measures: What a policy is measured by, the default first.
     """
 
@@ -149,6 +170,7 @@ class EnvTraits:
     individual: str
     has_demonstrator: bool
     adapts_source: bool
+    family: str
     measures: tuple[Measure, ...]
 
 
@@ -169,6 +191,7 @@ def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
         individual=getattr(inner, "individual", ""),
         has_demonstrator=isinstance(inner, HasDemonstrator),
         adapts_source=isinstance(inner, SourceAdaptation),
+        family=inner.family_name if isinstance(inner, HasBodyFamily) else "",
         measures=measures_of(env),
     )
 

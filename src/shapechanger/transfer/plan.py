@@ -2,39 +2,30 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 
-from shapechanger.errors import StudyError, UnknownName
+from shapechanger.errors import StudyError
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.methods import load_method
 
-__all__ = [
-    "ADAPTED_SOURCE_ARMS",
-    "ARMS",
-    "EVERY_ARM",
-    "Arm",
-    "Plan",
-    "Run",
-    "RunKind",
-    "TransferTask",
-]
+__all__ = ["ARMS", "NO_SKILL", "SOURCE", "Plan", "Run", "TransferTask"]
 
-Arm = Literal["scratch", "zero-shot", "fine-tune", "randomised", "identified"]
-RunKind = Literal["source", "random", "zero-action"] | Arm
-
-ARMS: Final[tuple[Arm, ...]] = ("scratch", "zero-shot", "fine-tune")
+ARMS: Final = ("scratch", "zero-shot", "fine-tune")
 """Arms that every pair of envs can be compared by."""
-ADAPTED_SOURCE_ARMS: Final[tuple[Arm, ...]] = ("randomised", "identified")
-"""Arms that learn in a source adapted to the target (source adaptation)."""
-EVERY_ARM: Final[tuple[Arm, ...]] = (*ARMS, *ADAPTED_SOURCE_ARMS)
-# Seeds follow from the place in this list: append only.
-_KINDS: Final[tuple[RunKind, ...]] = ("source", "random", *EVERY_ARM, "zero-action")
+SOURCE: Final = "source"
+"""Kind of the runs that train a source policy."""
+NO_SKILL: Final = ("random", "zero-action")
+"""Kinds of the runs without a policy, which give the zero of scores."""
+# Seeds follow from the place in this list, and those of other methods from their names.
+_KINDS: Final = (SOURCE, "random", *ARMS, "randomised", "identified", "zero-action")
 # Welch's interval needs two of each.
 _MIN_SEEDS: Final = 2
 
@@ -65,7 +56,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.
         seeds: Number of runs of each arm.
-        arms: The arms; scratch is always one, because the others are compared with it.
+        arms: The arms, by the names of their methods; scratch is always one, because the others are
+            compared with it.
         seed: The seed from which the seeds of all runs are drawn.
         source_policy: SHA-256 of the given policy file; empty if the study trains one for each
             seed.
@@ -78,6 +70,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     Raises:
         StudyError: If there are fewer than two seeds, or nothing to compare.
+        UnknownName: If there is no such method.
     """
 
     task: TransferTask
@@ -89,7 +82,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     steps: int
     source_steps: int
     seeds: int
-    arms: tuple[Arm, ...] = ARMS
+    arms: tuple[str, ...] = ARMS
     seed: int = 0
     source_policy: str = ""
     last_k: int = 3
@@ -103,8 +96,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
                 f"A study needs at least {_MIN_SEEDS} seeds for its intervals, got {self.seeds}."
             )
         for arm in self.arms:
-            if arm not in EVERY_ARM:
-                raise UnknownName("arm", arm, EVERY_ARM)
+            load_method(arm)
         if len(set(self.arms)) != len(self.arms):
             raise StudyError(f"Each arm is named once, got {', '.join(self.arms)}.")
         if "scratch" not in self.arms or len(self.arms) < 2:
@@ -113,10 +105,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     def runs(self) -> tuple[Run, ...]:
         """Every run of the study; those that others depend on come first."""
         given = bool(self.source_policy)
-        arms: list[RunKind] = [arm for arm in EVERY_ARM if arm in self.arms]
-        wanted: list[RunKind] = ["random", "zero-action", *arms]
-        if not given and {"zero-shot", "fine-tune"} & set(self.arms):
-            wanted.insert(0, "source")
+        wanted = [*NO_SKILL, *self.arms]
+        if not given and any(load_method(arm).uses_source_policy for arm in self.arms):
+            wanted.insert(0, SOURCE)
         # One given policy does the same in every run, and so does an action.
         once = set[str]() if self.individual else {"zero-action"}
         if given and not self.individual:
@@ -127,7 +118,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     def seed_of(self, run: Run) -> int:
         """The seed of a run, independent of the other runs and of their number."""
-        entropy = np.random.SeedSequence(self.seed, spawn_key=(_KINDS.index(run.kind), run.index))
+        known = run.kind in _KINDS
+        kind = _KINDS.index(run.kind) if known else zlib.crc32(run.kind.encode())
+        entropy = np.random.SeedSequence(self.seed, spawn_key=(kind, run.index))
         return int(entropy.generate_state(1)[0] >> 1)
 
     def target_of(self, run: Run) -> EnvRef:
@@ -136,9 +129,28 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
             return self.task.target
         return self.task.target.having({self.individual: run.index})
 
+    def last_step_of(self, kind: str) -> int:
+        """The step of the last evaluation of a kind of run."""
+        if kind == SOURCE:
+            return self.source_steps
+        return self.steps if kind not in NO_SKILL and load_method(kind).learns_on_target else 0
+
+    def trains(self, kind: str) -> bool:
+        """Return whether a kind of run trains a policy."""
+        return kind == SOURCE or (kind not in NO_SKILL and load_method(kind).trains)
+
+    def steps_of(self, kind: str) -> int:
+        """Env steps that a kind of run trains for, on any body."""
+        return (self.last_step_of(kind) or self.source_steps) if self.trains(kind) else 0
+
     def extends(self, other: Plan) -> bool:
-        """Return whether this is the other study with more seeds, so that its runs count here."""
-        return self.seeds > other.seeds and msgspec.structs.replace(other, seeds=self.seeds) == self
+        """Return whether this is the other study with more seeds or arms, or both.
+
+        The runs of the other study then count here, because no run depends on another arm.
+        """
+        grown = msgspec.structs.replace(other, seeds=self.seeds, arms=self.arms)
+        more = self.seeds >= other.seeds and set(self.arms) >= set(other.arms)
+        return more and grown == self != other
 
     def difference(self, other: Plan) -> str:
         """Names of the fields in which two plans differ; empty if they are equal."""
@@ -151,17 +163,17 @@ class Run(msgspec.Struct, frozen=True):
     """One training, or one evaluation: the unit of work, and of the statistics.
 
     Attributes:
-        kind: Its kind.
+        kind: Its kind: the name of a method, `SOURCE`, or one of `NO_SKILL`.
         index: Index of its seed, from 0.
     """
 
-    kind: RunKind
+    kind: str
     index: int
 
     @property
     def name(self) -> str:
         """Its name, which is also that of its folder."""
-        return f"{self.kind}-{self.index}"
+        return f"{self.kind.replace(':', '.')}-{self.index}"
 
     def folder(self, study: Path) -> Path:
         """Its folder in the folder of a study."""

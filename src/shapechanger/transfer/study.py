@@ -27,23 +27,10 @@ from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.ppo import require_budget
 from shapechanger.transfer.learners.settings import Settings
-from shapechanger.transfer.methods import (
-    RunResult,
-    learner_of,
-    load_result,
-    perform_run,
-)
+from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
-from shapechanger.transfer.plan import (
-    ADAPTED_SOURCE_ARMS,
-    ARMS,
-    EVERY_ARM,
-    Arm,
-    Plan,
-    Run,
-    RunKind,
-    TransferTask,
-)
+from shapechanger.transfer.plan import ARMS, SOURCE, Plan, Run, TransferTask
+from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 
 __all__ = [
     "PLAN_FILE",
@@ -62,6 +49,8 @@ __all__ = [
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
 
+# Arms for a target that can adapt its source.
+_ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
 
@@ -86,13 +75,13 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     shift: str
     runs: tuple[RunResult, ...]
     source_return: tuple[float, ...]
-    summaries: dict[Arm, Summary]
+    summaries: dict[str, Summary]
 
-    def of(self, kind: RunKind) -> list[RunResult]:
+    def of(self, kind: str) -> list[RunResult]:
         """Return the runs of one kind, by index."""
         return [result for result in self.runs if result.run.kind == kind]
 
-    def curves(self, kind: RunKind) -> LearningCurves:
+    def curves(self, kind: str) -> LearningCurves:
         """Return the learning curves of one kind of run, in units of the measure."""
         return _curves(self.plan, self.of(kind))
 
@@ -148,7 +137,7 @@ def inspect_task(task: TransferTask) -> TaskTraits:
         source.close()
 
 
-def default_arms(traits: TaskTraits) -> tuple[Arm, ...]:
+def default_arms(traits: TaskTraits) -> tuple[str, ...]:
     """Return the arms of a study that names none.
 
     Source adaptation helps where source and target are the same task, that is, where their layouts
@@ -159,7 +148,7 @@ def default_arms(traits: TaskTraits) -> tuple[Arm, ...]:
         target.observation_layout,
         target.action_layout,
     )
-    return EVERY_ARM if same and target.adapts_source else ARMS
+    return (*ARMS, *_ADAPTED) if same and target.adapts_source else ARMS
 
 
 def make_plan(
@@ -171,7 +160,7 @@ def make_plan(
     steps: int | None = None,
     source_steps: int | None = None,
     source_policy: Path | None = None,
-    arms: Sequence[Arm] = ARMS,
+    arms: Sequence[str] = ARMS,
     seed: int = 0,
     rules: Mapping[str, Any] | None = None,
     map_text: str = "",
@@ -189,7 +178,7 @@ def make_plan(
         steps: Target steps of a run; None for the learner's default.
         source_steps: Source steps of a source policy; None for the learner's default.
         source_policy: File of a given source policy; None to train one for each seed.
-        arms: The arms to compare.
+        arms: The arms to compare, by the names of their methods.
         seed: The seed from which the seeds of all runs are drawn.
         rules: Rules of the body map for entries without a partner, as in `BodyMap.between`.
         map_text: The body map as TOML, in place of `rules` and `units`.
@@ -212,11 +201,8 @@ def make_plan(
     learns = learner_of(learner, settings)
     learns.require(task.source, traits.source)
     learns.require(task.target, traits.target)
-    if set(arms) & set(ADAPTED_SOURCE_ARMS) and not traits.target.adapts_source:
-        raise StudyError(
-            f"{task.target} cannot adapt {task.source} to itself, which the arms "
-            f"{' and '.join(ADAPTED_SOURCE_ARMS)} need: leave them out."
-        )
+    for arm in arms:
+        load_method(arm).require(traits.source, traits.target, settings)
     measured = _measure(traits.target, measure)
     wanted = settings.steps if steps is None else steps
     require_budget(wanted, settings)
@@ -345,7 +331,7 @@ def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
 
 
 def is_folder_of(plan: Plan, out: Path) -> bool:
-    """Return whether `out` is the folder of this study, with as many seeds or fewer.
+    """Return whether `out` is the folder of this study, or of a part of it.
 
     Args:
         plan: The plan.
@@ -363,7 +349,7 @@ def is_folder_of(plan: Plan, out: Path) -> bool:
 def claim_folder(plan: Plan, out: Path) -> None:
     """Make `out` the folder of this study, or check that it already is.
 
-    A study can be resumed with more seeds: no run depends on their number.
+    A study can be resumed with more seeds or arms: no run depends on them.
 
     Args:
         plan: The plan.
@@ -403,13 +389,14 @@ def _digest(policy: Path) -> str:
 
 def _after(plan: Plan, run: Run) -> tuple[str, ...]:
     """Names of the runs that must end before this one."""
-    needs_source = run.kind in ("zero-shot", "fine-tune") and not plan.source_policy
-    return (Run("source", run.index).name,) if needs_source else ()
+    if run.kind not in plan.arms or plan.source_policy:
+        return ()
+    return (Run(SOURCE, run.index).name,) if load_method(run.kind).uses_source_policy else ()
 
 
 def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> Study:
     """Summarise the results of all runs."""
-    by_kind: dict[RunKind, list[RunResult]] = {}
+    by_kind: dict[str, list[RunResult]] = {}
     for result in results:
         by_kind.setdefault(result.run.kind, []).append(result)
     curves = {kind: _curves(plan, by_kind[kind]) for kind in by_kind if kind != "source"}
@@ -423,12 +410,12 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
         },
         {arm: float(curves[arm].returns[:, -last_k:].mean()) for arm in plan.arms},
     )
-    summaries: dict[Arm, Summary] = {
+    summaries: dict[str, Summary] = {
         arm: summarise(
             scratch,
             curves[arm],
             reference,
-            source_steps=plan.source_steps,
+            source_steps=plan.source_steps if load_method(arm).uses_source else 0,
             rng=np.random.default_rng(plan.seed),
             last_k=last_k,
         )

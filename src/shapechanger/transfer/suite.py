@@ -18,14 +18,14 @@ from shapechanger.errors import OutputError
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
-from shapechanger.transfer.methods import load_result
 from shapechanger.transfer.metrics import Estimate, LearningCurves
-from shapechanger.transfer.plan import Plan, RunKind
+from shapechanger.transfer.plan import SOURCE, Plan
+from shapechanger.transfer.runs import load_result
 from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
 
 __all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_outcomes"]
 
-_OF_TARGET: Final[tuple[RunKind, ...]] = ("random", "zero-action", "scratch")
+_OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
 _DEMONSTRATIONS: Final = "demonstrations"
 
@@ -128,14 +128,16 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
     other = read_json(sibling / PLAN_FILE, Plan, remedy)
-    same = msgspec.structs.replace(other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds)
+    same = msgspec.structs.replace(
+        other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds, arms=plan.arms
+    )
     if same != plan:
         return
-    kinds: list[RunKind] = []
+    kinds: list[str] = []
     if other.task.target == plan.task.target:
         kinds += _OF_TARGET
     if other.task.source == plan.task.source:
-        kinds.append("source")
+        kinds.append(SOURCE)
     for run in (run for run in plan.runs() if run.kind in kinds):
         shown = Path(_DEMONSTRATIONS, f"{run.name}.npz")
         if (sibling / shown).exists() and not (folder / shown).exists():

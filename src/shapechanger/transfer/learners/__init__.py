@@ -54,6 +54,7 @@ class Learner(Protocol):
         start: Any = None,
         body_map: BodyMap | None = None,
         only_last: bool = False,
+        callback: Any = None,
         on_evaluation: Callable[[Evaluation], None],
         on_steps: Callable[[int], None],
     ) -> Any:
@@ -67,8 +68,12 @@ class Learner(Protocol):
             start: A source policy to start from; None for a new policy.
             body_map: Map between the bodies of `start` and `env`.
             only_last: Whether only the final evaluation is needed.
+            callback: A callback of Stable-Baselines3 for the training; None for none.
             on_evaluation: Called with each evaluation.
             on_steps: Called with the number of steps done.
+
+        Raises:
+            StudyError: If the learner takes no callback and one is given, or the training diverges.
         """
         ...
 

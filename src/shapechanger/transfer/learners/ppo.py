@@ -93,6 +93,7 @@ class PpoLearner:
         start: TrainedPolicy | None = None,
         body_map: BodyMap | None = None,
         only_last: bool = False,
+        callback: BaseCallback | None = None,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
     ) -> TrainedPolicy:
@@ -108,6 +109,7 @@ class PpoLearner:
             on_steps=on_steps,
             source=start,
             body_map=body_map,
+            callback=callback,
         )
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
@@ -157,6 +159,7 @@ def train(
     on_steps: OnSteps = lambda steps: None,
     source: TrainedPolicy | None = None,
     body_map: BodyMap | None = None,
+    callback: BaseCallback | None = None,
     tensorboard: Path | None = None,
     threads: int | None = 1,
 ) -> TrainedPolicy:
@@ -172,6 +175,7 @@ def train(
         on_steps: Called with the number of steps taken, after each step of all envs.
         source: A policy of another body to start from; None for a new policy.
         body_map: Map between that body and this one; needed with `source`.
+        callback: A callback of Stable-Baselines3, called before each evaluation.
         tensorboard: Folder of TensorBoard logs.
         threads: Threads that step the envs, None for one per core; the result is the same. One by
             default: a study runs as many trainings at a time as there are cores.
@@ -200,9 +204,10 @@ def train(
         # Before `learn`: it starts with a reset, which already changes the running statistics.
         act = actor(model, _statistics(envs))
         on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, episodes=settings.eval_episodes))
-        callback = _PeriodicEvaluation(settings, eval_envs, single, on_evaluation, on_steps)
-        cast("Any", model).learn(settings.whole_updates(steps), callback=callback)
-        callback.evaluate_now()
+        evaluations = _PeriodicEvaluation(settings, eval_envs, single, on_evaluation, on_steps)
+        callbacks = [evaluations] if callback is None else [callback, evaluations]
+        cast("Any", model).learn(settings.whole_updates(steps), callback=callbacks)
+        evaluations.evaluate_now()
         card = PolicyCard(
             env,
             *layouts_of(eval_envs[0]),

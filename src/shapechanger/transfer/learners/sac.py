@@ -102,10 +102,17 @@ class CameraLearner:
         seed: int,
         *,
         body_map: BodyMap | None = None,
+        callback: Any = None,
         **options: Unpack[CameraTrainingOptions],
     ) -> CameraPolicy:
-        """Train a policy; all vehicles share one camera and action, so the body map is unused."""
+        """Train a policy; all vehicles share one camera and action, so the body map is unused.
+
+        Raises:
+            StudyError: If a callback is given.
+        """
         del body_map
+        if callback is not None:
+            raise StudyError(f"{self._name} takes no callback of Stable-Baselines3.")
         return _train(env, self._settings, steps, seed, **options)
 
     def evaluate(self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap) -> Evaluation:

@@ -1,4 +1,4 @@
-"""The runs of a study: what each method does, in a process of its own.
+"""The runs of a study, each in a process of its own, and their results.
 
 Everything random in a run follows from its own seed.
 """
@@ -9,12 +9,13 @@ import math
 import shutil
 import time
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
 from shapechanger.errors import CorruptStudy, StudyError
-from shapechanger.transfer.env_ref import EnvRef, SourceAdaptation
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import ReportSteps
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.learners import Learner
@@ -26,14 +27,14 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.ppo import PpoLearner, use_one_thread
+from shapechanger.transfer.learners.ppo import OnEvaluation, PpoLearner, use_one_thread
 from shapechanger.transfer.learners.sac import CameraLearner
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
-from shapechanger.transfer.plan import ADAPTED_SOURCE_ARMS, Plan, Run
+from shapechanger.transfer.methods import MethodRun, load_method
+from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
 __all__ = [
     "RunResult",
-    "adapt_source",
     "learner_of",
     "load_result",
     "perform_run",
@@ -42,8 +43,6 @@ __all__ = [
 
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
-# The adapted source env of a run.
-_SOURCE: Final = "source.json"
 
 
 class RunResult(msgspec.Struct, frozen=True):
@@ -86,14 +85,12 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
         CorruptStudy: If its file cannot be read or belongs to another run.
     """
     path = run.folder(study) / _RESULT
-    trains = run.kind in ("source", "scratch", "fine-tune", *ADAPTED_SOURCE_ARMS)
-    if not path.exists() or (trains and not policy_path(plan, study, run).exists()):
+    if not path.exists() or (plan.trains(run.kind) and not policy_path(plan, study, run).exists()):
         return None
     remedy = f"delete {path.parent} to repeat that run"
     result = read_json(path, RunResult, remedy)
     steps = [evaluation.steps for evaluation in result.curve]
-    last = {"source": plan.source_steps, "scratch": plan.steps, "fine-tune": plan.steps}
-    complete = bool(steps) and steps[0] == 0 and steps[-1] == last.get(run.kind, 0)
+    complete = bool(steps) and steps[0] == 0 and steps[-1] == plan.last_step_of(run.kind)
     if result.run != run or result.seed != plan.seed_of(run) or not complete:
         raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
     return result
@@ -121,7 +118,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     curve: list[Evaluation] = []
 
     def on_evaluation(evaluation: Evaluation) -> None:
-        if run.kind != "source":
+        if run.kind != SOURCE:
             evaluation.value(plan.measure)  # A reward term that the env lacks is refused here.
         if not math.isfinite(evaluation.mean_return):
             raise StudyError(
@@ -131,69 +128,83 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         curve.append(evaluation)
         append_line(folder / _CURVE, evaluation)
 
-    learner = learner_of(plan.learner, plan.settings)
-    target = plan.target_of(run)
-
-    def source_policy() -> object:
-        if given is not None:
-            return learner.load(given)
-        return learner.load(policy_path(plan, Path(study), Run("source", run.index)))
-
-    if run.kind in ("random", "zero-action"):
+    if run.kind in NO_SKILL:
         on_evaluation(_evaluate_unskilled(plan, run))
-    elif run.kind == "zero-shot":
-        on_evaluation(learner.evaluate(target, source_policy(), plan.body_map))
+        policy = None
     else:
-        in_source = run.kind == "source" or run.kind in ADAPTED_SOURCE_ARMS
-        env, shown = (plan.task.source, run) if in_source else (target, Run("scratch", run.index))
-        if run.kind in ADAPTED_SOURCE_ARMS:
-            env = adapt_source(plan, run)
-            write_json(folder / _SOURCE, env)
-        tunes = run.kind == "fine-tune"
-        policy = learner.train(
-            env,
-            plan.source_steps if in_source else plan.steps,
-            plan.seed_of(run),
-            # Scratch and fine-tune share demonstrations: they differ only in where they start.
-            demonstrations=DemonstrationFile(
-                Path(study, "demonstrations", f"{shown.name}.npz"), plan.seed_of(shown)
-            ),
-            start=source_policy() if tunes else None,
-            body_map=plan.body_map if tunes else None,
-            only_last=in_source,
-            # The curve of an adapted-source run is its evaluation on the target.
-            on_evaluation=_ignore if run.kind in ADAPTED_SOURCE_ARMS else on_evaluation,
-            on_steps=report,
-        )
-        learner.save(policy, policy_path(plan, Path(study), run))
-        if run.kind in ADAPTED_SOURCE_ARMS:
-            on_evaluation(learner.evaluate(target, policy, plan.body_map))
+        context = _method_run(plan, run, Path(study), given, on_evaluation, report)
+        if run.kind == SOURCE:
+            policy = context.train(
+                context.source, context.source_steps, on_evaluation=context.report
+            )
+        else:
+            policy = load_method(run.kind).learn(context)
+        if policy is not None:
+            context.learner.save(policy, policy_path(plan, Path(study), run))
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
     write_json(folder / _RESULT, result)
 
 
-def adapt_source(plan: Plan, run: Run) -> EnvRef:
-    """Return the source of a run, randomised or identified; identification moves the target.
+def _method_run(
+    plan: Plan,
+    run: Run,
+    study: Path,
+    given: Path | None,
+    on_evaluation: OnEvaluation,
+    on_steps: ReportSteps,
+) -> MethodRun:
+    """What a method is given for one of its runs."""
+    learner = learner_of(plan.learner, plan.settings)
+    target = plan.target_of(run)
+    done = 0
 
-    Args:
-        plan: Plan of the study.
-        run: The run.
+    def source_policy() -> object:
+        return learner.load(given or policy_path(plan, study, Run(SOURCE, run.index)))
 
-    Raises:
-        StudyError: If the target cannot adapt its source.
-    """
-    made = plan.target_of(run).make()
-    try:
-        target = made.unwrapped
-        if not isinstance(target, SourceAdaptation):
-            raise StudyError(f"{plan.task.target} cannot adapt {plan.task.source} to itself.")
-        if run.kind == "randomised":
-            more = target.randomised_source()
-        else:
-            more = target.identified_source(plan.seed_of(run))
-    finally:
-        made.close()
-    return plan.task.source.having(more)
+    def train(
+        env: EnvRef,
+        steps: int,
+        *,
+        start: Any = None,
+        body_map: BodyMap | None = None,
+        callback: Any = None,
+        on_evaluation: OnEvaluation | None = None,
+    ) -> Any:
+        nonlocal done
+        before = done
+        # All arms share the demonstrations of a target: they differ only in where they start.
+        shown = Run("scratch", run.index) if env == target else run
+        trained = learner.train(
+            env,
+            steps,
+            plan.seed_of(run),
+            demonstrations=DemonstrationFile(
+                study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown)
+            ),
+            start=start,
+            body_map=body_map,
+            only_last=env != target,
+            callback=callback,
+            on_evaluation=on_evaluation or _ignore,
+            on_steps=lambda now: on_steps(before + now),
+        )
+        done += steps
+        return trained
+
+    return MethodRun(
+        source=plan.task.source,
+        target=target,
+        body_map=plan.body_map,
+        learner=learner,
+        settings=plan.settings,
+        steps=plan.steps,
+        source_steps=plan.source_steps,
+        seed=plan.seed_of(run),
+        folder=run.folder(study),
+        source_policy=source_policy,
+        report=on_evaluation,
+        train=train,
+    )
 
 
 def _evaluate_unskilled(plan: Plan, run: Run) -> Evaluation:

@@ -1,0 +1,218 @@
+"""Transfer methods: what the arms of a study do with the source.
+
+A method is a small class with a name. Those that come with Shapechanger are listed here by module,
+so that naming one imports only that one. Others are found in three ways: by `register` in a module
+that is already imported, by an entry point of the group `shapechanger.methods`, or by a name such
+as `my_package:warm-start`, which imports `my_package` first, as Gymnasium's ids do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol
+
+from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer.env_ref import EnvRef
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.body_map import BodyMap
+    from shapechanger.transfer.env_ref import EnvTraits
+    from shapechanger.transfer.learners import Learner
+    from shapechanger.transfer.learners.evaluation import Evaluation
+    from shapechanger.transfer.learners.settings import Settings
+
+__all__ = ["Method", "MethodRun", "TrainFunction", "load_method", "method_names", "register"]
+
+_GROUP: Final = "shapechanger.methods"
+_HERE: Final = "shapechanger.transfer.methods"
+# In the order in which reports list them.
+_SHIPPED: Final = {
+    "scratch": f"{_HERE}.basic:Scratch",
+    "zero-shot": f"{_HERE}.basic:ZeroShot",
+    "fine-tune": f"{_HERE}.basic:FineTune",
+    "frozen-trunk": f"{_HERE}.frozen_trunk:FrozenTrunk",
+    "kickstart": f"{_HERE}.kickstart:Kickstart",
+    "evolution": f"{_HERE}.evolution:Evolution",
+    "randomised": f"{_HERE}.adapted_source:Randomised",
+    "identified": f"{_HERE}.adapted_source:Identified",
+}
+
+
+@dataclass(frozen=True)
+class MethodRun:
+    """One run of a method: the bodies, the budget, and how to train and to evaluate.
+
+    Attributes:
+        source: The source env.
+        target: The target env.
+        body_map: Map between their layouts.
+        learner: The learner.
+        settings: Its settings.
+        steps: Target steps that may be used, a multiple of an update.
+        source_steps: Source steps that a policy of the method's own may be trained for.
+        seed: Seed of the run; everything random follows from it.
+        folder: Folder of the run, for files of the method's own.
+        source_policy: Loads the source policy of this run's seed.
+        report: Records an evaluation on the target. Those of a method that learns on the target are
+            at the same steps as those of scratch.
+        train: Trains a policy, see `TrainFunction`.
+    """
+
+    source: EnvRef
+    target: EnvRef
+    body_map: BodyMap
+    learner: Learner
+    settings: Settings
+    steps: int
+    source_steps: int
+    seed: int
+    folder: Path
+    source_policy: Callable[[], Any]
+    report: Callable[[Evaluation], None]
+    train: TrainFunction
+
+    def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:
+        """Evaluate a policy on the target, without training it.
+
+        Args:
+            policy: The policy.
+            body_map: Map from its body to the target's; the study's if not given.
+        """
+        return self.learner.evaluate(self.target, policy, body_map or self.body_map)
+
+
+class TrainFunction(Protocol):
+    """Train a policy with the study's learner: the type of `MethodRun.train`."""
+
+    def __call__(
+        self,
+        env: EnvRef,
+        steps: int,
+        *,
+        start: Any = None,
+        body_map: BodyMap | None = None,
+        callback: Any = None,
+        on_evaluation: Callable[[Evaluation], None] | None = None,
+    ) -> Any:
+        """Train a policy.
+
+        Args:
+            env: The env to train in.
+            steps: Its steps.
+            start: A policy of another body to start from; None for a new one.
+            body_map: Map from that body to that of `env`.
+            callback: A callback of Stable-Baselines3 for the training; learners that are not of
+                Stable-Baselines3 refuse one.
+            on_evaluation: Called with each evaluation in `env`; None if there is no need of them.
+        """
+        ...
+
+
+class Method:
+    """A transfer method; subclass it and `register` the subclass.
+
+    Attributes:
+        name: Its name, as in `--arms`.
+        paper: Where it comes from.
+        uses_source_policy: Whether it starts from the source policy that the study trains.
+        uses_source: Whether it has cost source steps, which count in total steps.
+        trains: Whether it trains a policy, which `learn` returns.
+        learns_on_target: Whether it learns on the target, so that it has a learning curve there.
+    """
+
+    name: ClassVar[str]
+    paper: ClassVar[str] = ""
+    uses_source_policy: ClassVar[bool] = True
+    uses_source: ClassVar[bool] = True
+    trains: ClassVar[bool] = True
+    learns_on_target: ClassVar[bool] = True
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse a study that the method cannot be an arm of; by default none.
+
+        Args:
+            source: Traits of the source.
+            target: Traits of the target.
+            settings: Settings of the learner.
+
+        Raises:
+            StudyError: With the reason.
+        """
+
+    def learn(self, run: MethodRun) -> Any:
+        """Run the method once, and return its policy; None if it trains none.
+
+        Args:
+            run: The run.
+        """
+        raise NotImplementedError
+
+
+_registered: dict[str, type[Method]] = {}
+
+
+def register(method: type[Method]) -> type[Method]:
+    """Register a method under its name; may be used as a decorator.
+
+    Args:
+        method: The class.
+
+    Raises:
+        StudyError: If the name is empty, that of a kind of run, or taken.
+    """
+    name: str = getattr(method, "name", "")
+    if not name or not name.replace("-", "").replace("_", "").isalnum():
+        raise StudyError(
+            f"A method's name is made of letters, digits, - and _, and {method.__name__}'s is "
+            f"{name!r}."
+        )
+    taken = name in ("source", "random", "zero-action", *_SHIPPED)
+    other = _registered.get(name)
+    # A worker process may import the same class again under another module's name.
+    if taken or (other is not None and other.__qualname__ != method.__qualname__):
+        raise StudyError(
+            f"There is already a method {name!r}: give {method.__name__} another name."
+        )
+    _registered[name] = method
+    return method
+
+
+def method_names() -> tuple[str, ...]:
+    """Return the names of all methods that are shipped, installed or registered."""
+    installed = (point.name for point in entry_points(group=_GROUP))
+    return tuple(dict.fromkeys([*_SHIPPED, *installed, *_registered]))
+
+
+def load_method(name: str) -> Method:
+    """Return a method by its name.
+
+    Args:
+        name: Its name, or `module:name` to import a module first.
+
+    Raises:
+        UnknownName: If there is no such method or module.
+        StudyError: If a method that is installed cannot be loaded.
+    """
+    module, _, own = name.rpartition(":")
+    if module:
+        try:
+            import_module(module)
+        except ModuleNotFoundError as error:
+            raise UnknownName("method", name, method_names()) from error
+    if own in _SHIPPED:
+        home, _, attribute = _SHIPPED[own].partition(":")
+        return getattr(import_module(home), attribute)()
+    if own not in _registered:
+        for point in entry_points(group=_GROUP, name=own):
+            loaded: Any = point.load()
+            if not (isinstance(loaded, type) and issubclass(loaded, Method)):
+                raise StudyError(
+                    f"The entry point {own} of {_GROUP} is {loaded!r}, not a subclass of Method."
+                )
+            return loaded()
+        raise UnknownName("method", name, method_names())
+    return _registered[own]()

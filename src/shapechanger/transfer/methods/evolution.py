@@ -1,0 +1,122 @@
+"""Fine-tune along a path of bodies from the source to the target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.methods import Method, MethodRun
+
+__all__ = ["Evolution", "bodies_between"]
+
+# Share of the target steps that is spent on the bodies in between.
+_ON_THE_WAY: Final = 0.5
+
+
+class Evolution(Method):
+    """Fine-tune on one body after another, each a little more like the target.
+
+    Half of the target steps are spent on bodies between source and target, one for each evaluation
+    of the learning curve, and count as target steps. REvolveR chooses the next body by how well the
+    policy does; here the steps are equal.
+    """
+
+    name = "evolution"
+    paper = "X. Liu, D. Pathak and K. M. Kitani, REvolveR, ICML 2022"
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse bodies of two families, and learners other than PPO."""
+        if not isinstance(settings, PpoSettings):
+            raise StudyError(f"{self.name} needs PPO: leave this arm out.")
+        if not source.family or source.family != target.family:
+            raise StudyError(
+                f"{self.name} needs two bodies of one family, such as two ants: leave this arm out."
+            )
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train along the path, and then on the target."""
+        assert isinstance(run.settings, PpoSettings)  # As `require` has seen.
+        stage = run.settings.whole_updates(run.settings.eval_every)
+        n_stages = int(_ON_THE_WAY * run.steps) // stage
+        path = bodies_between(run.source, run.target, n_stages)
+        policy, env, onward = run.source_policy(), run.source, run.body_map
+        run.report(run.evaluate(policy))
+        for done, body in enumerate(path, 1):
+            policy = run.train(body, stage, start=policy, body_map=_map_between(env, body, run))
+            env, onward = body, _map_between(body, run.target, run)
+            evaluation = run.evaluate(policy, onward)
+            run.report(msgspec.structs.replace(evaluation, steps=done * stage))
+        return run.train(
+            run.target,
+            run.steps - len(path) * stage,
+            start=policy,
+            body_map=onward,
+            on_evaluation=_later(run.report, len(path) * stage),
+        )
+
+
+def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
+    """Return envs whose bodies lie at equal distances between two others.
+
+    Args:
+        source: An env of a family of bodies.
+        target: Another one of the same family.
+        count: Number of envs, without the two ends.
+
+    Raises:
+        StudyError: If the bodies are not of one family.
+    """
+    both = [source.make(), target.make()]
+    try:
+        start, end = (env.unwrapped for env in both)
+        if not (
+            isinstance(start, HasBodyFamily)
+            and isinstance(end, HasBodyFamily)
+            and start.family_name == end.family_name
+        ):
+            raise StudyError(f"{source} and {target} are not of one family of bodies.")
+        return [
+            target.having(start.arguments_towards(end, k / (count + 1)))
+            for k in range(1, count + 1)
+        ]
+    finally:
+        for env in both:
+            env.close()
+
+
+def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
+    """The study's map where the layouts change as from source to target, else one by name."""
+    layouts: list[Any] = []
+    for ref in (one, other):
+        made = ref.make()
+        layouts.append(layouts_of(made))
+        made.close()
+    (seen, acted), (sees, acts) = layouts
+    planned = run.body_map
+    if (seen, acted) == (sees, acts):
+        return BodyMap.identity(seen, acted)
+    if (seen, sees, acted, acts) == (
+        planned.source_observation,
+        planned.target_observation,
+        planned.source_action,
+        planned.target_action,
+    ):
+        return planned
+    return BodyMap.between(seen, sees, acted, acts)
+
+
+def _later(report: Callable[[Evaluation], None], steps: int) -> Callable[[Evaluation], None]:
+    """Report evaluations after the first as so many steps later."""
+
+    def report_later(evaluation: Evaluation) -> None:
+        if evaluation.steps > 0:
+            report(msgspec.structs.replace(evaluation, steps=evaluation.steps + steps))
+
+    return report_later

@@ -1,0 +1,61 @@
+"""Fine-tune with a frozen trunk: only the layers that depend on the body learn."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from stable_baselines3.common.callbacks import BaseCallback
+from torch import nn
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.env_ref import EnvTraits
+from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.methods import Method, MethodRun
+
+__all__ = ["FrozenTrunk"]
+
+_LEAST_LAYERS = 2
+
+
+class FrozenTrunk(Method):
+    """Fine-tune the first and the last layer of the policy, and keep those between.
+
+    The first layer reads the body's sensors and the last one moves its motors; what lies between
+    holds the skill, if it can be told apart from the body. The value network learns as a whole.
+    """
+
+    name = "frozen-trunk"
+    paper = "C. Devin and others, Learning Modular Neural Network Policies, ICRA 2017"
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse learners other than PPO, and networks without a layer in the middle."""
+        del source, target
+        if not isinstance(settings, PpoSettings) or len(settings.net_arch) < _LEAST_LAYERS:
+            raise StudyError(
+                f"{self.name} needs PPO with at least {_LEAST_LAYERS} hidden layers: leave this "
+                "arm out."
+            )
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train on the target, starting from the source policy."""
+        return run.train(
+            run.target,
+            run.steps,
+            start=run.source_policy(),
+            body_map=run.body_map,
+            callback=_Freeze(),
+            on_evaluation=run.report,
+        )
+
+
+class _Freeze(BaseCallback):
+    """Excludes the hidden layers after the first from the optimiser's steps."""
+
+    def _on_training_start(self) -> None:
+        hidden = cast("Any", self.model.policy).mlp_extractor.policy_net
+        linear = [layer for layer in hidden if isinstance(layer, nn.Linear)]
+        for layer in linear[1:]:
+            layer.requires_grad_(False)
+
+    def _on_step(self) -> bool:
+        return True

@@ -1,0 +1,170 @@
+"""What the shipped methods change in a training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.learners.settings import learner_settings
+from shapechanger.transfer.methods import kickstart
+from shapechanger.transfer.methods.evolution import bodies_between
+from shapechanger.transfer.methods.kickstart import MappedTeacher
+from shapechanger.transfer.plan import Run, TransferTask
+from shapechanger.transfer.runs import policy_path
+from shapechanger.transfer.study import Study, run_study
+from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
+
+ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
+_DEEP = msgspec.structs.replace(TINY_NORMALISED, net_arch=(8, 8))
+_LEARNING = ("fine-tune", "frozen-trunk", "kickstart", "evolution")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
+    """A tiny study of the methods that learn on the target, and its folder."""
+    out = tmp_path_factory.mktemp("methods") / "study"
+    plan = tiny_plan(_DEEP, arms=("scratch", *_LEARNING), steps=128, source_steps=32)
+    return run_study(plan, out, executor=Serial()), out
+
+
+def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
+    made, out = study
+    return dict(load_policy(policy_path(made.plan, out, Run(kind, 0))).model.policy.state_dict())
+
+
+def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
+    """So that they can be compared; every arm has a summary."""
+    made, _ = study
+    for kind in ("scratch", *_LEARNING):
+        assert [e.steps for e in made.of(kind)[0].curve] == [0, 32, 64, 96, 128], kind
+    assert set(made.summaries) == set(_LEARNING)
+
+
+def test_they_start_where_the_source_policy_does(study: tuple[Study, Path]) -> None:
+    """All but kickstart, which starts with a new policy."""
+    made, _ = study
+    starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
+    assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]
+
+
+def test_a_frozen_trunk_stays(study: tuple[Study, Path]) -> None:
+    """The second layer is the source's, and all others have learned."""
+    source, frozen = _weights(study, "source"), _weights(study, "frozen-trunk")
+    tuned = _weights(study, "fine-tune")
+    trunk = "mlp_extractor.policy_net.2.weight"
+    assert torch.equal(frozen[trunk], source[trunk])
+    assert not torch.equal(tuned[trunk], source[trunk])
+    for name in ("mlp_extractor.policy_net.0.weight", "action_net.weight", "log_std"):
+        assert not torch.equal(frozen[name], source[name]), name
+    assert not torch.equal(
+        frozen["mlp_extractor.value_net.2.weight"], source["mlp_extractor.value_net.2.weight"]
+    )
+
+
+def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It comes nearer to the source policy's actions than the same training without that weight."""
+    settings = msgspec.structs.replace(
+        TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
+    )
+    plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
+    monkeypatch.setattr(kickstart, "_UNTIL", 1e9)  # The weight stays.
+    observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
+    away: list[float] = []
+    for weight in (0.0, 1.0):
+        monkeypatch.setattr(kickstart, "_WEIGHT", weight)
+        out = tmp_path / f"weight-{weight:g}"
+        run_study(plan, out, executor=Serial())
+
+        def acts(kind: str, out: Path = out) -> Any:
+            return load_policy(policy_path(plan, out, Run(kind, 0))).act
+
+        shown = MappedTeacher(acts("source"), plan.body_map)(observations)
+        away.append(float(np.abs(acts("kickstart")(observations) - shown).mean()))
+    assert away[1] < 0.8 * away[0], away
+
+
+def test_actions_to_be_learned_are_not_taught() -> None:
+    """A motor that the source lacks has no teacher, unless a rule gives it one."""
+    source, target = ANT.make(), EXTENDED.make()
+    layouts = [
+        getattr(env.unwrapped, f"{side}_layout")
+        for side in ("observation", "action")
+        for env in (source, target)
+    ]
+    crossing = BodyMap.between(*layouts, rules={"foot_*/motor": "learn"})
+    teacher = MappedTeacher(lambda observations: np.ones((len(observations), 8)), crossing)
+    assert teacher.taught.sum() == 8
+    shown = teacher(np.zeros((3, target.observation_space.shape[0])))  # pyright: ignore[reportOptionalSubscript]
+    assert shown.shape == (3, 12)
+    assert (shown[:, teacher.taught] == 1.0).all()
+
+
+def test_bodies_between_grow() -> None:
+    """From a small pole to a big one in equal steps; the two ends are left out."""
+    lengths = []
+    for ref in bodies_between(SMALL, BIG, 2):
+        made = ref.make()
+        pole = made.unwrapped.model.geom("cpole")  # type: ignore[attr-defined]
+        lengths.append(2.0 * float(pole.size[1]))
+        made.close()
+    np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
+
+
+def test_bodies_between_may_have_other_spaces() -> None:
+    """An ant with weak feet lies between an ant without and one with."""
+    (between,) = bodies_between(ANT, EXTENDED, 1)
+    made = between.make()
+    assert made.action_space.shape == (12,)
+    made.close()
+    (back,) = bodies_between(EXTENDED, ANT, 1)
+    made = back.make()
+    assert made.action_space.shape == (12,)
+    made.close()
+
+
+def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
+    """Ant to ExtendedAnt by evolution, with a rule of the study for the new motors."""
+    plan = tiny_plan(
+        TINY_NORMALISED,
+        task=TransferTask(ANT, EXTENDED),
+        rules={"foot_*/motor": "copy ankle_*/motor"},
+        arms=("scratch", "evolution"),
+        steps=64,
+        source_steps=32,
+    )
+    study = run_study(plan, tmp_path / "study", executor=Serial())
+    assert [e.steps for e in study.of("evolution")[0].curve] == [0, 32, 64]
+
+
+def test_bodies_of_two_families_have_no_path() -> None:
+    """Nor has an env without a family."""
+    with pytest.raises(StudyError, match="not of one family"):
+        bodies_between(ANT, BIG, 1)
+    finger = EnvRef("shapechanger/Finger-v1")
+    task = TransferTask(finger, finger.having({"gap": "real-like"}))
+    with pytest.raises(StudyError, match="evolution needs two bodies of one family"):
+        tiny_plan(task=task, arms=("scratch", "evolution"))
+
+
+@pytest.mark.parametrize("arm", ["frozen-trunk", "kickstart", "evolution"])
+def test_clones_are_refused(arm: str) -> None:
+    """Before anything is recorded: these methods are PPO's."""
+    cars = TransferTask(EnvRef("shapechanger/Car-v1"), EnvRef("shapechanger/Tank-v1"))
+    with pytest.raises(StudyError, match=f"{arm} needs PPO"):
+        tiny_plan(learner_settings("cloning"), task=cars, arms=("scratch", arm))  # type: ignore[arg-type]
+
+
+def test_a_network_without_a_trunk_is_refused() -> None:
+    """One hidden layer is both the first and the last."""
+    with pytest.raises(StudyError, match="at least 2 hidden layers"):
+        tiny_plan(TINY, arms=("scratch", "frozen-trunk"))

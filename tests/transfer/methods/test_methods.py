@@ -1,0 +1,154 @@
+"""Methods by name: shipped ones, those of plug-ins, and what is refused."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer import methods
+from shapechanger.transfer.executor import Processes, Serial
+from shapechanger.transfer.methods import Method, MethodRun, load_method, method_names, register
+from shapechanger.transfer.plan import ARMS, Run
+from shapechanger.transfer.study import run_study
+from tests.transfer.studies import tiny_plan
+
+_PLUGIN = '''
+from shapechanger.transfer.methods import Method, register
+
+@register
+class Patient(Method):
+    """Learn the target from the start, as scratch does."""
+
+    name = "patient"
+    uses_source_policy = False
+    uses_source = False
+
+    def learn(self, run):
+        return run.train(run.target, run.steps, on_evaluation=run.report)
+'''
+
+
+@pytest.fixture
+def no_other(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[Method]]:
+    """An empty registry, as at the start of a program."""
+    found: dict[str, type[Method]] = {}
+    monkeypatch.setattr(methods, "_registered", found)
+    return found
+
+
+@pytest.fixture
+def plugin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_other: dict[str, type[Method]]
+) -> str:
+    """Name of a method in a module that nobody has imported."""
+    (tmp_path / "my_methods.py").write_text(_PLUGIN)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.delitem(sys.modules, "my_methods", raising=False)
+    return "my_methods:patient"
+
+
+@pytest.mark.parametrize("name", method_names())
+def test_shipped_methods_have_their_names(name: str) -> None:
+    """Each is found, says its name and what it does; all but the simplest name a paper."""
+    method = load_method(name)
+    assert method.name == name
+    assert type(method).__doc__
+    assert method.paper or name in ("scratch", "zero-shot")
+
+
+def test_a_name_that_does_not_exist(no_other: dict[str, type[Method]]) -> None:
+    """The nearest one is suggested, and a module that is missing is no crash."""
+    with pytest.raises(UnknownName, match="'kickstart'"):
+        load_method("kickstarts")
+    with pytest.raises(UnknownName, match="no_such_module:patient"):
+        load_method("no_such_module:patient")
+
+
+def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
+    """Two methods of one name would share a folder; the same class again is no other."""
+
+    class First(Method):
+        name = "mine"
+
+    class Second(Method):
+        name = "mine"
+
+    class Random(Method):
+        name = "random"
+
+    class Spaced(Method):
+        name = "my method"
+
+    assert register(First) is First
+    assert register(First) is First
+    with pytest.raises(StudyError, match="already a method 'mine'"):
+        register(Second)
+    with pytest.raises(StudyError, match="already a method 'random'"):
+        register(Random)
+    with pytest.raises(StudyError, match="made of letters"):
+        register(Spaced)
+    assert isinstance(load_method("mine"), First)
+
+
+def test_methods_of_other_packages(
+    monkeypatch: pytest.MonkeyPatch, no_other: dict[str, type[Method]], plugin: str
+) -> None:
+    """An entry point is a method's name; one that is no method is refused."""
+    points = {
+        "patient": EntryPoint("patient", "my_methods:Patient", methods._GROUP),
+        "broken": EntryPoint("broken", "pathlib:Path", methods._GROUP),
+    }
+
+    def installed(group: str, name: str = "") -> list[EntryPoint]:
+        assert group == "shapechanger.methods"
+        return [point for key, point in points.items() if name in ("", key)]
+
+    monkeypatch.setattr(methods, "entry_points", installed)
+    assert load_method("patient").name == "patient"
+    assert {"patient", "broken"} < set(method_names())
+    with pytest.raises(StudyError, match="not a subclass of Method"):
+        load_method("broken")
+
+
+def test_a_method_of_ones_own_is_an_arm(plugin: str, tmp_path: Path) -> None:
+    """In other processes too, which import its module; it does what scratch does."""
+    plan = tiny_plan(arms=("scratch", plugin), steps=32)
+    study = run_study(plan, tmp_path / "study", executor=Processes(1))
+    assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", plugin}
+    assert (tmp_path / "study" / "runs" / "my_methods.patient-0" / "policy.safetensors").exists()
+    ours, theirs = study.of(plugin)[0], study.of("scratch")[0]
+    assert [e.steps for e in ours.curve] == [e.steps for e in theirs.curve] == [0, 32]
+    assert ours.seed != theirs.seed
+    assert study.summaries[plugin].source_steps == 0
+
+
+def test_a_study_grows_by_arms(tmp_path: Path) -> None:
+    """Runs that have ended count, and a smaller study in a larger one's folder is refused."""
+    first = tiny_plan(steps=32)
+    run_study(first, tmp_path / "study", executor=Serial())
+    grown = tiny_plan(steps=32, arms=(*ARMS, "kickstart"))
+    assert grown.extends(first)
+    assert not first.extends(grown)
+    assert not first.extends(first)
+
+
+def test_seeds_do_not_depend_on_other_arms() -> None:
+    """Nor on their order; those of a plug-in follow from its name."""
+    small, large = tiny_plan(), tiny_plan(arms=("scratch", "kickstart", "fine-tune"))
+    assert small.seed_of(Run("fine-tune", 1)) == large.seed_of(Run("fine-tune", 1))
+    kinds = ("scratch", "fine-tune", "kickstart", "evolution", "a:b")
+    assert len({small.seed_of(Run(kind, 0)) for kind in kinds}) == len(kinds)
+
+
+def test_a_method_must_say_what_it_does() -> None:
+    """The base class does nothing."""
+    run: Any = None
+    with pytest.raises(NotImplementedError):
+        Method().learn(run)
+    assert MethodRun.__doc__
