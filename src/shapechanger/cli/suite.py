@@ -8,6 +8,7 @@ import re
 import shlex
 import sys
 import tomllib
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
@@ -20,19 +21,21 @@ from rich.table import Table
 from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
 from shapechanger.cli.env_arguments import default_learner, driven, env_ref, require_seed
 from shapechanger.cli.transfer import run_steps, write_study_report
-from shapechanger.errors import StudyError, UnknownName
+from shapechanger.errors import RenderError, StudyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
+    from shapechanger.reports.suite import FilmStrip
     from shapechanger.transfer.learners.settings import Settings
     from shapechanger.transfer.plan import Plan, TransferTask
-    from shapechanger.transfer.study import TaskTraits
+    from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
 __all__ = ["SuiteFile", "load_suite", "shipped_suites", "suite_tasks"]
 
 _SHIPPED: Final = Path(__file__).parent / "suites"
 _SUMMARY: Final = "suite.json"
+_FILM: Final = "film.mp4"
 _FILE_WIDTH: Final = 200
 
 
@@ -214,9 +217,8 @@ class Suite:
     def run(self) -> None:
         """Run the studies, write their reports, and print the joint table."""
         from shapechanger.transfer.executor import Processes
-        from shapechanger.transfer.files import write_json
         from shapechanger.transfer.study import inspect_task, unfinished_runs
-        from shapechanger.transfer.suite import open_study_folder, run_in_suite, study_outcomes
+        from shapechanger.transfer.suite import open_study_folder, run_in_suite
 
         suite = load_suite(self.name)
         require_seed(suite.seed if self.seed is None else self.seed)
@@ -229,7 +231,7 @@ class Suite:
         # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = Processes(self.workers)
-        found: list[StudyOutcome] = []
+        page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
             traits = inspect_task(tasks[name])
             plan = self._plan(suite, tasks[name], traits)
@@ -248,9 +250,9 @@ class Suite:
             except KeyboardInterrupt:
                 raise Interrupted(f"Stopped. Go on with: {command}") from None
             write_study_report(study, folder)
-            found += study_outcomes({name: study})
-            write_json(out / _SUMMARY, found)
-            console.print(f"wrote {folder / 'report.html'}", soft_wrap=True)
+            page.add(name, study)
+            console.print(f"wrote {folder / 'report.html'} and {page.path}", soft_wrap=True)
+        found = page.outcomes()
         console.print(_table(found))
         halves = sum(outcome.halves for outcome in found)
         console.print(
@@ -277,6 +279,73 @@ class Suite:
             seed=suite.seed if self.seed is None else self.seed,
             measure=suite.measure,
             traits=traits,
+        )
+
+
+class _Page:
+    """The page of a suite, written again whenever a study has ended.
+
+    Attributes:
+        path: The page.
+    """
+
+    def __init__(
+        self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
+    ) -> None:
+        from shapechanger.transfer.files import read_json
+        from shapechanger.transfer.study import STUDY_FILE, Study
+
+        self.path = out / "index.html"
+        self._suite, self._name, self._out, self._tasks = suite, name, out, tasks
+        self._strips: dict[str, list[FilmStrip]] = {}
+        self._studies = {
+            one: read_json(out / one / STUDY_FILE, Study, f"delete {out / one}")
+            for one in tasks
+            if (out / one / STUDY_FILE).exists()
+        }
+
+    def add(self, name: str, study: Study) -> None:
+        """Add a study that has ended, or replace it, and write the page."""
+        from shapechanger.cli.films import film_study
+        from shapechanger.reports.suite import Sweep, write_suite_report
+        from shapechanger.transfer.files import write_json
+
+        self._studies[name] = study
+        for one in self._studies:
+            if one not in self._strips or one == name:
+                # Without a way to render, the page has no films.
+                with suppress(RenderError):
+                    self._strips[one] = film_study(
+                        self._studies[one], self._out / one, self._out / one / _FILM
+                    )
+        ordered = {one: self._studies[one] for one in self._tasks if one in self._studies}
+        swept = self._suite.sweep
+        write_suite_report(
+            self._name,
+            ordered,
+            self.path,
+            seeds=self._suite.seeds,
+            strips=self._strips,
+            films={one: f"{one}/{_FILM}" for one, strips in self._strips.items() if strips},
+            sweep=Sweep(
+                f"{swept.field} of {swept.edit.get('edit', 'the edit')}",
+                {
+                    one: value
+                    for one, value in zip(self._tasks, swept.values, strict=True)
+                    if one in ordered
+                },
+            )
+            if swept and len(self._suite.sources) == 1 and not self._suite.targets
+            else None,
+        )
+        write_json(self._out / _SUMMARY, self.outcomes())
+
+    def outcomes(self) -> list[StudyOutcome]:
+        """Return the outcome of each study, in the order of the suite."""
+        from shapechanger.transfer.suite import study_outcomes
+
+        return study_outcomes(
+            {one: self._studies[one] for one in self._tasks if one in self._studies}
         )
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
@@ -36,6 +36,7 @@ __all__ = [
     "joint_chart",
     "learning_curves",
     "scatter_chart",
+    "sweep_chart",
     "training_chart",
 ]
 
@@ -336,3 +337,44 @@ def _return_limits(study: Study) -> tuple[float, float]:
 def _tick_label(value: float, place: int | None) -> str:
     """Format a tick; `place` is matplotlib's."""
     return f"{value:,.10g}".replace("e+", "e")
+
+
+def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
+    """Plot the end of each arm over a number in which the targets of several studies differ.
+
+    A point is one seed; a line joins the means over seeds.
+
+    Args:
+        studies: The studies by that number.
+        xlabel: What the number is.
+    """
+    first = next(iter(studies.values()))
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        values = sorted(studies)
+        for arm in first.plan.arms:
+            style = _line_style(first, arm)
+            ends = [_ends(studies[value], arm) for value in values]
+            for value, end in zip(values, ends, strict=True):
+                axes.plot([value] * end.size, end, ".", color=style.colour, alpha=0.4, markersize=4)
+            axes.plot(
+                values,
+                [float(end.mean()) for end in ends],
+                color=style.colour,
+                linestyle=style.line,
+                marker=style.marker or "o",
+                markersize=4.5,
+                linewidth=2.0,
+                label=arm,
+            )
+        axes.set_xlabel(xlabel)
+        axes.set_ylabel(_axis_label(first))
+        figure.legend(loc="outside lower center", ncols=3, handlelength=2.5)
+
+    return _svg(_WIDE, draw)
+
+
+def _ends(study: Study, arm: str) -> NDArray[np.float64]:
+    """Mean of the last evaluations of each run of an arm."""
+    returns = study.curves(arm).returns
+    return returns[:, -min(study.plan.last_k, returns.shape[1]) :].mean(axis=1)

@@ -415,6 +415,12 @@ def caveats(study: Study) -> tuple[str, ...]:
             f"Each seed has its own target, whose {study.plan.individual} is the index of the "
             "seed: the intervals are over these, too."
         )
+    if len(study.looks) > 1:
+        looks = " and ".join(map(str, study.looks))
+        sentences.append(
+            f"Results were computed with {looks} seeds: unless the last number was declared before "
+            "the first results were seen, a 95 % interval covers less than 95 %."
+        )
     if study.plan.seeds < _FEW_SEEDS:
         sentences.append(
             f"With {study.plan.seeds} seeds the intervals are wide: no clear difference does not "

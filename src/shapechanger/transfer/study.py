@@ -67,6 +67,8 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
         source_return: Mean return of the source policies in the source, one for each seed; empty
             if a policy was given.
         summaries: The measures of each arm but scratch.
+        looks: Numbers of seeds at which the result was computed, the present one last. More than
+            one means that seeds were added when results could be seen.
     """
 
     plan: Plan
@@ -76,6 +78,7 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     runs: tuple[RunResult, ...]
     source_return: tuple[float, ...]
     summaries: dict[str, Summary]
+    looks: tuple[int, ...] = ()
 
     def of(self, kind: str) -> list[RunResult]:
         """Return the runs of one kind, by index."""
@@ -313,8 +316,15 @@ def run_study(
         (executor or Processes()).run(jobs, on_progress)
     results = [load_result(plan, out, run) for run in plan.runs()]
     study = _study(plan, [result for result in results if result is not None], command, shift)
+    study = msgspec.structs.replace(study, looks=_looks(plan, out / STUDY_FILE))
     write_json(out / STUDY_FILE, study)
     return study
+
+
+def _looks(plan: Plan, before: Path) -> tuple[int, ...]:
+    """Numbers of seeds at which this study has been evaluated, with the present one."""
+    looked = read_json(before, Study, f"delete {before}").looks if before.exists() else ()
+    return looked if looked[-1:] == (plan.seeds,) else (*looked, plan.seeds)
 
 
 def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:

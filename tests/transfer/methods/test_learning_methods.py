@@ -19,6 +19,7 @@ from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.methods import kickstart
 from shapechanger.transfer.methods.evolution import bodies_between
 from shapechanger.transfer.methods.kickstart import MappedTeacher
+from shapechanger.transfer.methods.shuffled_map import shuffle
 from shapechanger.transfer.plan import Run, TransferTask
 from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import Study, run_study
@@ -168,3 +169,31 @@ def test_a_network_without_a_trunk_is_refused() -> None:
     """One hidden layer is both the first and the last."""
     with pytest.raises(StudyError, match="at least 2 hidden layers"):
         tiny_plan(TINY, arms=("scratch", "frozen-trunk"))
+
+
+def test_a_shuffled_map_has_the_same_rules() -> None:
+    """Each at another entry, of the same shape; those that copy nothing stay."""
+    source, target = ANT.make(), EXTENDED.make()
+    layouts = [
+        getattr(env.unwrapped, f"{side}_layout")
+        for side in ("observation", "action")
+        for env in (source, target)
+    ]
+    right = BodyMap.between(*layouts)
+    wrong = shuffle(right, np.random.default_rng(0))
+    for side in ("observation", "action"):
+        ours, theirs = getattr(wrong, side), getattr(right, side)
+        assert [entry.feature for entry in ours] == [entry.feature for entry in theirs]
+        assert sorted(str(e.rule) for e in ours) == sorted(str(e.rule) for e in theirs)
+        moved = sum(a.rule != b.rule for a, b in zip(ours, theirs, strict=True))
+        assert moved > len(ours) // 2
+    assert shuffle(right, np.random.default_rng(0)) == wrong
+
+
+def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) -> None:
+    """It is an arm as any other, and does not start where fine-tuning does."""
+    made, _ = study
+    plan = tiny_plan(_DEEP, arms=("scratch", "shuffled-map"), steps=32, source_steps=32)
+    shuffled = run_study(plan, tmp_path / "study", executor=Serial())
+    start = shuffled.of("shuffled-map")[0].curve[0]
+    assert start.mean_return != made.of("fine-tune")[0].curve[0].mean_return

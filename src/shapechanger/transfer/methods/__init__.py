@@ -37,6 +37,7 @@ _SHIPPED: Final = {
     "frozen-trunk": f"{_HERE}.frozen_trunk:FrozenTrunk",
     "kickstart": f"{_HERE}.kickstart:Kickstart",
     "evolution": f"{_HERE}.evolution:Evolution",
+    "shuffled-map": f"{_HERE}.shuffled_map:ShuffledMap",
     "randomised": f"{_HERE}.adapted_source:Randomised",
     "identified": f"{_HERE}.adapted_source:Identified",
 }

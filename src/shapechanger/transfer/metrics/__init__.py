@@ -31,6 +31,7 @@ from shapechanger.transfer.metrics.measures import (
     time_to_threshold,
     total_reward_gain,
 )
+from shapechanger.transfer.metrics.pooled import interquartile_mean, probability_of_improvement
 
 __all__ = [
     "DEFAULT_THRESHOLDS",
@@ -48,7 +49,9 @@ __all__ = [
     "estimate_ratio",
     "forward_transfer",
     "in_total_steps",
+    "interquartile_mean",
     "jumpstart",
+    "probability_of_improvement",
     "steps_to_reach",
     "summarise",
     "time_to_threshold",

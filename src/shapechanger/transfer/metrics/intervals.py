@@ -17,9 +17,9 @@ from scipy import stats
 
 from shapechanger.errors import StudyError
 
-__all__ = ["Estimate", "Method", "estimate_difference", "estimate_ratio", "undefined"]
+__all__ = ["Estimate", "IntervalKind", "estimate_difference", "estimate_ratio", "undefined"]
 
-Method = Literal["Welch's t", "studentised bootstrap", "none"]
+IntervalKind = Literal["Welch's t", "studentised bootstrap", "stratified bootstrap", "none"]
 
 # Numbers that differ by a smaller share of their size are equal up to rounding.
 _ROUNDING: Final = 1e-12
@@ -45,7 +45,7 @@ class Estimate(msgspec.Struct, frozen=True):
     value: float | None
     low: float | None = None
     high: float | None = None
-    method: Method = "none"
+    method: IntervalKind = "none"
     note: str = ""
 
 

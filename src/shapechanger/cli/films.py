@@ -1,0 +1,138 @@
+"""Film what the policies of a study do: source, zero-shot and every arm that was trained."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+
+import imageio.v3 as iio
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.cli.pictures import write_film
+from shapechanger.reports.suite import FilmStrip
+from shapechanger.reports.verdict import finals
+from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.env_ref import EnvRef, measures_of
+from shapechanger.transfer.learners.evaluation import Act
+from shapechanger.transfer.learners.ppo import EVALUATION_SEED
+from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.plan import SOURCE, Run
+from shapechanger.transfer.runs import learner_of, policy_path
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.study import Study
+
+__all__ = ["film_study"]
+
+_WIDTH, _HEIGHT = 240, 180
+_FILM_S: Final = 10.0
+_PICTURES: Final = 6
+_GAP: Final = 4
+
+
+class _Scene(NamedTuple):
+    """One policy in one env."""
+
+    name: str
+    env: EnvRef
+    act: Act
+    body_map: BodyMap | None
+
+
+def film_study(study: Study, folder: Path, film: Path | None = None) -> list[FilmStrip]:
+    """Play each arm's median seed for ten seconds, from the same start.
+
+    Args:
+        study: The study.
+        folder: Its folder, with the policies.
+        film: A film to write with all of them side by side; None for none.
+
+    Returns:
+        A strip for each; none for learners from pictures, or if the envs draw nothing.
+
+    Raises:
+        RenderError: If frames cannot be drawn here.
+        OutputError: If the film cannot be written.
+    """
+    if not isinstance(study.plan.settings, PpoSettings):
+        return []
+    strips: list[FilmStrip] = []
+    rows: list[NDArray[np.uint8]] = []
+    fps = 0.0
+    for scene in _scenes(study, folder):
+        frames, fps, measured = _play(scene)
+        if not frames:
+            return []
+        places = np.linspace(0, len(frames) - 1, _PICTURES).round().astype(int)
+        gap = np.full((_HEIGHT, _GAP, 3), 255, np.uint8)
+        pieces: list[NDArray[np.uint8]] = []
+        for place in places.tolist():
+            pieces += [gap, frames[place]]
+        row = np.concatenate(pieces[1:], axis=1)
+        jpeg = cast("Any", iio).imwrite("<bytes>", row, extension=".jpg", quality=80)
+        strips.append(FilmStrip(f"{scene.name}: {measured}", jpeg))
+        rows.append(np.stack(frames))
+    if film is not None and rows:
+        longest = max(len(row) for row in rows)
+        # An episode that ended stays at its last frame.
+        padded = [np.concatenate([row, row[-1:].repeat(longest - len(row), 0)]) for row in rows]
+        beside: NDArray[np.uint8] = np.concatenate(padded, axis=2)
+        write_film([*beside], film, fps)
+    return strips
+
+
+def _scenes(study: Study, folder: Path) -> list[_Scene]:
+    plan = study.plan
+    learner = learner_of(plan.learner, plan.settings)
+    scenes: list[_Scene] = []
+
+    def policy(run: Run) -> Act:
+        return learner.load(policy_path(plan, folder, run)).act
+
+    has_source = bool(study.of(SOURCE))
+    if has_source:
+        best = Run(SOURCE, _median(study, SOURCE))
+        scenes.append(_Scene("source, in the source", plan.task.source, policy(best), None))
+    for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
+        run = Run(arm, _median(study, arm))
+        target = plan.target_of(run)
+        if plan.trains(arm):
+            scenes.append(_Scene(arm, target, policy(run), None))
+        elif has_source:
+            source = policy(Run(SOURCE, run.index))
+            scenes.append(_Scene(arm, target, source, plan.body_map))
+    return scenes
+
+
+def _median(study: Study, kind: str) -> int:
+    """Index of the run in the middle."""
+    values = finals(study, kind)
+    if np.isnan(values).any():
+        return 0
+    return int(np.argsort(values, kind="stable")[(values.size - 1) // 2])
+
+
+def _play(scene: _Scene) -> tuple[list[NDArray[np.uint8]], float, str]:
+    """Return frames, their rate, and the default measure over them."""
+    env: Any = scene.env.make(render_mode="rgb_array", width=_WIDTH, height=_HEIGHT)
+    try:
+        fps = float(env.metadata["render_fps"])
+        measure = measures_of(env)[0]
+        acting = env if scene.body_map is None else MappedEnv(env, scene.body_map)
+        observation, _ = acting.reset(seed=EVALUATION_SEED)
+        frames: list[NDArray[np.uint8]] = [env.render()]
+        steps, total, over = round(_FILM_S * fps), 0.0, False
+        while not over and len(frames) < steps:
+            action = scene.act(np.asarray(observation)[None])[0]
+            observation, reward, terminated, truncated, info = acting.step(action)
+            value = float(info[measure.key]) if measure.key else float(reward)
+            total = value if measure.key and measure.over == "end" else total + value
+            frames.append(env.render())
+            over = terminated or truncated
+        value = total / steps if measure.over == "episode" else total
+        fell = f", ends after {len(frames) / fps:.1f} s" if over and len(frames) < steps else ""
+        unit = "" if measure.unit == "1" else f" {measure.unit}"
+        return frames, fps, f"{measure.name} {value:.2f}{unit}{fell}"
+    finally:
+        env.close()

@@ -1,0 +1,302 @@
+"""The page of a suite: a matrix of all pairs, methods by target, curves and films."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.reports.numbers import count, estimate_text, number
+from shapechanger.reports.page import jpeg_uri, render, svg_uri
+from shapechanger.reports.verdict import direction, finals, headline_arm, is_flat, verdict
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.files import write_atomic
+from shapechanger.transfer.metrics import (
+    Estimate,
+    Reference,
+    interquartile_mean,
+    probability_of_improvement,
+    total_reward_gain,
+)
+from shapechanger.transfer.study import Study
+
+__all__ = ["FilmStrip", "Sweep", "suite_html", "write_suite_report"]
+
+# Colours of the heat map at its ends, as red, green and blue; white lies between them.
+_HELPED: Final = (0, 114, 178)
+_HURT: Final = (213, 94, 0)
+# Share of the full colour that black text can be read on.
+_STRONGEST: Final = 0.55
+
+
+class FilmStrip(NamedTuple):
+    """What one policy does, as a row of pictures.
+
+    Attributes:
+        caption: Whose it is, and how well it did.
+        jpeg: The row as one JPEG file.
+    """
+
+    caption: str
+    jpeg: bytes
+
+
+class Sweep(NamedTuple):
+    """The number in which the targets of a suite differ.
+
+    Attributes:
+        name: What it is.
+        values: Its value in each study, by name of the study.
+    """
+
+    name: str
+    values: Mapping[str, float]
+
+
+def write_suite_report(
+    name: str,
+    studies: Mapping[str, Study],
+    path: Path,
+    *,
+    seeds: int,
+    strips: Mapping[str, Sequence[FilmStrip]] | None = None,
+    films: Mapping[str, str] | None = None,
+    sweep: Sweep | None = None,
+) -> None:
+    """Write the page of a suite.
+
+    Args:
+        name: Name of the suite.
+        studies: Its studies by name; at least one.
+        path: The file, such as `results/ants/index.html`; its folder must exist.
+        seeds: Number of seeds that the suite's file declares.
+        strips: Film strips of a study, by its name.
+        films: Film of a study, relative to the page, by the study's name.
+        sweep: The number in which targets differ; None if they differ in more.
+
+    Raises:
+        MissingExtra: If matplotlib or Jinja2 is not installed.
+        OutputError: If the file cannot be written.
+    """
+    page = suite_html(name, studies, seeds=seeds, strips=strips, films=films, sweep=sweep)
+    write_atomic(path, page.encode())
+
+
+def suite_html(
+    name: str,
+    studies: Mapping[str, Study],
+    *,
+    seeds: int,
+    strips: Mapping[str, Sequence[FilmStrip]] | None = None,
+    films: Mapping[str, str] | None = None,
+    sweep: Sweep | None = None,
+) -> str:
+    """Render the page of a suite; see `write_suite_report`."""
+    from shapechanger.reports.charts import learning_curves, sweep_chart
+
+    first = next(iter(studies.values()))
+    arm, plan = headline_arm(first), first.plan
+    swept = None
+    if sweep is not None:
+        by_value = {sweep.values[one]: study for one, study in studies.items()}
+        swept = svg_uri(sweep_chart(by_value, sweep.name))
+    return render(
+        "suite.html",
+        title=name,
+        arm=arm,
+        measure=plan.measure,
+        unit="" if plan.unit == "1" else plan.unit,
+        verdict=_verdict(studies),
+        looks=_looks(studies, seeds),
+        matrix=_matrix(studies),
+        sweep=swept,
+        methods=_methods(studies),
+        studies=[
+            {
+                "name": one,
+                "verdict": verdict(study),
+                "curves": svg_uri(learning_curves(study, "target")),
+                "film": (films or {}).get(one, ""),
+                "strips": [
+                    (strip.caption, jpeg_uri(strip.jpeg)) for strip in (strips or {}).get(one, ())
+                ],
+            }
+            for one, study in studies.items()
+        ],
+        settings=_settings(studies),
+    )
+
+
+def _verdict(studies: Mapping[str, Study]) -> str:
+    """Count the pairs on which transfer helped."""
+    found = [direction(_gain(study)) for study in studies.values()]
+    flat = sum(is_flat(study) for study in studies.values())
+    arm = headline_arm(next(iter(studies.values())))
+    words = (
+        f"Over {len(found)} studies, {arm} is ahead of scratch in {found.count('up')}, behind in "
+        f"{found.count('down')}, and without a clear difference in {found.count('unclear')}"
+    )
+    return f"{words}; {flat} show nothing." if flat else f"{words}."
+
+
+def _gain(study: Study) -> Estimate:
+    """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
+
+    That of an arm that is not trained on the target is its advantage at the start.
+    """
+    arm = study.curves(headline_arm(study))
+    if arm.n_evals > 1:
+        return total_reward_gain(arm, study.curves("scratch"))
+    return study.summaries[headline_arm(study)].in_target_steps.jumpstart
+
+
+def _looks(studies: Mapping[str, Study], declared: int) -> str:
+    """State whether the numbers of seeds are those that were declared."""
+    now = {study.plan.seeds for study in studies.values()}
+    grown = sorted({study.looks for study in studies.values() if len(study.looks) > 1})
+    text = f"The suite declares {declared} seeds"
+    if now == {declared}:
+        text += ", and every study has them."
+    else:
+        text += f"; the studies have {_listed(sorted(now))}, so these are interim results."
+    if grown:
+        text += (
+            " Results were also computed on the way, with "
+            f"{_listed([look for looks in grown for look in looks[:-1]])} seeds: intervals hold "
+            "for the declared number only."
+        )
+    return text
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return " and ".join(str(each) for each in dict.fromkeys(numbers))
+
+
+def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
+    """The pairs as a table of sources and targets; None where each target has one source."""
+    sources = list(dict.fromkeys(_name(study.plan.task.source) for study in studies.values()))
+    targets = list(dict.fromkeys(_name(study.plan.task.target) for study in studies.values()))
+    if len(sources) < 2 or len(studies) < 3:
+        return None
+    # The same bodies in the same order on both sides.
+    targets.sort(key=lambda one: sources.index(one) if one in sources else len(sources))
+    cells = {
+        (_name(study.plan.task.source), _name(study.plan.task.target)): (one, study)
+        for one, study in studies.items()
+    }
+    gains = {pair: _gain(study) for pair, (_, study) in cells.items()}
+    widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
+    rows: list[dict[str, Any]] = []
+    for source in sources:
+        row: list[dict[str, str] | None] = []
+        for target in targets:
+            if (source, target) not in cells:
+                row.append(None)
+                continue
+            one, study = cells[source, target]
+            gain = gains[source, target]
+            row.append(
+                {
+                    "name": one,
+                    "gain": estimate_text(gain, signed=True),
+                    "colour": _colour((gain.value or 0.0) / widest),
+                    "ends": ", ".join(
+                        f"{arm} {number(float(finals(study, arm).mean()), 2)}"
+                        for arm in study.plan.arms
+                    ),
+                }
+            )
+        rows.append({"source": source, "cells": row})
+    return {"targets": targets, "rows": rows}
+
+
+def _colour(share: float) -> str:
+    """CSS colour of a gain, from -1 to 1."""
+    full = _HELPED if share >= 0.0 else _HURT
+    strength = _STRONGEST * min(1.0, abs(share))
+    mixed = (round(255 + strength * (part - 255)) for part in full)
+    return "#{:02x}{:02x}{:02x}".format(*mixed)
+
+
+def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
+    """For each target, and for all together: every arm's scores and its chance to beat scratch."""
+    by_target: dict[str, list[Study]] = {}
+    for study in studies.values():
+        by_target.setdefault(_name(study.plan.task.target), []).append(study)
+    ends = {target: _score_ends(some) for target, some in by_target.items()}
+    rows: list[tuple[str, ...]] = []
+    for target, scores in ends.items():
+        rows += _method_rows(target, scores, len(by_target[target]))
+    if len(ends) > 1:
+        merged: dict[str, list[NDArray[np.float64]]] = {}
+        for scores in ends.values():
+            for arm, groups in scores.items():
+                merged.setdefault(arm, []).extend(groups)
+        rows += _method_rows("all targets", merged, len(studies))
+    return rows
+
+
+def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
+    """Final scores of each arm in studies of one target, whose scale they share.
+
+    0 is what takes no skill, as in each study, and 1 the end of the best arm of all.
+    """
+    values = {
+        arm: [finals(study, arm) for study in studies if arm in study.plan.arms]
+        for arm in dict.fromkeys(arm for study in studies for arm in study.plan.arms)
+    }
+    zero = max(next(iter(study.summaries.values())).reference.zero for study in studies)
+    one = max(float(group.mean()) for groups in values.values() for group in groups)
+    reference = Reference(zero, one)
+    if not reference.defined:
+        return {}
+    return {
+        arm: [(group - zero) / (one - zero) for group in groups] for arm, groups in values.items()
+    }
+
+
+def _method_rows(
+    target: str, scores: Mapping[str, list[NDArray[np.float64]]], n_studies: int
+) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for arm, groups in scores.items():
+        rng = np.random.default_rng(0)
+        better = "baseline"
+        if arm != "scratch" and len(groups) == n_studies:
+            chance = probability_of_improvement(groups, scores["scratch"], rng=rng)
+            better = estimate_text(chance)
+        elif arm != "scratch":
+            better = f"only in {len(groups)} of {n_studies} studies"
+        mean = estimate_text(interquartile_mean(groups, rng=rng))
+        runs = str(sum(group.size for group in groups))
+        rows.append((target, arm, runs, mean, better))
+    return rows
+
+
+def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
+    """What the studies have in common, and what they cost."""
+    plans = [study.plan for study in studies.values()]
+    first = next(iter(studies.values()))
+    hours = sum(run.wall_s for study in studies.values() for run in study.runs) / 3600.0
+    return [
+        ("Command", first.command or "called from Python"),
+        ("Learner", ", ".join(dict.fromkeys(plan.learner for plan in plans))),
+        ("Target steps", _listed([plan.steps for plan in plans])),
+        ("Source steps", _listed([plan.source_steps for plan in plans])),
+        ("Seed", _listed([plan.seed for plan in plans])),
+        ("Machine", first.machine),
+        ("Time", f"{number(hours, 1)} h for all runs; those that studies share count in each"),
+        ("Runs", count(sum(len(study.runs) for study in studies.values()))),
+        ("Versions", ", ".join(f"{name} {version}" for name, version in plans[0].versions.items())),
+    ]
+
+
+def _name(env: EnvRef) -> str:
+    """The env's name with its arguments, without namespace and version."""
+    short = env.id.rpartition("/")[2].removesuffix("-v1")
+    lenses = env.kwargs.get("lenses") or ""
+    extra = ", ".join(str(value) for key, value in env.kwargs.items() if key != "lenses")
+    return " ".join(filter(None, (short, str(lenses) if lenses else "", extra)))

@@ -1,0 +1,67 @@
+"""A control: fine-tune through a body map whose entries are shuffled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from shapechanger.layout import Layout
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.body_map.rules import Copy, MapEntry
+from shapechanger.transfer.methods import Method, MethodRun
+
+__all__ = ["ShuffledMap", "shuffle"]
+
+_WHY = "shuffled"
+
+
+class ShuffledMap(Method):
+    """Fine-tune through a body map that confuses all entries: a control of what the map is worth.
+
+    Weights of the source policy that help whatever their inputs and outputs mean help here, too.
+    """
+
+    name = "shuffled-map"
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train on the target, starting from the source policy."""
+        return run.train(
+            run.target,
+            run.steps,
+            start=run.source_policy(),
+            body_map=shuffle(run.body_map, np.random.default_rng(run.seed)),
+            on_evaluation=run.report,
+        )
+
+
+def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
+    """Return a body map with the same rules, each at another entry.
+
+    Args:
+        body_map: The map.
+        rng: Draws the order.
+    """
+    return msgspec.structs.replace(
+        body_map,
+        observation=_shuffled(body_map.observation, body_map.source_observation, rng),
+        action=_shuffled(body_map.action, body_map.target_action, rng),
+    )
+
+
+def _shuffled(
+    entries: Sequence[MapEntry], layout: Layout, rng: np.random.Generator
+) -> tuple[MapEntry, ...]:
+    """Exchange the rules that copy features of the same shape; the others stay."""
+    places: dict[tuple[int, ...], list[int]] = {}
+    for i, entry in enumerate(entries):
+        if isinstance(entry.rule, Copy):
+            places.setdefault(layout[entry.feature].shape, []).append(i)
+    result = list(entries)
+    for alike in places.values():
+        order: list[int] = rng.permutation(alike).tolist()
+        for place, taken in zip(alike, order, strict=True):
+            result[place] = MapEntry(entries[place].feature, entries[taken].rule, _WHY)
+    return tuple(result)

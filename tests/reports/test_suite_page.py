@@ -1,0 +1,128 @@
+"""The page of a suite: every pair in its place, and honest about its seeds."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.reports.suite import FilmStrip, Sweep, suite_html, write_suite_report
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.study import Study
+from tests.reports.studies import make_study, rising
+from tests.reports.test_report_page import EVIL, Reader
+
+ANTS = [EnvRef(f"shapechanger/{name}-v1") for name in ("Ant", "BigAnt", "ExtendedAnt")]
+
+
+def _pairs(**more: tuple[int, ...]) -> dict[str, Study]:
+    """Six pairs of three ants: transfer helps, but from BigAnt to Ant it hurts."""
+    studies: dict[str, Study] = {}
+    for source, target in permutations(ANTS, 2):
+        worse = rising(-200.0, 100.0, 3000.0, seed=3)
+        study = make_study(source=source, target=target)
+        if (source, target) == (ANTS[1], ANTS[0]):
+            study = make_study(source=source, target=target, fine_tune=worse)
+        name = f"{source.id[13:-3]}-to-{target.id[13:-3]}"
+        studies[name] = msgspec.structs.replace(study, **more)
+    return studies
+
+
+def test_every_pair_has_its_cell() -> None:
+    """Rows are sources, columns targets; a cell leads to the study's own report."""
+    page = suite_html("ants", _pairs(), seeds=5)
+    reader = Reader(page)
+    links = [value for name, value in reader.attributes if name == "href"]
+    for source, target in permutations(("Ant", "BigAnt", "ExtendedAnt"), 2):
+        assert links.count(f"{source}-to-{target}/report.html") == 2
+    assert reader.words.count("same body") == 3
+    assert "ahead of scratch in 5, behind in 1, and without a clear difference in 0" in reader.words
+    assert reader.headings[1] == "Fine-tune against scratch"
+
+
+def test_colours_follow_the_gain() -> None:
+    """Blue where transfer helps and orange where it hurts; text stays legible on both."""
+    page = suite_html("ants", _pairs(), seeds=5)
+    colours = [part.partition('"')[0] for part in page.split('style="background: #')[1:]]
+    assert len(colours) == 6
+    parts = [tuple(int(colour[i : i + 2], 16) for i in (0, 2, 4)) for colour in colours]
+    assert sum(red > blue for red, _, blue in parts) == 1
+    assert all(sum(part) > 300 for part in parts)
+
+
+def test_methods_are_compared_by_target_and_over_all() -> None:
+    """Interquartile means and the chance to beat scratch, with intervals."""
+    words = Reader(suite_html("ants", _pairs(), seeds=5)).words
+    assert words.count("all targets") == 3
+    assert words.count("baseline") == 4
+    assert "ExtendedAnt fine-tune 10" in words
+    assert "all targets fine-tune 30" in words
+
+
+def test_declared_seeds() -> None:
+    """The page says whether the number of seeds is the declared one, and whether anyone looked."""
+    assert "declares 5 seeds, and every study has them." in suite_html("a", _pairs(), seeds=5)
+    interim = suite_html("a", _pairs(), seeds=8)
+    assert "the studies have 5, so these are interim results" in interim
+    grown = suite_html("a", _pairs(looks=(3, 5)), seeds=5)
+    assert "Results were also computed on the way, with 3 seeds" in grown
+    assert "Results were also" not in suite_html("a", _pairs(looks=(5,)), seeds=5)
+
+
+def test_a_sweep_has_its_picture() -> None:
+    """One source, and targets that differ in one number: a chart in place of the matrix."""
+    studies = {
+        f"Ant-{factor:g}": make_study(target=EnvRef("shapechanger/Ant-v1", {"body": str(factor)}))
+        for factor in (0.5, 1.5, 2.0)
+    }
+    values = {name: float(name[4:]) for name in studies}
+    reader = Reader(suite_html("shank", studies, seeds=5, sweep=Sweep("factor", values)))
+    assert "Over the targets" in reader.headings
+    assert "Fine-tune against scratch" not in reader.headings
+
+
+def test_strips_and_films(tmp_path: Path) -> None:
+    """Pictures are in the page, films lie beside it."""
+    strips = {"Ant-to-BigAnt": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
+    path = tmp_path / "index.html"
+    write_suite_report(
+        "ants", _pairs(), path, seeds=5, strips=strips, films={"Ant-to-BigAnt": "a/film.mp4"}
+    )
+    reader = Reader(path.read_text())
+    assert ("href", "a/film.mp4") in reader.attributes
+    assert any(value.startswith("data:image/jpeg") for _, value in reader.attributes)
+    assert "zero-shot: 0.1 m/s" in reader.words
+    assert "Films" in reader.headings
+    assert "Films" not in Reader(suite_html("ants", _pairs(), seeds=5)).headings
+
+
+def test_names_cannot_run() -> None:
+    """Text is text."""
+    page = suite_html(EVIL, {EVIL: make_study(command=EVIL)}, seeds=5)
+    assert "<script" not in page
+
+
+def test_arms_that_only_some_studies_have() -> None:
+    """They are listed, and not compared over all."""
+    studies = _pairs()
+    studies["Ant-to-BigAnt"] = make_study(
+        source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune")
+    )
+    assert "only in 5 of 6 studies" in Reader(suite_html("ants", studies, seeds=5)).words
+
+
+def test_nothing_learned_has_no_scores() -> None:
+    """The table stays empty, and the verdict says that the studies show nothing."""
+    flat = rising(0.0, 0.0, 1e3, noise=0.0)
+    studies = {
+        "a": make_study(
+            scratch=flat, fine_tune=flat, zero_shot=flat[:, :1], random=np.zeros((5, 1))
+        )
+    }
+    words = Reader(suite_html("flat", studies, seeds=5)).words
+    assert "1 show nothing" in words
+    with pytest.raises(StopIteration):
+        suite_html("none", {}, seeds=5)
