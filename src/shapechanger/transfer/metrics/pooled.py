@@ -45,15 +45,10 @@ def interquartile_mean(
         StudyError: If there are no runs.
     """
     _require_runs(scores)
-
-    def trimmed(groups: _Groups) -> float:
-        mean: Any = stats.trim_mean(np.concatenate(groups), _TRIMMED)
-        return float(mean)
-
-    draws: list[float] = [
-        trimmed([_drawn(group, rng) for group in scores]) for _ in range(n_resamples)
-    ]
-    return _between(trimmed(scores), draws, confidence)
+    mean: Any = stats.trim_mean(np.concatenate(scores), _TRIMMED)
+    drawn = np.concatenate([_drawn(group, n_resamples, rng) for group in scores], axis=1)
+    means: Any = stats.trim_mean(drawn, _TRIMMED, axis=1)
+    return _between(float(mean), means, confidence)
 
 
 def probability_of_improvement(
@@ -83,18 +78,17 @@ def probability_of_improvement(
     if len(arm) != len(scratch):
         raise StudyError(f"There are {len(arm)} studies of the arm and {len(scratch)} of scratch.")
 
-    def above(ours: _Groups, theirs: _Groups) -> float:
-        shares: list[float] = []
-        for x, y in zip(ours, theirs, strict=True):
-            difference = np.subtract.outer(x, y)
-            shares.append(float(np.mean(0.5 + 0.5 * np.sign(difference))))
-        return float(np.mean(shares))
-
-    draws = [
-        above([_drawn(x, rng) for x in arm], [_drawn(y, rng) for y in scratch])
-        for _ in range(n_resamples)
+    chances = [
+        _chance(_drawn(x, n_resamples, rng), _drawn(y, n_resamples, rng))
+        for x, y in zip(arm, scratch, strict=True)
     ]
-    return _between(above(arm, scratch), draws, confidence)
+    value = np.mean([_chance(x[None], y[None]) for x, y in zip(arm, scratch, strict=True)])
+    return _between(float(value), np.mean(chances, axis=0), confidence)
+
+
+def _chance(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of the pairs along the last axes in which x is above y; equal ones count half."""
+    return 0.5 + 0.5 * np.sign(x[:, :, None] - y[:, None, :]).mean(axis=(1, 2))
 
 
 def _require_runs(groups: Sequence[NDArray[np.float64]]) -> None:
@@ -103,11 +97,13 @@ def _require_runs(groups: Sequence[NDArray[np.float64]]) -> None:
         raise StudyError("Each study needs at least one run.")
 
 
-def _drawn(group: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    return group[rng.integers(group.size, size=group.size)]
+def _drawn(
+    group: NDArray[np.float64], n_resamples: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    return group[rng.integers(group.size, size=(n_resamples, group.size))]
 
 
-def _between(value: float, draws: Sequence[float], confidence: float) -> Estimate:
+def _between(value: float, draws: NDArray[np.float64], confidence: float) -> Estimate:
     tail = (1.0 - confidence) / 2.0
-    low, high = (float(np.quantile(np.array(draws), q)) for q in (tail, 1.0 - tail))
+    low, high = (float(np.quantile(draws, q)) for q in (tail, 1.0 - tail))
     return Estimate(value, low, high, "stratified bootstrap")
