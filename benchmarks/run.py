@@ -25,6 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import (
+    atlas,
     cloning_real,
     console,
     corrections,
@@ -135,6 +136,11 @@ def demo() -> list[Row]:
 
 
 SUITES: dict[str, Callable[[], list[Row]]] = {
+    "atlas-ants": atlas.ants,
+    "atlas-pendulums": atlas.pendulums,
+    "atlas-shank": atlas.shank,
+    "atlas-controls": atlas.controls,
+    "atlas-claims": atlas.claims,
     "bodies": bodies,
     "cloning-real": cloning_real.real,
     "console": console.console,

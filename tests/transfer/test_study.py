@@ -200,9 +200,11 @@ def test_spaces_that_cannot_be_mapped_are_refused() -> None:
 @pytest.mark.parametrize("steps", [1, 31])
 def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
     """The message says how much is needed."""
-    with pytest.raises(StudyError, match=f"{steps} steps is smaller than one evaluation.*32"):
+    with pytest.raises(
+        StudyError, match=f"{steps} target steps is smaller than one evaluation.*32"
+    ):
         tiny_plan(steps=steps)
-    with pytest.raises(StudyError, match="smaller than one evaluation"):
+    with pytest.raises(StudyError, match="source steps is smaller than one evaluation"):
         tiny_plan(source_steps=0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, cast
@@ -21,7 +22,16 @@ from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["asked", "default_learner", "driven", "env_ref", "opened", "options_of", "require_seed"]
+__all__ = [
+    "asked",
+    "default_learner",
+    "driven",
+    "env_ref",
+    "opened",
+    "options_of",
+    "require_seed",
+    "settings_of",
+]
 
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
@@ -131,6 +141,33 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
     if not isinstance(options, dict):
         raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
     return cast("dict[str, Any]", options)
+
+
+def settings_of(given: Sequence[str]) -> dict[str, Any]:
+    """Parse settings of a learner.
+
+    Args:
+        given: Each as NAME=VALUE, with the value as in TOML: 3e-4, true or [64, 64].
+
+    Raises:
+        StudyError: If one has another form, or is given twice.
+    """
+    settings: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        try:
+            parsed = tomllib.loads(f"value = {value}") if equals and name else {}
+        except tomllib.TOMLDecodeError:
+            parsed = {}
+        if len(parsed) != 1:
+            raise StudyError(
+                f"A setting is written NAME=VALUE, such as learning_rate=3e-4 or "
+                f"net_arch=[64,64], not {text!r}."
+            )
+        if name in settings:
+            raise StudyError(f"--set names {name} more than once.")
+        settings[name] = parsed["value"]
+    return settings
 
 
 def require_seed(seed: int) -> None:

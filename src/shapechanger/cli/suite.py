@@ -26,7 +26,6 @@ from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.reports.suite import FilmStrip
-    from shapechanger.transfer.learners.settings import Settings
     from shapechanger.transfer.plan import Plan, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
@@ -265,13 +264,14 @@ class Suite:
 
     def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
         """The plan of one study."""
+        from shapechanger.transfer.learners.settings import change_settings
         from shapechanger.transfer.study import default_arms, make_plan
 
         learner = suite.learner or default_learner(task.target)
         return make_plan(
             task,
             learner,
-            _settings(learner, suite.settings),
+            change_settings(learner, suite.settings),
             seeds=suite.seeds if self.seeds is None else self.seeds,
             steps=suite.steps if self.steps is None else self.steps,
             source_steps=suite.source_steps if self.source_steps is None else self.source_steps,
@@ -347,28 +347,6 @@ class _Page:
         return study_outcomes(
             {one: self._studies[one] for one in self._tasks if one in self._studies}
         )
-
-
-def _settings(learner: str, changed: dict[str, Any]) -> Settings:
-    """The settings of a learner, some of them replaced.
-
-    Raises:
-        UnknownName: If the learner has no such setting.
-        StudyError: If a value is of the wrong type.
-    """
-    from shapechanger.transfer.learners.settings import learner_settings
-
-    settings = learner_settings(learner)
-    known: dict[str, Any] = msgspec.structs.asdict(settings)
-    for name in changed:
-        if name not in known:
-            raise UnknownName(f"setting of {learner}", name, known)
-    try:
-        return msgspec.convert(
-            {**msgspec.to_builtins(settings), **changed}, type(settings), strict=True
-        )
-    except msgspec.ValidationError as error:
-        raise StudyError(f"The settings of {learner} are wrong: {error}.") from None
 
 
 def _table(found: list[StudyOutcome]) -> Table:

@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
-from shapechanger.cli.env_arguments import default_learner, driven, env_ref, opened, require_seed
+from shapechanger.cli.env_arguments import (
+    default_learner,
+    driven,
+    env_ref,
+    opened,
+    require_seed,
+    settings_of,
+)
 from shapechanger.errors import MissingExtra, OutputError
 
 if TYPE_CHECKING:
@@ -38,6 +45,8 @@ class Train:
     """Env steps; the learner's own number if not given."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the env if not given."""
+    set: tuple[str, ...] = ()
+    """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     seed: int = 0
     """Seed of everything random."""
     tensorboard: Path | None = None
@@ -49,13 +58,13 @@ class Train:
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
-        from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
+        from shapechanger.transfer.learners.settings import PpoSettings, change_settings
         from shapechanger.transfer.runs import learner_of
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
         learner = self.learner or default_learner(env)
-        settings = learner_settings(learner)
+        settings = change_settings(learner, settings_of(self.set))
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
         suffix = ".safetensors" if isinstance(settings, PpoSettings) else ".zip"

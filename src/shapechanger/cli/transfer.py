@@ -21,6 +21,7 @@ from shapechanger.cli.env_arguments import (
     opened,
     options_of,
     require_seed,
+    settings_of,
 )
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
@@ -78,6 +79,8 @@ class Transfer:
     such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
     """Name of the learner's settings; those tuned for the target if not given."""
+    set: tuple[str, ...] = ()
+    """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     arms: tuple[str, ...] = ()
     """Methods to compare; scratch is required. `shapechanger methods` lists them, and module:name
     is one that a module of your own registers. The default is scratch, zero-shot and fine-tune;
@@ -167,11 +170,11 @@ class Transfer:
 
     def _plan(self, task: TransferTask, traits: TaskTraits) -> Plan:
         """The plan of the study."""
-        from shapechanger.transfer.learners.settings import learner_settings
+        from shapechanger.transfer.learners.settings import change_settings
         from shapechanger.transfer.study import default_arms, make_plan
 
         learner = self.learner or default_learner(task.target)
-        settings = learner_settings(learner)
+        settings = change_settings(learner, settings_of(self.set))
         steps, seeds = self.steps, self.seeds
         if self.quick:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)

@@ -18,12 +18,13 @@ from shapechanger.transfer.metrics import (
     Estimate,
     Reference,
     interquartile_mean,
+    jumpstart,
     probability_of_improvement,
     total_reward_gain,
 )
 from shapechanger.transfer.study import Study
 
-__all__ = ["FilmStrip", "Sweep", "suite_html", "write_suite_report"]
+__all__ = ["FilmStrip", "Sweep", "gain_over_scratch", "suite_html", "write_suite_report"]
 
 # Colours of the heat map at its ends, as red, green and blue; white lies between them.
 _HELPED: Final = (0, 114, 178)
@@ -132,7 +133,7 @@ def suite_html(
 
 def _verdict(studies: Mapping[str, Study]) -> str:
     """Count the pairs on which transfer helped."""
-    found = [direction(_gain(study)) for study in studies.values()]
+    found = [direction(gain_over_scratch(study)) for study in studies.values()]
     flat = sum(is_flat(study) for study in studies.values())
     arm = headline_arm(next(iter(studies.values())))
     words = (
@@ -142,15 +143,18 @@ def _verdict(studies: Mapping[str, Study]) -> str:
     return f"{words}; {flat} show nothing." if flat else f"{words}."
 
 
-def _gain(study: Study) -> Estimate:
+def gain_over_scratch(study: Study) -> Estimate:
     """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
 
     That of an arm that is not trained on the target is its advantage at the start.
+
+    Args:
+        study: The study.
     """
     arm = study.curves(headline_arm(study))
     if arm.n_evals > 1:
         return total_reward_gain(arm, study.curves("scratch"))
-    return study.summaries[headline_arm(study)].in_target_steps.jumpstart
+    return jumpstart(arm, study.curves("scratch"))
 
 
 def _looks(studies: Mapping[str, Study], declared: int) -> str:
@@ -187,7 +191,7 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
         (_name(study.plan.task.source), _name(study.plan.task.target)): (one, study)
         for one, study in studies.items()
     }
-    gains = {pair: _gain(study) for pair, (_, study) in cells.items()}
+    gains = {pair: gain_over_scratch(study) for pair, (_, study) in cells.items()}
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
     rows: list[dict[str, Any]] = []
     for source in sources:

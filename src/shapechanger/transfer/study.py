@@ -208,7 +208,7 @@ def make_plan(
         load_method(arm).require(traits.source, traits.target, settings)
     measured = _measure(traits.target, measure)
     wanted = settings.steps if steps is None else steps
-    require_budget(wanted, settings)
+    require_budget(wanted, settings, "target")
     budget = settings.whole_updates(wanted)
     if source_steps is None:
         source_steps = settings.source_steps or budget // 2
@@ -223,7 +223,7 @@ def make_plan(
             )
         source_budget, digest = origin.steps, _digest(source_policy)
     else:
-        require_budget(source_budget, settings)
+        require_budget(source_budget, settings, "source")
     layouts = (
         traits.source.observation_layout,
         traits.target.observation_layout,

@@ -233,19 +233,21 @@ def use_one_thread() -> None:
     torch.set_num_threads(1)
 
 
-def require_budget(steps: int, settings: Settings) -> None:
+def require_budget(steps: int, settings: Settings, which: str = "") -> None:
     """Refuse a budget that ends before the first evaluation.
 
     Args:
         steps: The budget.
         settings: Settings of the learner.
+        which: "target" or "source", where there are two budgets.
 
     Raises:
         StudyError: If it does.
     """
     if steps < settings.eval_every:
+        budget = f"{steps} {which} steps" if which else f"{steps} steps"
         raise StudyError(
-            f"A budget of {steps} steps is smaller than one evaluation, which comes every "
+            f"A budget of {budget} is smaller than one evaluation, which comes every "
             f"{settings.eval_every} steps: give at least that."
         )
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
@@ -16,6 +17,7 @@ __all__ = [
     "PpoSettings",
     "SacSettings",
     "Settings",
+    "change_settings",
     "learner_settings",
 ]
 
@@ -329,3 +331,27 @@ def learner_settings(name: str) -> Settings:
     if name not in LEARNERS:
         raise UnknownName("learner", name, LEARNERS)
     return LEARNERS[name]
+
+
+def change_settings(learner: str, changed: Mapping[str, Any]) -> Settings:
+    """Return the shipped settings of a learner with some of them replaced.
+
+    Args:
+        learner: Name of the learner.
+        changed: New values by name, as TOML or JSON hold them.
+
+    Raises:
+        UnknownName: If there is no such learner, or it has no such setting.
+        StudyError: If a value is of the wrong type, or impossible.
+    """
+    settings = learner_settings(learner)
+    known: dict[str, Any] = msgspec.structs.asdict(settings)
+    for name in changed:
+        if name not in known:
+            raise UnknownName(f"setting of {learner}", name, known)
+    try:
+        return msgspec.convert(
+            {**msgspec.to_builtins(settings), **changed}, type(settings), strict=True
+        )
+    except msgspec.ValidationError as error:
+        raise StudyError(f"The settings of {learner} are wrong: {error}.") from None

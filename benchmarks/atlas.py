@@ -1,0 +1,262 @@
+"""The atlas: when does one body help another? Suites of studies, with intervals.
+
+These are studies of hours: they go on from what lies in `results/`, and `SEEDS` says how many runs
+each arm has. The numbers of every run are written beside the rows, and the pictures of the README.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from itertools import combinations
+from pathlib import Path
+from typing import Any, Final
+
+import imageio.v3 as iio
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from benchmarks.row import Row
+from shapechanger.cli.films import film_study
+from shapechanger.cli.suite import Suite, load_suite, suite_tasks
+from shapechanger.reports.numbers import estimate_text
+from shapechanger.reports.suite import gain_over_scratch
+from shapechanger.reports.verdict import direction, finals
+from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.metrics import estimate_difference
+from shapechanger.transfer.plan import SOURCE, Run
+from shapechanger.transfer.runs import RunResult, learner_of, policy_path
+from shapechanger.transfer.study import STUDY_FILE, Study
+
+__all__ = ["ants", "claims", "controls", "pendulums", "shank"]
+
+RESULTS: Final = Path(__file__).parent / "results"
+PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
+# The study whose films stand in the README.
+SHOWN: Final = "Ant-to-BigAnt"
+# Index of the Amputated Ant's cut limb, number 4.
+_DAMAGED: Final = 3
+
+
+def ants() -> list[Row]:
+    """The twelve directed pairs of the four ants."""
+    studies = _suite("ants")
+    if len(studies) > 1:
+        _matrix_picture(studies, PICTURES / "ants-matrix.png")
+    if SHOWN in studies:
+        _strip_picture(studies[SHOWN], Path("results", "ants", SHOWN), PICTURES / "ants-strip.jpg")
+    return _rows(studies)
+
+
+def pendulums() -> list[Row]:
+    """The six directed pairs of the three pendulums."""
+    return _rows(_suite("pendulums"))
+
+
+def shank() -> list[Row]:
+    """One ant's policy in ants with shanks of half to two and a half times the length."""
+    return _rows(_suite("shank"))
+
+
+def controls() -> list[Row]:
+    """Scratch against scratch: how often an interval shows an effect that is not there."""
+    rows: list[Row] = []
+    for name, study in _suite("pendulums").items():
+        ends = finals(study, "scratch")
+        halves = ends.size // 2
+        shown = total = 0
+        for chosen in combinations(range(ends.size), halves):
+            ours = ends[list(chosen)]
+            theirs = np.delete(ends, chosen)[:halves]
+            shown += direction(estimate_difference(ours, theirs)) != "unclear"
+            total += 1
+        rate = shown / total
+        rows.append(
+            Row(
+                f"{name}: splits of scratch in which one half seems better than the other",
+                f"{100.0 * rate:.1f} %",
+                f"all {total} splits of {ends.size} runs; they overlap, so the rate is rough",
+                "about 5 %",
+                rate <= 0.1,
+            )
+        )
+    return rows
+
+
+def claims() -> list[Row]:
+    """The three claims of the 2017 paper, in numbers."""
+    pendulum = _suite("pendulums")["InvertedPendulum-to-BigInvertedPendulum"]
+    balanced = [_first_reaching(run, 950.0) for run in pendulum.of("scratch")]
+    learned = [seconds for seconds in balanced if seconds is not None]
+    found = _suite("ants")
+    big, cut = found["Ant-to-BigAnt"], found["AmputatedAnt-to-Ant"]
+    kept = finals(big, "zero-shot").mean() / finals(big, "fine-tune").mean()
+    shares = _power_shares(cut, Path("results", "ants", "AmputatedAnt-to-Ant"))
+    whole = _power_shares(big, Path("results", "ants", "Ant-to-BigAnt"))
+    return [
+        Row(
+            "a pendulum is learned in minutes: BigInvertedPendulum from scratch to 950 of 1000",
+            f"{np.median(learned):.0f} s" if learned else "never",
+            f"{len(learned)} of {len(balanced)} seeds; median, evaluations included",
+            "minutes",
+            len(learned) == len(balanced) and float(np.median(learned)) < 300.0,
+        ),
+        Row(
+            "the Ant's policy is near the Big Ant's: zero-shot over fine-tuned forward speed",
+            f"{100.0 * kept:.0f} %",
+            f"{finals(big, 'zero-shot').mean():.2f} of {finals(big, 'fine-tune').mean():.2f} m/s, "
+            f"{big.plan.seeds} seeds",
+            "none: whatever comes out",
+            True,
+        ),
+        Row(
+            "the Amputated Ant's policy ignores the damaged limb: its share of mechanical power",
+            f"{100.0 * shares[:, _DAMAGED].mean():.0f} %",
+            "by limb of AmputatedAnt "
+            + ", ".join(f"{100.0 * share:.0f}" for share in shares.mean(axis=0))
+            + "; of Ant "
+            + ", ".join(f"{100.0 * share:.0f}" for share in whole.mean(axis=0))
+            + " %",
+            "< 25 %, a quarter",
+            float(shares[:, _DAMAGED].mean()) < 0.25,
+        ),
+    ]
+
+
+def _first_reaching(run: RunResult, level: float) -> float | None:
+    """Seconds of a run until its first evaluation at a return; None if it never gets there."""
+    for evaluation in run.curve:
+        if evaluation.mean_return >= level:
+            return run.wall_s * evaluation.steps / run.curve[-1].steps
+    return None
+
+
+def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
+    """Share of each limb in the mechanical power of the source policies, shape (seeds, 4)."""
+    plan = study.plan
+    learner = learner_of(plan.learner, plan.settings)
+    shares: list[NDArray[np.float64]] = []
+    for index in range(plan.seeds):
+        act = learner.load(policy_path(plan, folder, Run(SOURCE, index))).act
+        env: Any = plan.task.source.make()
+        data, model = env.unwrapped.data, env.unwrapped.model
+        limbs = [int(model.actuator(i).name.rpartition("_")[2]) - 1 for i in range(model.nu)]
+        spent = np.zeros(4)
+        observation, _ = env.reset(seed=0)
+        over = False
+        while not over:
+            observation, _, terminated, truncated, _ = env.step(act(observation[None])[0])
+            power = np.abs(data.actuator_force * data.actuator_velocity)
+            np.add.at(spent, limbs, power)
+            over = terminated or truncated
+        env.close()
+        shares.append(spent / spent.sum())
+    return np.array(shares)
+
+
+def _suite(name: str) -> dict[str, Study]:
+    """Run a suite, or what is missing of it, and write the numbers of its runs."""
+    suite, out = load_suite(name), Path("results", name)
+    seeds = int(os.environ.get("SEEDS", suite.seeds))
+    Suite(name, seeds=seeds, out=out).run()
+    studies = {
+        one: read_json(out / one / STUDY_FILE, Study, f"delete {out / one}")
+        for one, _ in suite_tasks(suite)
+    }
+    write_json(RESULTS / f"atlas-{name}-runs.json", {one: _runs(s) for one, s in studies.items()})
+    return studies
+
+
+def _runs(study: Study) -> dict[str, Any]:
+    """The measure of every run at every evaluation."""
+    kinds = dict.fromkeys(run.run.kind for run in study.runs)
+    found: dict[str, Any] = {"measure": study.plan.measure, "unit": study.plan.unit}
+    for kind in kinds:
+        found[kind] = [
+            {
+                "seed": run.seed,
+                "steps": [evaluation.steps for evaluation in run.curve],
+                "values": [round(e.value(study.plan.measure), 4) for e in run.curve],
+                "returns": [round(e.mean_return, 2) for e in run.curve],
+            }
+            for run in study.of(kind)
+        ]
+    return found
+
+
+def _rows(studies: dict[str, Study]) -> list[Row]:
+    rows: list[Row] = []
+    for name, study in studies.items():
+        plan = study.plan
+        unit = "" if plan.unit == "1" else f" {plan.unit}"
+        ends = ", ".join(f"{arm} {finals(study, arm).mean():.3g}" for arm in plan.arms)
+        rows.append(
+            Row(
+                f"{name}: {plan.measure} of fine-tune over that of scratch, mean over the budget",
+                f"{estimate_text(gain_over_scratch(study), signed=True)}{unit}",
+                f"{plan.seeds} seeds; at the end: {ends}{unit}",
+                "none: whatever comes out",
+                True,
+            )
+        )
+    ahead = sum(direction(gain_over_scratch(study)) == "up" for study in studies.values())
+    behind = sum(direction(gain_over_scratch(study)) == "down" for study in studies.values())
+    rows.append(
+        Row(
+            "studies in which fine-tune is ahead of scratch, and behind",
+            f"{ahead} and {behind} of {len(studies)}",
+            "95 % intervals over seeds",
+            "none: whatever comes out",
+            True,
+        )
+    )
+    return rows
+
+
+def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
+    """Draw the gains as a heat map, sources in rows and targets in columns."""
+    names = list(dict.fromkeys(name.partition("-to-")[0] for name in studies))
+    gains = np.full((len(names), len(names)), np.nan)
+    figure = Figure(figsize=(7.2, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for name, study in studies.items():
+        source, _, target = name.partition("-to-")
+        row, column = names.index(source), names.index(target)
+        gain = gain_over_scratch(study)
+        gains[row, column] = gain.value
+        ends = {arm: float(finals(study, arm).mean()) for arm in study.plan.arms}
+        axes.text(
+            column,
+            row,
+            f"{ends['scratch']:.2f} → {ends['fine-tune']:.2f} m/s\n"
+            f"{estimate_text(gain, signed=True)}\nzero-shot {ends['zero-shot']:.2f}",
+            ha="center",
+            va="center",
+            fontsize=8,
+        )
+    widest = float(np.nanmax(np.abs(gains)))
+    colours = LinearSegmentedColormap.from_list("gain", ["#e8a27c", "#ffffff", "#7fb8dc"])
+    axes.imshow(gains, cmap=colours, vmin=-widest, vmax=widest, aspect="auto")
+    axes.set_xticks(range(len(names)), names)
+    axes.set_yticks(range(len(names)), names)
+    axes.xaxis.tick_top()
+    axes.set_xlabel("target", fontsize=9)
+    axes.xaxis.set_label_position("top")
+    axes.set_ylabel("source", fontsize=9)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(length=0)
+    figure.savefig(path, dpi=130)
+
+
+def _strip_picture(study: Study, folder: Path, path: Path) -> None:
+    """Put the film strips of a study below one another, with their captions."""
+    strips = film_study(study, folder)
+    figure = Figure(figsize=(9.0, 1.25 * len(strips)), layout="constrained")
+    for axes, strip in zip(np.ravel(figure.subplots(len(strips), 1)), strips, strict=True):
+        picture: NDArray[np.uint8] = np.asarray(iio.imread(io.BytesIO(strip.jpeg)))
+        axes.imshow(picture, aspect="equal")
+        axes.set_title(strip.caption, fontsize=9, loc="left", pad=2)
+        axes.axis("off")
+    figure.savefig(path, dpi=130, pil_kwargs={"quality": 80})
