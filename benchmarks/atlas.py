@@ -1,7 +1,8 @@
 """The atlas: when does one body help another? Suites of studies, with intervals.
 
-These are studies of hours: they go on from what lies in `results/`, and `SEEDS` says how many runs
-each arm has. The numbers of every run are written beside the rows, and the pictures of the README.
+These are studies of hours: they go on from what lies in `results/`, `SEEDS` says how many runs each
+arm has, and `ONLY` names the studies to run, separated by spaces. The numbers of every run are
+written beside the rows, and the pictures of the README.
 """
 
 from __future__ import annotations
@@ -160,10 +161,11 @@ def _suite(name: str) -> dict[str, Study]:
     """Run a suite, or what is missing of it, and write the numbers of its runs."""
     suite, out = load_suite(name), Path("results", name)
     seeds = int(os.environ.get("SEEDS", suite.seeds))
-    Suite(name, seeds=seeds, out=out).run()
+    Suite(name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
     studies = {
         one: read_json(out / one / STUDY_FILE, Study, f"delete {out / one}")
         for one, _ in suite_tasks(suite)
+        if (out / one / STUDY_FILE).exists()
     }
     write_json(RESULTS / f"atlas-{name}-runs.json", {one: _runs(s) for one, s in studies.items()})
     return studies
@@ -217,7 +219,7 @@ def _rows(studies: dict[str, Study]) -> list[Row]:
 
 def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
     """Draw the gains as a heat map, sources in rows and targets in columns."""
-    names = list(dict.fromkeys(name.partition("-to-")[0] for name in studies))
+    names = [str(env) for env in load_suite("ants").envs]
     gains = np.full((len(names), len(names)), np.nan)
     figure = Figure(figsize=(7.2, 4.0), layout="constrained")
     axes = figure.subplots()
@@ -236,6 +238,9 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
             va="center",
             fontsize=8,
         )
+    for row, column in np.argwhere(np.isnan(gains)).tolist():
+        words = "same body" if row == column else "not run yet"
+        axes.text(column, row, words, ha="center", va="center", fontsize=8, color="#8c959f")
     widest = float(np.nanmax(np.abs(gains)))
     colours = LinearSegmentedColormap.from_list("gain", ["#e8a27c", "#ffffff", "#7fb8dc"])
     axes.imshow(gains, cmap=colours, vmin=-widest, vmax=widest, aspect="auto")

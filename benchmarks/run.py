@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -171,8 +172,10 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 
 def _asked() -> str:
     """What was asked for besides, as a shell takes it."""
-    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "VEHICLE", "LP_NUM_THREADS")
-    return "".join(f"{name}={os.environ[name]} " for name in names if name in os.environ)
+    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "VEHICLE", "LP_NUM_THREADS")
+    return "".join(
+        f"{name}={shlex.quote(os.environ[name])} " for name in names if name in os.environ
+    )
 
 
 def _processor() -> str:

@@ -72,7 +72,7 @@ class Identified(AdaptedSource):
     """Learn in a source whose parameters are identified from motions of the target."""
 
     name = "identified"
-    paper = "J. Tan and others, Sim-to-Real: Learning Agile Locomotion, RSS 2018, section IV"
+    paper = "J. Tan and others, Sim-to-Real: Learning Agile Locomotion, RSS 2018"
 
     def arguments(self, target: SourceAdaptation, seed: int) -> dict[str, Any]:
         """Move the target, and return what was identified."""
