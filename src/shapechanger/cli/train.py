@@ -58,7 +58,11 @@ class Train:
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
-        from shapechanger.transfer.learners.settings import PpoSettings, change_settings
+        from shapechanger.transfer.learners.settings import (
+            PpoSettings,
+            change_settings,
+            tuning_text,
+        )
         from shapechanger.transfer.runs import learner_of
 
         require_seed(self.seed)
@@ -80,6 +84,7 @@ class Train:
         make_folder(out.parent)
         use_one_thread()
         console = plain_console()
+        console.print(f"{learner}: {tuning_text(learner, env.id)}")
 
         def show(result: Evaluation) -> None:
             terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())

@@ -30,7 +30,12 @@ from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
-from shapechanger.transfer.learners.settings import CloningSettings, SacSettings, Settings
+from shapechanger.transfer.learners.settings import (
+    CloningSettings,
+    SacSettings,
+    Settings,
+    tuning_text,
+)
 from shapechanger.transfer.metrics import Summary
 from shapechanger.transfer.study import Study
 
@@ -93,6 +98,7 @@ def report_html(study: Study, pictures: Pictures | None = None, picture_note: st
         shift=study.shift,
         map=_body_map(plan.body_map),
         rhythm=_rhythm(plan.settings),
+        tuning=tuning_text(plan.learner, plan.task.target.id),
         settings=[
             (name, _setting(value)) for name, value in msgspec.structs.asdict(plan.settings).items()
         ],

@@ -13,12 +13,14 @@ from shapechanger.errors import StudyError, UnknownName
 
 __all__ = [
     "LEARNERS",
+    "TUNED_ON",
     "CloningSettings",
     "PpoSettings",
     "SacSettings",
     "Settings",
     "change_settings",
     "learner_settings",
+    "tuning_text",
 ]
 
 
@@ -320,6 +322,33 @@ LEARNERS: Final[dict[str, Settings]] = {
         clone=CloneSettings(held_out=0.0),
     ),
 }
+
+
+TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
+    "ppo-balance": ("InvertedPendulum", "BigInvertedPendulum"),
+    "ppo-run": ("Ant",),
+    "ppo-finger": ("Finger",),
+    "ppo-rig": ("Finger",),
+    "cloning": ("Car",),
+    "sac": ("Tank",),
+}
+"""The envs that the settings of each learner were tuned on; all others inherit them."""
+
+
+def tuning_text(learner: str, env: str) -> str:
+    """State whether the settings of a learner were tuned on an env.
+
+    Args:
+        learner: Name of the learner.
+        env: Id of the env.
+    """
+    if learner not in TUNED_ON:
+        return "Nobody has stated what these settings were tuned on."
+    name = env.rpartition("/")[2].removesuffix("-v1")
+    tuned = " and ".join(TUNED_ON[learner])
+    if name in TUNED_ON[learner]:
+        return f"The settings were tuned on {tuned}."
+    return f"The settings were tuned on {tuned}, not on {name}."
 
 
 def learner_settings(name: str) -> Settings:

@@ -1,0 +1,55 @@
+"""Settings of learners: changing some, and where they come from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import pytest
+
+import shapechanger  # noqa: F401 - registers the envs.
+from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer.learners.settings import (
+    LEARNERS,
+    TUNED_ON,
+    PpoSettings,
+    change_settings,
+    learner_settings,
+    tuning_text,
+)
+
+
+def test_some_settings_change_and_others_stay() -> None:
+    """Values as TOML holds them: lists for tuples, whole numbers for floats."""
+    changed = change_settings("ppo-run", {"net_arch": [32], "learning_rate": 1})
+    assert isinstance(changed, PpoSettings)
+    assert (changed.net_arch, changed.learning_rate) == ((32,), 1.0)
+    assert changed.n_steps == learner_settings("ppo-run").n_steps  # type: ignore[union-attr]
+    assert change_settings("ppo-run", {}) == learner_settings("ppo-run")
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind", "words"),
+    [
+        ({"learning_rat": 1.0}, UnknownName, "'learning_rate'"),
+        ({"learning_rate": "fast"}, StudyError, "learning_rate"),
+        ({"n_envs": 0}, StudyError, "at least one env"),
+    ],
+)
+def test_wrong_settings_are_refused(
+    changed: dict[str, Any], kind: type[Exception], words: str
+) -> None:
+    """With the name of the setting."""
+    with pytest.raises(kind, match=words):
+        change_settings("ppo-run", changed)
+
+
+def test_every_learner_says_what_it_was_tuned_on() -> None:
+    """Envs that exist; an env that inherits settings is told."""
+    assert set(TUNED_ON) == set(LEARNERS)
+    for names in TUNED_ON.values():
+        for name in names:
+            assert f"shapechanger/{name}-v1" in gym.registry
+    assert tuning_text("ppo-run", "shapechanger/Ant-v1") == "The settings were tuned on Ant."
+    assert tuning_text("ppo-run", "shapechanger/Hopper-v1").endswith("not on Hopper.")
+    assert "Nobody has stated" in tuning_text("mine", "shapechanger/Ant-v1")
