@@ -26,12 +26,12 @@ from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
 from shapechanger.reports.verdict import direction, finals
 from shapechanger.transfer.files import read_json, write_json
-from shapechanger.transfer.metrics import estimate_difference
+from shapechanger.transfer.metrics import estimate_difference, jumpstart, total_reward_gain
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import RunResult, learner_of, policy_path
 from shapechanger.transfer.study import STUDY_FILE, Study
 
-__all__ = ["ants", "claims", "controls", "pendulums", "shank"]
+__all__ = ["ants", "claims", "controls", "methods", "pendulums", "shank"]
 
 RESULTS: Final = Path(__file__).parent / "results"
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
@@ -54,6 +54,33 @@ def ants() -> list[Row]:
 def pendulums() -> list[Row]:
     """The six directed pairs of the three pendulums."""
     return _rows(_suite("pendulums"))
+
+
+def methods() -> list[Row]:
+    """Every method on one pair of ants: its forward speed on the way and at the end."""
+    rows: list[Row] = []
+    for name, study in _suite("methods").items():
+        plan = study.plan
+        scratch = study.curves("scratch")
+        for arm in plan.arms:
+            if arm == "scratch":
+                continue
+            curves = study.curves(arm)
+            trained = curves.n_evals > 1
+            gain = (total_reward_gain if trained else jumpstart)(curves, scratch)
+            rows.append(
+                Row(
+                    f"{name}: {plan.measure} of {arm} over that of scratch, "
+                    + ("mean over the budget" if trained else "at the start"),
+                    f"{estimate_text(gain, signed=True)} {plan.unit}",
+                    f"{plan.seeds} seeds; from {curves.returns[:, 0].mean():.2f} to "
+                    f"{finals(study, arm).mean():.2f} {plan.unit}; scratch to "
+                    f"{finals(study, 'scratch').mean():.2f}",
+                    "none: whatever comes out",
+                    True,
+                )
+            )
+    return rows
 
 
 def shank() -> list[Row]:

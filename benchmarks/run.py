@@ -138,6 +138,7 @@ def demo() -> list[Row]:
 
 SUITES: dict[str, Callable[[], list[Row]]] = {
     "atlas-ants": atlas.ants,
+    "atlas-methods": atlas.methods,
     "atlas-pendulums": atlas.pendulums,
     "atlas-shank": atlas.shank,
     "atlas-controls": atlas.controls,

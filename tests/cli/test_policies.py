@@ -78,3 +78,48 @@ def test_what_cannot_be_converted_gets_one_sentence(
     assert words in message
     assert message.count("\n") == 1
     assert not out.exists()
+
+
+@pytest.fixture
+def trained(tmp_path: Path) -> Path:
+    """A policy of a pendulum, in a folder of its own."""
+    _zip(tmp_path / "mine.zip", policy_kwargs={"net_arch": [8]})
+    out = tmp_path / "policies" / "mine.safetensors"
+    out.parent.mkdir()
+    convert = ["policies", "convert", str(tmp_path / "mine.zip"), "InvertedPendulum"]
+    main([*convert, "--out", str(out), "--trust"])
+    return out
+
+
+def test_a_folder_is_listed(trained: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file that is no policy gets its reason, and an empty folder a sentence."""
+    (trained.parent / "other.safetensors").write_text("no")
+    main(["policies", "list", str(trained.parent)])
+    said = capsys.readouterr().out
+    assert "mine.safetensors" in said
+    assert "shapechanger/InvertedPendulum-v1" in said
+    assert "is not a policy" in said
+    (trained.parent / "empty").mkdir()
+    with pytest.raises(SystemExit):
+        main(["policies", "list", str(trained.parent / "empty")])
+    assert "There is no policy in" in capsys.readouterr().err
+
+
+def test_an_exported_policy_does_the_same(
+    trained: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Evaluated in its own env and in another, from both files."""
+    exported = trained.with_suffix(".onnx")
+    main(["policies", "export", str(trained), "--out", str(exported)])
+    capsys.readouterr()
+    for env in ([], ["--env", "BigInvertedPendulum"]):
+        said: list[str] = []
+        for file in (trained, exported):
+            main(["policies", "evaluate", str(file), "--episodes", "2", *env])
+            said.append(capsys.readouterr().out)
+        assert said[0] == said[1]
+        assert said[0].startswith("return ")
+        assert "steps" in said[0]
+    with pytest.raises(SystemExit):
+        main(["policies", "evaluate", str(exported), "--episodes", "0"])
+    assert "at least one episode" in capsys.readouterr().err

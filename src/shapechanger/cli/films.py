@@ -14,8 +14,7 @@ from shapechanger.reports.suite import FilmStrip
 from shapechanger.reports.verdict import finals
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.env_ref import EnvRef, measures_of
-from shapechanger.transfer.learners.evaluation import Act
-from shapechanger.transfer.learners.ppo import EVALUATION_SEED
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import learner_of, policy_path

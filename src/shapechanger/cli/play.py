@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 import tyro
@@ -14,6 +14,10 @@ from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import env_ref, opened, require_seed
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.learners.policy_file import TrainedPolicy
+    from shapechanger.transfer.onnx_policy import OnnxPolicy
 
 __all__ = ["Play"]
 
@@ -25,8 +29,8 @@ class Play:
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
     policy: Path | None = None
-    """A policy that `train` or a study has written; random actions if not given. One of another
-    body acts through the body map of same names."""
+    """A policy that `train`, a study or `policies export` has written; random actions if not given.
+    One of another body acts through the body map of same names."""
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     out: Path | None = None
@@ -78,12 +82,19 @@ class Play:
             return env, random_actions(env.action_space, self.seed)
         from shapechanger.transfer.body_map import BodyMap, MappedEnv
         from shapechanger.transfer.env_ref import layouts_of
-        from shapechanger.transfer.learners.cloning import is_clone, load_clone
-        from shapechanger.transfer.learners.policy_file import load_policy
 
-        if is_clone(self.policy):
-            return env, load_clone(self.policy).predict_many
-        policy = load_policy(self.policy)
+        policy: TrainedPolicy | OnnxPolicy
+        if self.policy.suffix == ".onnx":  # Without PyTorch.
+            from shapechanger.transfer.onnx_policy import OnnxPolicy
+
+            policy = OnnxPolicy(self.policy)
+        else:
+            from shapechanger.transfer.learners.cloning import is_clone, load_clone
+            from shapechanger.transfer.learners.policy_file import load_policy
+
+            if is_clone(self.policy):
+                return env, load_clone(self.policy).predict_many
+            policy = load_policy(self.policy)
         observation, action = layouts_of(env)
         if (observation, action) == (policy.card.observation, policy.card.action):
             return env, policy.act

@@ -1,13 +1,15 @@
-"""`shapechanger policies`: show a policy's card, and convert a policy of Stable-Baselines3."""
+"""`shapechanger policies`: list, show, evaluate, export and convert policies."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
 import msgspec
 import tyro
+from rich.table import Table
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import env_ref, opened
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners.settings import PpoSettings
 
 __all__ = ["Policies"]
+
+_FILE_WIDTH: Final = 160
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,95 @@ class Show:
             console.print(f"{name:12} {text}", soft_wrap=True)
         for name, value in msgspec.structs.asdict(card.settings).items():
             console.print(f"  {name:16} {value}", soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class ListPolicies:
+    """List the policies in a folder and its subfolders."""
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
+    """The folder."""
+
+    def run(self) -> None:
+        """Print a line for each policy; a file that is none gets its reason."""
+        from shapechanger.transfer.learners.policy_file import load_policy
+
+        table = Table("file", "env", "learner", "steps", "seed", box=None)
+        for path in sorted(self.folder.rglob("*.safetensors")):
+            name = str(path.relative_to(self.folder))
+            try:
+                card = load_policy(path).card
+            except CorruptStudy as error:
+                table.add_row(name, str(error))
+                continue
+            table.add_row(name, str(card.env), card.learner, f"{card.steps:,}", str(card.seed))
+        if not table.rows:
+            raise StudyError(f"There is no policy in {self.folder}: train one, or name a folder.")
+        plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH).print(table)
+
+
+@dataclass(frozen=True)
+class EvaluatePolicy:
+    """Play a policy for some episodes, and print its measures."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy, or one that was exported as ONNX."""
+    env: str = ""
+    """Id of another env, where it acts through the body map of same names; its own by default."""
+    body: str = ""
+    """Another body of that env's family: its name, or edits as JSON."""
+    episodes: int = 10
+    """Number of episodes; their starts are those of every evaluation."""
+
+    def run(self) -> None:
+        """Evaluate."""
+        from shapechanger.transfer.body_map import BodyMap, MappedEnv
+        from shapechanger.transfer.env_ref import layouts_of, measures_of
+        from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
+
+        if self.episodes < 1:
+            raise StudyError("An evaluation takes at least one episode.")
+        if self.file.suffix == ".onnx":
+            from shapechanger.transfer.onnx_policy import OnnxPolicy
+
+            policy = OnnxPolicy(self.file)
+        else:
+            from shapechanger.transfer.learners.policy_file import load_policy
+
+            policy = load_policy(self.file)
+        card = policy.card
+        with opened(env_ref(self.env, self.body) if self.env else card.env) as env:
+            observation, action = layouts_of(env)
+            acting: Any = env
+            if (observation, action) != (card.observation, card.action):
+                body_map = BodyMap.between(card.observation, observation, card.action, action)
+                acting = MappedEnv(env, body_map)
+            found = evaluate(policy.act, [acting], EVALUATION_SEED, episodes=self.episodes)
+            console = plain_console()
+            for measure in measures_of(env):
+                unit = "" if measure.unit == "1" else f" {measure.unit}"
+                console.print(f"{measure.name:14} {found.value(measure.name):.4g}{unit}")
+            console.print(f"{'length':14} {found.mean_length:.4g} steps")
+
+
+@dataclass(frozen=True)
+class ExportPolicy:
+    """Export a policy for other programs, which need neither PyTorch nor Shapechanger."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy."""
+    out: Path
+    """The file to write, such as ant.onnx."""
+    format: Literal["onnx"] = "onnx"
+    """Its format."""
+
+    def run(self) -> None:
+        """Write the file."""
+        from shapechanger.transfer.learners.policy_file import load_policy
+        from shapechanger.transfer.onnx_policy import export_onnx
+
+        export_onnx(load_policy(self.file), self.out)
+        plain_console().print(f"wrote {self.out}", soft_wrap=True)
 
 
 @dataclass(frozen=True)
@@ -161,10 +254,13 @@ def _settings(model: Any) -> PpoSettings:
 
 @dataclass(frozen=True)
 class Policies:
-    """Inspect and convert policies."""
+    """List, inspect, evaluate, export and convert policies."""
 
     command: (
-        Annotated[Show, tyro.conf.subcommand("show")]
+        Annotated[ListPolicies, tyro.conf.subcommand("list")]
+        | Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[EvaluatePolicy, tyro.conf.subcommand("evaluate")]
+        | Annotated[ExportPolicy, tyro.conf.subcommand("export")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
     )
 

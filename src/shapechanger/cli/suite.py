@@ -196,8 +196,8 @@ class Suite:
     """
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
-    """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, pendulums,
-    shank or vehicles."""
+    """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, methods,
+    pendulums, shank or vehicles."""
     seeds: int | None = None
     """Runs of each arm; the suite's own number if not given."""
     steps: int | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import msgspec
@@ -22,6 +22,7 @@ from shapechanger.transfer.env_ref import (
 from shapechanger.transfer.learners.settings import Settings
 
 __all__ = [
+    "EVALUATION_SEED",
     "Act",
     "Evaluation",
     "evaluate",
@@ -29,6 +30,9 @@ __all__ = [
     "random_actions",
     "zero_actions",
 ]
+
+EVALUATION_SEED: Final = 10_000_000
+"""Seed of the first evaluation episode: far from those of training, the same for every run."""
 
 # Observations of shape (n, ...) in, actions of shape (n, ...) out.
 Act = Callable[[NDArray[Any]], NDArray[Any]]

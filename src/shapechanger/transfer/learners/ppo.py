@@ -17,7 +17,12 @@ from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
 from shapechanger.transfer.learners import PolicyOrigin
-from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
+from shapechanger.transfer.learners.evaluation import (
+    EVALUATION_SEED,
+    Evaluation,
+    evaluate,
+    evaluation_envs,
+)
 from shapechanger.transfer.learners.policy_file import (
     Normalisation,
     PolicyCard,
@@ -43,7 +48,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners.cloning import DemonstrationFile
 
 __all__ = [
-    "EVALUATION_SEED",
     "OnEvaluation",
     "OnSteps",
     "PpoLearner",
@@ -53,9 +57,6 @@ __all__ = [
     "training_vec_env",
     "use_one_thread",
 ]
-
-# Far from the seeds of training, and the same for every run and arm.
-EVALUATION_SEED = 10_000_000
 
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]

@@ -1,0 +1,196 @@
+"""Policies as ONNX files, which run without PyTorch.
+
+The file holds the policy's mean action with its normalisation and bounds. Its metadata has the
+names of the layouts and the card, so that a program that knows nothing of Shapechanger can see what
+each number is. Reading one runs no code from it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import CorruptStudy, MissingExtra, StudyError
+from shapechanger.layout import Layout
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.files import write_atomic
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.learners.policy_file import TrainedPolicy
+
+__all__ = ["OnnxCard", "OnnxPolicy", "export_onnx"]
+
+_CARD: Final = "shapechanger"
+_OPSET: Final = 17
+# The intermediate representation of ONNX 1.12, which every runtime since 2022 reads.
+_IR_VERSION: Final = 8
+# Defaults of Stable-Baselines3's `VecNormalize`.
+_EPSILON: Final = 1e-8
+_CLIP: Final = 10.0
+
+
+class OnnxCard(msgspec.Struct, frozen=True):
+    """Provenance of a policy in an ONNX file: a part of its `PolicyCard`.
+
+    Attributes:
+        env: The env that it was trained in.
+        observation: Layout of its observations.
+        action: Layout of its actions.
+        learner: Name of the learner.
+        steps: Env steps of training.
+        seed: Seed of the training.
+        version: Version of Shapechanger.
+    """
+
+    env: EnvRef
+    observation: Layout
+    action: Layout
+    learner: str
+    steps: int
+    seed: int
+    version: str
+
+
+def export_onnx(policy: TrainedPolicy, path: Path) -> None:
+    """Write a policy as ONNX.
+
+    Its input `observation` is float64 of shape (n, observations), as the env returns it, and its
+    output `action` float32 of shape (n, actions), as the env takes it.
+
+    Args:
+        policy: The policy.
+        path: The file, such as `ant.onnx`.
+
+    Raises:
+        MissingExtra: If onnx is not installed.
+        OutputError: If it cannot be written.
+    """
+    try:
+        import onnx
+        from onnx import helper, numpy_helper
+    except ImportError as error:
+        raise MissingExtra("onnx", "onnx") from error
+    make: Any = helper
+    numbers: Any = numpy_helper
+    nodes: list[Any] = []
+    constants: dict[str, NDArray[Any]] = {}
+
+    def apply(operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
+        nodes.append(make.make_node(operator, inputs, [output], **attributes))
+        return output
+
+    last = "observation"
+    if policy.normalisation is not None:
+        statistics = policy.normalisation.observation
+        constants["mean"] = np.asarray(statistics.mean, np.float64)
+        constants["deviation"] = np.sqrt(np.asarray(statistics.var, np.float64) + _EPSILON)
+        constants["least"], constants["most"] = np.float64(-_CLIP), np.float64(_CLIP)  # pyright: ignore[reportArgumentType]
+        last = apply("Sub", [last, "mean"], "centred")
+        last = apply("Div", [last, "deviation"], "scaled")
+        last = apply("Clip", [last, "least", "most"], "normalised")
+    last = apply("Cast", [last], "features", to=onnx.TensorProto.FLOAT)
+    weights = {
+        name: value.detach().cpu().numpy()
+        for name, value in policy.model.policy.state_dict().items()
+    }
+    hidden = [name for name in weights if name.startswith("mlp_extractor.policy_net.")]
+    layers = list(dict.fromkeys(name.rpartition(".")[0] for name in hidden))
+    for place, layer in enumerate([*layers, "action_net"]):
+        constants[f"weight_{place}"] = weights[f"{layer}.weight"]
+        constants[f"bias_{place}"] = weights[f"{layer}.bias"]
+        inputs = [last, f"weight_{place}", f"bias_{place}"]
+        last = apply("Gemm", inputs, f"sum_{place}", transB=1)
+        if layer != "action_net":
+            last = apply("Tanh", [last], f"layer_{place}")
+    space: Any = cast("Any", policy.model).action_space
+    constants["low"] = space.low.astype(np.float32)
+    constants["high"] = space.high.astype(np.float32)
+    last = apply("Max", [last, "low"], "bounded")
+    apply("Min", [last, "high"], "action")
+    sides = (
+        ("observation", onnx.TensorProto.DOUBLE, policy.card.observation),
+        ("action", onnx.TensorProto.FLOAT, policy.card.action),
+    )
+    seen, done = (
+        make.make_tensor_value_info(name, kind, ["n", layout.size]) for name, kind, layout in sides
+    )
+    tensors = [numbers.from_array(np.asarray(value), name) for name, value in constants.items()]
+    graph = make.make_graph(nodes, "policy", [seen], [done], tensors)
+    model = make.make_model(
+        graph,
+        opset_imports=[make.make_opsetid("", _OPSET)],
+        ir_version=_IR_VERSION,
+        producer_name="shapechanger",
+        producer_version=policy.card.version,
+    )
+    facts = {f"{name}_names": json.dumps(layout.names) for name, _, layout in sides}
+    card = OnnxCard(*(getattr(policy.card, name) for name in OnnxCard.__struct_fields__))
+    make.set_model_props(model, {**facts, _CARD: msgspec.json.encode(card).decode()})
+    cast("Any", onnx).checker.check_model(model)
+    write_atomic(path, model.SerializeToString())
+
+
+class OnnxPolicy:
+    """A policy from an ONNX file that `export_onnx` wrote.
+
+    Attributes:
+        card: Its provenance.
+
+    Args:
+        path: The file.
+
+    Raises:
+        MissingExtra: If onnxruntime is not installed.
+        CorruptStudy: If the file is missing or is no such policy.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import onnxruntime  # pyright: ignore[reportMissingTypeStubs]
+        except ImportError as error:
+            raise MissingExtra("onnxruntime", "onnx") from error
+        runtime: Any = onnxruntime
+        options = runtime.SessionOptions()
+        # One policy is small: more threads would only wait for one another.
+        options.intra_op_num_threads = 1
+        try:
+            self._session = runtime.InferenceSession(
+                path.read_bytes(), options, providers=["CPUExecutionProvider"]
+            )
+            facts = self._session.get_modelmeta().custom_metadata_map
+            self.card = msgspec.json.decode(facts[_CARD], type=OnnxCard)
+        except FileNotFoundError as error:
+            raise CorruptStudy(f"There is no policy file {path}.") from error
+        except Exception as error:  # The runtime's errors have no common base.
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
+            raise CorruptStudy(
+                f"{path} is not a policy that `shapechanger policies export` has written "
+                f"({reason})."
+            ) from error
+        sizes = [
+            each.shape[1] for each in (*self._session.get_inputs(), *self._session.get_outputs())
+        ]
+        if sizes != [self.card.observation.size, self.card.action.size]:
+            raise CorruptStudy(
+                f"{path} has {sizes} numbers, and its layouts "
+                f"{[self.card.observation.size, self.card.action.size]}."
+            )
+
+    def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the mean actions, shape (n, actions), for observations of shape (n, observations).
+
+        Raises:
+            StudyError: If the observations have another size.
+        """
+        if observations.ndim != 2 or observations.shape[1] != self.card.observation.size:
+            raise StudyError(
+                f"This policy takes observations of shape (n, {self.card.observation.size}), got "
+                f"{observations.shape}."
+            )
+        inputs = {"observation": np.asarray(observations, np.float64)}
+        return cast("NDArray[np.float32]", self._session.run(["action"], inputs)[0])

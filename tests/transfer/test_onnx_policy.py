@@ -1,0 +1,109 @@
+"""Policies as ONNX: the same actions without PyTorch, and names for every number."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from shapechanger.errors import CorruptStudy, StudyError
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
+from shapechanger.transfer.plan import Run
+from shapechanger.transfer.runs import policy_path
+from shapechanger.transfer.study import run_study
+from tests.transfer.studies import TINY, TINY_NORMALISED, tiny_plan
+
+
+@pytest.fixture(scope="module", params=[TINY, TINY_NORMALISED], ids=["plain", "normalised"])
+def files(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Path]:
+    """A policy that was trained, and what it was exported to."""
+    folder = tmp_path_factory.mktemp("onnx")
+    plan = tiny_plan(request.param, arms=("scratch", "fine-tune"), steps=32, source_steps=32)
+    run_study(plan, folder / "study", executor=Serial())
+    policy = policy_path(plan, folder / "study", Run("fine-tune", 0))
+    export_onnx(load_policy(policy), folder / "policy.onnx")
+    return policy, folder / "policy.onnx"
+
+
+def test_actions_are_those_of_pytorch(files: tuple[Path, Path]) -> None:
+    """To 1e-5, within the bounds, for observations near and far."""
+    policy, exported = load_policy(files[0]), OnnxPolicy(files[1])
+    rng = np.random.default_rng(0)
+    for scale in (0.01, 1.0, 100.0):
+        seen = rng.normal(0.0, scale, (50, 4))
+        actions = exported.act(seen)
+        np.testing.assert_allclose(actions, policy.act(seen), atol=1e-5, rtol=1e-5)
+        assert actions.dtype == np.float32
+        assert (np.abs(actions) <= 3.0).all()
+
+
+def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
+    """For whoever knows ONNX and nothing of us."""
+    model = onnx.load(str(files[1]))
+    facts = {entry.key: entry.value for entry in model.metadata_props}
+    card = load_policy(files[0]).card
+    assert json.loads(facts["observation_names"]) == list(card.observation.names)
+    assert json.loads(facts["action_names"]) == list(card.action.names)
+    assert OnnxPolicy(files[1]).card.observation == card.observation
+    assert OnnxPolicy(files[1]).card.steps == card.steps
+
+
+def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
+    """As on a robot that has none."""
+    code = (
+        "import sys; sys.modules['torch'] = None; import numpy as np; from pathlib import Path; "
+        "from shapechanger.transfer.onnx_policy import OnnxPolicy; "
+        f"print(OnnxPolicy(Path({str(files[1])!r})).act(np.zeros((1, 4))).shape)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.stdout.strip() == "(1, 1)", done.stderr
+
+
+def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
+    """With the shape that it takes."""
+    with pytest.raises(StudyError, match=r"shape \(n, 4\), got \(1, 5\)"):
+        OnnxPolicy(files[1]).act(np.zeros((1, 5)))
+
+
+@pytest.mark.parametrize("how", ["missing", "cut", "text", "foreign"])
+def test_what_is_no_policy_gets_one_sentence(
+    files: tuple[Path, Path], tmp_path: Path, how: str
+) -> None:
+    """Whatever the runtime makes of it."""
+    path = tmp_path / "mine.onnx"
+    content = files[1].read_bytes()
+    if how == "cut":
+        path.write_bytes(content[:200])
+    elif how == "text":
+        path.write_text("hello")
+    elif how == "foreign":
+        model = onnx.load_from_string(content)
+        del model.metadata_props[:]
+        path.write_bytes(model.SerializeToString())
+    with pytest.raises(CorruptStudy, match=r"mine\.onnx") as caught:
+        OnnxPolicy(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: Path) -> None:
+    """Layouts that do not fit the network would mislead everybody."""
+    model = onnx.load(str(files[1]))
+    for entry in model.metadata_props:
+        if entry.key == "shapechanger":
+            card = json.loads(entry.value)
+            card["action"] = card["observation"]
+            entry.value = json.dumps(card)
+    (tmp_path / "mine.onnx").write_bytes(model.SerializeToString())
+    with pytest.raises(CorruptStudy, match="its layouts"):
+        OnnxPolicy(tmp_path / "mine.onnx")
