@@ -126,3 +126,12 @@ def test_nothing_learned_has_no_scores() -> None:
     assert "1 show nothing" in words
     with pytest.raises(StopIteration):
         suite_html("none", {}, seeds=5)
+
+
+def test_pairs_that_are_missing() -> None:
+    """A pair that has not run is not the same body."""
+    studies = _pairs()
+    del studies["Ant-to-BigAnt"]
+    words = Reader(suite_html("ants", studies, seeds=5)).words
+    assert words.count("not run") == 1
+    assert words.count("same body") == 3
