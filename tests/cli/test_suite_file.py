@@ -31,7 +31,14 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
 def test_the_shipped_suites_are_those_of_the_docs() -> None:
     """All ordered pairs, the car with each lens alone, and nine lengths of an ant's shanks."""
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
-    assert counts == {"ants": 12, "lenses": 4, "pendulums": 6, "shank": 9, "vehicles": 12}
+    assert counts == {
+        "ants": 12,
+        "lenses": 4,
+        "methods": 1,
+        "pendulums": 6,
+        "shank": 9,
+        "vehicles": 12,
+    }
     for _, task in suite_tasks(load_suite("vehicles")):
         assert task.source.kwargs == task.target.kwargs == {"put_back": True}
     lenses = dict(suite_tasks(load_suite("lenses")))
