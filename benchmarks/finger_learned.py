@@ -24,7 +24,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.ppo import train, use_one_thread
+from shapechanger.transfer.learners.sb3 import train, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
 
 __all__ = ["FOLDER", "TASKS", "learned", "trained"]

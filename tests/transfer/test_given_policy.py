@@ -16,7 +16,7 @@ from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone, train_clones
 from shapechanger.transfer.learners.policy_file import save_policy
-from shapechanger.transfer.learners.ppo import train
+from shapechanger.transfer.learners.sb3 import train
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET

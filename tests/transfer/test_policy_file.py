@@ -20,7 +20,7 @@ from shapechanger.errors import CorruptStudy
 from shapechanger.transfer.learners.cloning import load_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.ppo import train
+from shapechanger.transfer.learners.sb3 import train
 from shapechanger.transfer.learners.settings import PpoSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 

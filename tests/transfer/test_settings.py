@@ -13,19 +13,19 @@ from shapechanger.transfer.learners.settings import (
     LEARNERS,
     TUNED_ON,
     PpoSettings,
-    change_settings,
     learner_settings,
+    resolve_learner,
     tuning_text,
 )
 
 
 def test_some_settings_change_and_others_stay() -> None:
     """Values as TOML holds them: lists for tuples, whole numbers for floats."""
-    changed = change_settings("ppo-run", {"net_arch": [32], "learning_rate": 1})
+    _, changed = resolve_learner("ppo-run", {"net_arch": [32], "learning_rate": 1})
     assert isinstance(changed, PpoSettings)
     assert (changed.net_arch, changed.learning_rate) == ((32,), 1.0)
     assert changed.n_steps == learner_settings("ppo-run").n_steps  # type: ignore[union-attr]
-    assert change_settings("ppo-run", {}) == learner_settings("ppo-run")
+    assert resolve_learner("ppo-run", {}) == ("ppo-run", learner_settings("ppo-run"))
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_wrong_settings_are_refused(
 ) -> None:
     """With the name of the setting."""
     with pytest.raises(kind, match=words):
-        change_settings("ppo-run", changed)
+        resolve_learner("ppo-run", changed)
 
 
 def test_every_learner_says_what_it_was_tuned_on() -> None:

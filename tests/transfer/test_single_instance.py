@@ -9,7 +9,7 @@ import pytest
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Evaluation
-from shapechanger.transfer.learners.ppo import train
+from shapechanger.transfer.learners.sb3 import train
 from tests.transfer.studies import TINY
 
 FINGER = EnvRef("shapechanger/Finger-v1")

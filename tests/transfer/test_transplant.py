@@ -719,7 +719,7 @@ def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str
     body_map = MAPS["identity"]
     with pytest.raises(TransplantError, match=message) as caught:
         transplant(make(body_map), body_map, envs(ant_observation(), ant_action()))
-    assert "Only PPO and SAC with an MlpPolicy" in str(caught.value)
+    assert "Only models with the MlpPolicy of PPO, SAC or TQC" in str(caught.value)
 
 
 def test_unknown_parameters_are_refused() -> None:

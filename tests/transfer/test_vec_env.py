@@ -11,7 +11,7 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.ppo import ThreadVecEnv, training_vec_env
+from shapechanger.transfer.learners.sb3 import ThreadVecEnv, training_vec_env
 from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 

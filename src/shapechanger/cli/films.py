@@ -15,7 +15,7 @@ from shapechanger.reports.verdict import finals
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.env_ref import EnvRef, measures_of
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
-from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import learner_of, policy_path
 
@@ -54,7 +54,7 @@ def film_study(study: Study, folder: Path, film: Path | None = None) -> list[Fil
         RenderError: If frames cannot be drawn here.
         OutputError: If the film cannot be written.
     """
-    if not isinstance(study.plan.settings, PpoSettings):
+    if not isinstance(study.plan.settings, Sb3Settings):
         return []
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []

@@ -264,14 +264,16 @@ class Suite:
 
     def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
         """The plan of one study."""
-        from shapechanger.transfer.learners.settings import change_settings
+        from shapechanger.transfer.learners.settings import resolve_learner
         from shapechanger.transfer.study import default_arms, make_plan
 
-        learner = suite.learner or default_learner(task.target)
+        learner, settings = resolve_learner(
+            suite.learner or default_learner(task.target), suite.settings
+        )
         return make_plan(
             task,
             learner,
-            change_settings(learner, suite.settings),
+            settings,
             seeds=suite.seeds if self.seeds is None else self.seeds,
             steps=suite.steps if self.steps is None else self.steps,
             source_steps=suite.source_steps if self.source_steps is None else self.source_steps,

@@ -26,7 +26,7 @@ from shapechanger.errors import MissingExtra, OutputError
 if TYPE_CHECKING:
     from shapechanger.transfer.env_ref import EnvRef
     from shapechanger.transfer.learners.evaluation import Evaluation
-    from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
+    from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
 
 __all__ = ["Train"]
 
@@ -44,7 +44,8 @@ class Train:
     steps: int | None = None
     """Env steps; the learner's own number if not given."""
     learner: str | None = None
-    """Name of the learner's settings; those tuned for the env if not given."""
+    """Name of the learner's settings, a TOML file of them, or a class or function of yours as
+    module:name; those tuned for the env if not given."""
     set: tuple[str, ...] = ()
     """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     seed: int = 0
@@ -57,21 +58,22 @@ class Train:
         from shapechanger.transfer.env_ref import env_traits
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
-        from shapechanger.transfer.learners.ppo import require_budget, train, use_one_thread
+        from shapechanger.transfer.learners.sb3 import require_budget, train, use_one_thread
         from shapechanger.transfer.learners.settings import (
-            PpoSettings,
-            change_settings,
+            Sb3Settings,
+            resolve_learner,
             tuning_text,
         )
         from shapechanger.transfer.runs import learner_of
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
-        learner = self.learner or default_learner(env)
-        settings = change_settings(learner, settings_of(self.set))
+        learner, settings = resolve_learner(
+            self.learner or default_learner(env), settings_of(self.set)
+        )
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
-        suffix = ".safetensors" if isinstance(settings, PpoSettings) else ".zip"
+        suffix = ".safetensors" if isinstance(settings, Sb3Settings) else ".zip"
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + suffix)
         # The policy is written last; check first that it can be.
         with opened(env) as made:
@@ -95,7 +97,7 @@ class Train:
 
         try:
             with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
-                if not isinstance(settings, PpoSettings):
+                if not isinstance(settings, Sb3Settings):
                     _learn_to_drive(env, settings, steps, self.seed, out, show, progress)
                     console.print(f"wrote {out}")
                     return
@@ -118,7 +120,7 @@ class Train:
 
 def _learn_to_drive(
     env: EnvRef,
-    settings: CloningSettings | SacSettings,
+    settings: CloningSettings | CameraSacSettings,
     steps: int,
     seed: int,
     out: Path,
@@ -126,8 +128,8 @@ def _learn_to_drive(
     progress: StudyProgress,
 ) -> None:
     """Clone the demonstrator of an env, and write the policy and its demonstrations."""
+    from shapechanger.transfer.learners.camera import train_camera_policy
     from shapechanger.transfer.learners.cloning import DemonstrationFile
-    from shapechanger.transfer.learners.sac import train_camera_policy
 
     policy = train_camera_policy(
         env,

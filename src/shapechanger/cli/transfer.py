@@ -78,7 +78,8 @@ class Transfer:
     """What policies are compared by: a measure of the target such as "forward speed", a reward term
     such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
-    """Name of the learner's settings; those tuned for the target if not given."""
+    """Name of the learner's settings, a TOML file of them, or a class or function of yours as
+    module:name; those tuned for the target if not given."""
     set: tuple[str, ...] = ()
     """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     arms: tuple[str, ...] = ()
@@ -170,11 +171,12 @@ class Transfer:
 
     def _plan(self, task: TransferTask, traits: TaskTraits) -> Plan:
         """The plan of the study."""
-        from shapechanger.transfer.learners.settings import change_settings
+        from shapechanger.transfer.learners.settings import resolve_learner
         from shapechanger.transfer.study import default_arms, make_plan
 
-        learner = self.learner or default_learner(task.target)
-        settings = change_settings(learner, settings_of(self.set))
+        learner, settings = resolve_learner(
+            self.learner or default_learner(task.target), settings_of(self.set)
+        )
         steps, seeds = self.steps, self.seeds
         if self.quick:
             shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)

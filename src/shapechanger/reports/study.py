@@ -31,8 +31,8 @@ from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.settings import (
+    CameraSacSettings,
     CloningSettings,
-    SacSettings,
     Settings,
     tuning_text,
 )
@@ -301,7 +301,7 @@ def _rhythm(settings: Settings) -> str:
             f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
             "cloned anew from the same start, and all arms use the same demonstrations."
         )
-    if isinstance(settings, SacSettings):
+    if isinstance(settings, CameraSacSettings):
         return (
             f"every {count(settings.eval_every)} steps of SAC, which starts after "
             f"{count(settings.demonstrated_steps)} demonstrated steps: these are cloned first, and "

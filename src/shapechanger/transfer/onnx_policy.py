@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import CorruptStudy, MissingExtra, StudyError
+from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, TransplantError
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
@@ -68,6 +68,7 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
 
     Raises:
         MissingExtra: If onnx is not installed.
+        StudyError: If its network is not the `MlpPolicy` of PPO, SAC or TQC.
         OutputError: If it cannot be written.
     """
     try:
@@ -94,22 +95,22 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         last = apply("Div", [last, "deviation"], "scaled")
         last = apply("Clip", [last, "least", "most"], "normalised")
     last = apply("Cast", [last], "features", to=onnx.TensorProto.FLOAT)
-    weights = {
-        name: value.detach().cpu().numpy()
-        for name, value in policy.model.policy.state_dict().items()
-    }
-    hidden = [name for name in weights if name.startswith("mlp_extractor.policy_net.")]
-    layers = list(dict.fromkeys(name.rpartition(".")[0] for name in hidden))
-    for place, layer in enumerate([*layers, "action_net"]):
-        constants[f"weight_{place}"] = weights[f"{layer}.weight"]
-        constants[f"bias_{place}"] = weights[f"{layer}.bias"]
+    network = _mean_network(policy)
+    for place, layer in enumerate(network.layers):
+        constants[f"weight_{place}"] = layer.weight.detach().cpu().numpy()
+        constants[f"bias_{place}"] = layer.bias.detach().cpu().numpy()
         inputs = [last, f"weight_{place}", f"bias_{place}"]
         last = apply("Gemm", inputs, f"sum_{place}", transB=1)
-        if layer != "action_net":
-            last = apply("Tanh", [last], f"layer_{place}")
+        if place < len(network.layers) - 1:
+            last = apply(network.activation, [last], f"layer_{place}")
     space: Any = cast("Any", policy.model).action_space
-    constants["low"] = space.low.astype(np.float32)
-    constants["high"] = space.high.astype(np.float32)
+    low, high = space.low.astype(np.float32), space.high.astype(np.float32)
+    if network.squashes:
+        constants["half"], constants["middle"] = 0.5 * (high - low), 0.5 * (high + low)
+        last = apply("Tanh", [last], "squashed")
+        last = apply("Mul", [last, "half"], "stretched")
+        last = apply("Add", [last, "middle"], "moved")
+    constants["low"], constants["high"] = low, high
     last = apply("Max", [last, "low"], "bounded")
     apply("Min", [last, "high"], "action")
     sides = (
@@ -133,6 +134,44 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
     make.set_model_props(model, {**facts, _CARD: msgspec.json.encode(card).decode()})
     cast("Any", onnx).checker.check_model(model)
     write_atomic(path, model.SerializeToString())
+
+
+class _MeanNetwork(NamedTuple):
+    """The network from normalised observations to mean actions.
+
+    Attributes:
+        layers: Its linear layers.
+        activation: What follows each but the last, as ONNX calls it.
+        squashes: Whether tanh and the bounds follow the last.
+    """
+
+    layers: list[Any]
+    activation: str
+    squashes: bool
+
+
+def _mean_network(policy: TrainedPolicy) -> _MeanNetwork:
+    from torch import nn
+
+    from shapechanger.transfer.transplant.model import check_supported
+
+    try:
+        check_supported(policy.model)
+    except TransplantError as error:
+        raise StudyError(f"This policy cannot be exported: {error}") from error
+    model: Any = policy.model
+    squashes = not hasattr(model.policy, "mlp_extractor")
+    if squashes:
+        hidden, last = model.policy.actor.latent_pi, model.policy.actor.mu
+    else:
+        hidden, last = model.policy.mlp_extractor.policy_net, model.policy.action_net
+    kinds: set[type] = {type(layer) for layer in hidden if not isinstance(layer, nn.Linear)}
+    known: dict[type, str] = {nn.Tanh: "Tanh", nn.ReLU: "Relu"}
+    activation = known.get(kinds.pop()) if kinds else "Tanh"
+    if kinds or activation is None:
+        raise StudyError("This policy cannot be exported: it has other layers than Tanh or ReLU.")
+    layers = [layer for layer in hidden if isinstance(layer, nn.Linear)]
+    return _MeanNetwork([*layers, last], activation, squashes)
 
 
 class OnnxPolicy:

@@ -19,6 +19,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import ReportSteps
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.learners import Learner
+from shapechanger.transfer.learners.camera import CameraLearner
 from shapechanger.transfer.learners.cloning import DemonstrationFile
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
@@ -27,9 +28,8 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.ppo import OnEvaluation, PpoLearner, use_one_thread
-from shapechanger.transfer.learners.sac import CameraLearner
-from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.learners.sb3 import OnEvaluation, Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
@@ -68,8 +68,8 @@ def learner_of(name: str, settings: Settings) -> Learner:
         name: Name of the learner.
         settings: Its settings.
     """
-    if isinstance(settings, PpoSettings):
-        return PpoLearner(name, settings)
+    if isinstance(settings, Sb3Settings):
+        return Sb3Learner(name, settings)
     return CameraLearner(name, settings)
 
 
@@ -234,5 +234,5 @@ def policy_path(plan: Plan, study: Path, run: Run) -> Path:
         study: Folder of the study.
         run: The run.
     """
-    is_ppo = isinstance(plan.settings, PpoSettings)
-    return run.folder(study) / ("policy.safetensors" if is_ppo else "policy.zip")
+    of_sb3 = isinstance(plan.settings, Sb3Settings)
+    return run.folder(study) / ("policy.safetensors" if of_sb3 else "policy.zip")

@@ -157,11 +157,18 @@ def test_bodies_of_two_families_have_no_path() -> None:
         tiny_plan(task=task, arms=("scratch", "evolution"))
 
 
-@pytest.mark.parametrize("arm", ["frozen-trunk", "kickstart", "evolution"])
-def test_clones_are_refused(arm: str) -> None:
-    """Before anything is recorded: these methods are PPO's."""
+@pytest.mark.parametrize(
+    ("arm", "needs"),
+    [
+        ("frozen-trunk", "PPO"),
+        ("kickstart", "PPO"),
+        ("evolution", "a learner of Stable-Baselines3"),
+    ],
+)
+def test_clones_are_refused(arm: str, needs: str) -> None:
+    """Before anything is recorded: these methods are not for cloning."""
     cars = TransferTask(EnvRef("shapechanger/Car-v1"), EnvRef("shapechanger/Tank-v1"))
-    with pytest.raises(StudyError, match=f"{arm} needs PPO"):
+    with pytest.raises(StudyError, match=f"{arm} needs {needs}"):
         tiny_plan(learner_settings("cloning"), task=cars, arms=("scratch", arm))  # type: ignore[arg-type]
 
 

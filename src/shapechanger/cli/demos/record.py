@@ -57,7 +57,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         return ExpertPilot(_expert(env, seed))
     if not Path(driver).is_file():
         raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
-    from shapechanger.transfer.learners.ppo import use_one_thread
+    from shapechanger.transfer.learners.sb3 import use_one_thread
 
     use_one_thread()  # Inference on single frames is slower with more threads.
     act = _policy(Path(driver), env)

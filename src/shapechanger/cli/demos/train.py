@@ -62,7 +62,7 @@ class TrainClone:
         from shapechanger.demos.cloning.learn import learn, settings_for
         from shapechanger.demos.dataset import count_steps, load_dataset
         from shapechanger.reports.clone import write_clone_report, write_numbers
-        from shapechanger.transfer.learners.ppo import use_one_thread
+        from shapechanger.transfer.learners.sb3 import use_one_thread
 
         console = plain_console()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))

@@ -19,7 +19,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
-from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
+from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
 
 __all__ = [
     "CLONE_EVALUATION_SEED",
@@ -211,7 +211,7 @@ def train_clones(
 
 
 def evaluate_clone(
-    env: EnvRef, policy: CameraPolicy, settings: CloningSettings | SacSettings, steps: int = 0
+    env: EnvRef, policy: CameraPolicy, settings: CloningSettings | CameraSacSettings, steps: int = 0
 ) -> Evaluation:
     """Evaluate a clone.
 

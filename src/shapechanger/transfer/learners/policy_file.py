@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import random
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,13 +25,14 @@ from shapechanger.errors import CorruptStudy, MissingExtra
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
-from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
+from shapechanger.transfer.learners.settings import Sb3Settings
 
 try:
     import torch
     from safetensors import SafetensorError
     from safetensors import numpy as safetensors
-    from stable_baselines3 import PPO
+    from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.running_mean_std import RunningMeanStd
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
@@ -43,7 +45,6 @@ __all__ = [
     "PolicyCard",
     "TrainedPolicy",
     "load_policy",
-    "ppo_arguments",
     "save_policy",
 ]
 
@@ -74,7 +75,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
     observation: Layout
     action: Layout
     learner: str
-    settings: PpoSettings
+    settings: Sb3Settings
     steps: int
     seed: int
     version: str
@@ -104,7 +105,7 @@ class TrainedPolicy:
         card: Its provenance.
     """
 
-    model: PPO
+    model: BaseAlgorithm
     normalisation: Normalisation | None
     card: PolicyCard
 
@@ -114,7 +115,7 @@ class TrainedPolicy:
         return actor(self.model, self.normalisation)
 
 
-def actor(model: PPO, normalisation: Normalisation | None) -> Act:
+def actor(model: BaseAlgorithm, normalisation: Normalisation | None) -> Act:
     """Return a function from the env's observations to the model's mean actions.
 
     Args:
@@ -139,21 +140,6 @@ _CLIP: Final = 10.0
 def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArray[np.float32]:
     scaled = (observations - statistics.mean) / np.sqrt(statistics.var + _EPSILON)
     return np.clip(scaled, -_CLIP, _CLIP).astype(np.float32)
-
-
-def ppo_arguments(settings: PpoSettings) -> dict[str, Any]:
-    """Return the arguments of Stable-Baselines3's PPO that do not depend on the network."""
-    return {
-        "n_steps": settings.n_steps,
-        "batch_size": settings.batch_size,
-        "n_epochs": settings.n_epochs,
-        "learning_rate": settings.learning_rate,
-        "gamma": settings.gamma,
-        "gae_lambda": settings.gae_lambda,
-        "clip_range": settings.clip_range,
-        "ent_coef": settings.ent_coef,
-        "device": "cpu",
-    }
 
 
 def save_policy(policy: TrainedPolicy, path: Path) -> None:
@@ -185,11 +171,13 @@ def save_policy(policy: TrainedPolicy, path: Path) -> None:
     write_atomic(path, safetensors.save(tensors, metadata=metadata))
 
 
-def load_policy(path: Path) -> TrainedPolicy:
+def load_policy(path: Path, function: str = "") -> TrainedPolicy:
     """Read what `save_policy` wrote.
 
     Args:
         path: The file.
+        function: The function that may be called to build the model, as `module:function`. A file
+            alone may only name classes of models.
 
     Raises:
         CorruptStudy: If the file is missing, is no such policy, or has been changed.
@@ -201,7 +189,7 @@ def load_policy(path: Path) -> TrainedPolicy:
         tensors = safetensors.load(content)
         if _digest(tensors) != metadata[_HASH]:
             raise ValueError("its numbers do not have the hash of its card")
-        return TrainedPolicy(_model(card, tensors), _read_statistics(tensors), card)
+        return TrainedPolicy(_model(card, tensors, function), _read_statistics(tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
     except (
@@ -237,26 +225,26 @@ def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
     return digest.hexdigest()
 
 
-def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> PPO:
+def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str) -> BaseAlgorithm:
     """Build the model that the card describes, with the weights of the file."""
     settings = card.settings
-    model: Any = PPO(
-        "MlpPolicy",
-        None,  # pyright: ignore[reportArgumentType]  # Its spaces follow.
-        policy_kwargs={
-            "net_arch": list(settings.net_arch),
-            "log_std_init": settings.log_std_init,
-        },
-        _init_setup_model=False,
-        **ppo_arguments(settings),
-    )
+    if settings.algorithm != function:
+        require_class(settings.algorithm)
+    spaces: list[gym.spaces.Box] = []
     for side, layout in (("observation", card.observation), ("action", card.action)):
         low, high = (tensors[f"{_SPACES}{side}.{end}"] for end in ("low", "high"))
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
-        setattr(model, f"{side}_space", gym.spaces.Box(low, high, dtype=low.dtype.type))
-    model.n_envs = settings.n_envs
-    model._setup_model()
+        spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
+    # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
+    states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
+    try:
+        model: Any = build_model(settings, SpacesOnly(settings.n_envs, *spaces), card.seed)
+    finally:
+        random.setstate(states[0])
+        np.random.set_state(states[1])  # noqa: NPY002
+        torch.set_rng_state(states[2])
+    model.env = None
     weights = {
         name.removeprefix(_WEIGHTS): torch.from_numpy(value.copy())  # pyright: ignore[reportUnknownMemberType]
         for name, value in tensors.items()

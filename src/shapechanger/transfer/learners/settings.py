@@ -1,10 +1,12 @@
-"""Learner settings: PPO, cloning, and SAC from a camera; the shipped sets were tuned."""
+"""Learner settings: Stable-Baselines3's, cloning, and SAC from a camera; the shipped sets."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, Literal, Self, TypeVar
 
 import msgspec
 
@@ -14,59 +16,46 @@ from shapechanger.errors import StudyError, UnknownName
 __all__ = [
     "LEARNERS",
     "TUNED_ON",
+    "CameraSacSettings",
     "CloningSettings",
+    "ImportedSettings",
+    "OffPolicySettings",
     "PpoSettings",
-    "SacSettings",
+    "Sb3Settings",
     "Settings",
-    "change_settings",
     "learner_settings",
+    "resolve_learner",
     "tuning_text",
 ]
 
 
-class PpoSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
-    """Settings of Stable-Baselines3's PPO, under its names.
+class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
+    """Settings that all learners of Stable-Baselines3 share.
 
     Attributes:
+        algorithm: The class that learns: "PPO", "SAC", "TQC", or `module:name`.
         n_envs: Number of parallel envs.
-        n_steps: Steps of each env between two updates.
-        batch_size: Steps in a minibatch.
-        n_epochs: Passes over the steps of an update.
-        learning_rate: Learning rate of Adam.
-        gamma: Discount.
-        gae_lambda: Lambda of generalised advantage estimation.
-        clip_range: Clipping range of the policy ratio.
-        ent_coef: Weight of the entropy.
-        log_std_init: Initial logarithm of the standard deviation of the actions.
         net_arch: Widths of the hidden layers, of actor and critic each.
         normalise: Whether observations and rewards are divided by running estimates of their
             standard deviation (`VecNormalize`).
         steps: Default env steps of a training.
         source_steps: Default env steps of a source policy; 0 for half as many as on the target, so
             that total steps leave something to compare.
-        eval_every: Target steps between two evaluations, at least `n_envs * n_steps`.
+        eval_every: Target steps between two evaluations, at least `update_steps`.
         eval_episodes: Episodes of an evaluation, with the policy's mean actions.
     """
 
-    n_envs: int
-    n_steps: int
-    batch_size: int
-    n_epochs: int
-    learning_rate: float
-    gamma: float = 0.99
-    gae_lambda: float = 0.95
-    clip_range: float = 0.2
-    ent_coef: float = 0.0
-    log_std_init: float = 0.0
+    algorithm: str
+    n_envs: int = 1
     net_arch: tuple[int, ...] = (64, 64)
     normalise: bool = False
     steps: int
     source_steps: int = 0
     eval_every: int
-    eval_episodes: int
+    eval_episodes: int = 5
 
     def __post_init__(self) -> None:
-        if self.n_envs < 1 or self.n_steps < 1 or self.eval_episodes < 1:
+        if min(self.n_envs, self.update_steps, self.eval_episodes) < 1:
             raise StudyError("A learner needs at least one env, one step and one episode.")
         if self.eval_every < self.update_steps:
             raise StudyError(
@@ -77,11 +66,12 @@ class PpoSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
     @property
     def update_steps(self) -> int:
         """Env steps between two updates; budgets are rounded up to a multiple of it."""
-        return self.n_envs * self.n_steps
+        raise NotImplementedError
 
-    def whole_updates(self, steps: int) -> int:
-        """Round `steps` up to whole updates."""
-        return -(-steps // self.update_steps) * self.update_steps
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of the class besides policy, env and seed."""
+        raise NotImplementedError
 
     @property
     def last_k(self) -> int:
@@ -93,10 +83,145 @@ class PpoSettings(msgspec.Struct, frozen=True, kw_only=True, tag="ppo"):
         """Steps after which an evaluation episode is truncated; None for the env's own limit."""
         return None
 
-    def for_budget(self, steps: int) -> PpoSettings:
+    def whole_updates(self, steps: int) -> int:
+        """Round `steps` up to whole updates."""
+        return -(-steps // self.update_steps) * self.update_steps
+
+    def for_budget(self, steps: int) -> Self:
         """Return the settings for a shorter budget: four evaluations, no source default."""
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
+
+
+class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
+    """Settings of Stable-Baselines3's PPO, under its names.
+
+    Attributes:
+        n_steps: Steps of each env between two updates.
+        batch_size: Steps in a minibatch.
+        n_epochs: Passes over the steps of an update.
+        learning_rate: Learning rate of Adam.
+        gamma: Discount.
+        gae_lambda: Lambda of generalised advantage estimation.
+        clip_range: Clipping range of the policy ratio.
+        ent_coef: Weight of the entropy.
+        log_std_init: Initial logarithm of the standard deviation of the actions.
+    """
+
+    algorithm: Literal["PPO"] = "PPO"
+    n_steps: int
+    batch_size: int
+    n_epochs: int
+    learning_rate: float
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    ent_coef: float = 0.0
+    log_std_init: float = 0.0
+
+    @property
+    def update_steps(self) -> int:
+        """Env steps between two updates."""
+        return self.n_envs * self.n_steps
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of the class besides policy, env and seed."""
+        return {
+            "policy_kwargs": {
+                "net_arch": list(self.net_arch),
+                "log_std_init": self.log_std_init,
+            },
+            "n_steps": self.n_steps,
+            "batch_size": self.batch_size,
+            "n_epochs": self.n_epochs,
+            "learning_rate": self.learning_rate,
+            "gamma": self.gamma,
+            "gae_lambda": self.gae_lambda,
+            "clip_range": self.clip_range,
+            "ent_coef": self.ent_coef,
+        }
+
+
+class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
+    """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
+
+    Attributes:
+        algorithm: SAC or TQC.
+        net_arch: Widths of the hidden layers, of actor and critics each.
+        learning_rate: Learning rate of Adam.
+        batch_size: Transitions in a batch.
+        buffer_size: Transitions that the replay buffer keeps.
+        learning_starts: Env steps before the first update, with random actions. A transplanted
+            policy acts itself in these.
+        train_freq: Steps of each env between two updates.
+        gradient_steps: Gradient steps of an update; -1 for as many as env steps.
+        gamma: Discount.
+        tau: Share of the critics that moves into their targets at each gradient step.
+        ent_coef: Weight of the entropy; "auto" to learn it.
+    """
+
+    algorithm: Literal["SAC", "TQC"]
+    net_arch: tuple[int, ...] = (256, 256)
+    learning_rate: float = 3e-4
+    batch_size: int = 256
+    buffer_size: int = 1_000_000
+    learning_starts: int = 10_000
+    train_freq: int = 1
+    gradient_steps: int = -1
+    gamma: float = 0.99
+    tau: float = 0.005
+    ent_coef: float | str = "auto"
+
+    @property
+    def update_steps(self) -> int:
+        """Env steps between two updates."""
+        return self.n_envs * self.train_freq
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of the class besides policy, env and seed."""
+        return {
+            "policy_kwargs": {"net_arch": list(self.net_arch)},
+            "learning_rate": self.learning_rate,
+            "batch_size": self.batch_size,
+            "buffer_size": self.buffer_size,
+            "learning_starts": self.learning_starts,
+            "train_freq": self.train_freq,
+            "gradient_steps": self.gradient_steps,
+            "gamma": self.gamma,
+            "tau": self.tau,
+            "ent_coef": self.ent_coef,
+        }
+
+
+class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
+    """Settings of any class that is compatible with Stable-Baselines3, or of a function.
+
+    Attributes:
+        algorithm: The class as `module:Class`, called as `Class("MlpPolicy", envs, seed=seed,
+            **arguments)`; or a function `module:function(envs, seed, **arguments)` that returns a
+            model.
+        steps_per_update: Steps of each env between two updates, which the class calls `n_steps` or
+            `train_freq`.
+        arguments: Its arguments.
+    """
+
+    algorithm: str
+    steps_per_update: int = 1
+    steps: int = 100_000
+    eval_every: int = 10_000
+    arguments: dict[str, Any] = {}
+
+    @property
+    def update_steps(self) -> int:
+        """Env steps between two updates."""
+        return self.n_envs * self.steps_per_update
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of the class or function besides policy, env and seed."""
+        return self.arguments
 
 
 class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
@@ -164,7 +289,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
+class CameraSacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac-camera"):
     """Settings of SAC from a camera, starting from a clone; those of SAC under SB3's names.
 
     Attributes:
@@ -225,7 +350,7 @@ class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
         """Default steps of a source policy: none of its own."""
         return 0
 
-    def for_budget(self, steps: int) -> SacSettings:
+    def for_budget(self, steps: int) -> CameraSacSettings:
         """Return the settings for a shorter budget: the same."""
         return self
 
@@ -240,8 +365,13 @@ class SacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac"):
         )
 
 
-Settings = PpoSettings | CloningSettings | SacSettings
+Sb3Settings = PpoSettings | OffPolicySettings | ImportedSettings
+"""The settings of any learner of Stable-Baselines3."""
+
+Settings = Sb3Settings | CloningSettings | CameraSacSettings
 """The settings of any learner."""
+
+_Kind = TypeVar("_Kind", bound=msgspec.Struct)
 
 # Tuned on the reaching finger only: each of four seeds ends with 200 of 200
 # targets reached (`python -m benchmarks.run finger-learned`).
@@ -303,10 +433,13 @@ LEARNERS: Final[dict[str, Settings]] = {
         # Early stopping on few held-out pictures is unreliable: it stopped after 150 steps.
         clone=CloneSettings(held_out=0.0),
     ),
+    # The settings that the papers of SAC and TQC share, and Stable-Baselines3's defaults.
+    "sac": OffPolicySettings(algorithm="SAC", steps=200_000, eval_every=20_000),
+    "tqc": OffPolicySettings(algorithm="TQC", steps=200_000, eval_every=20_000),
     # A minute of demonstrations and nine of SAC. Chosen on the tank that starts from the car's
     # clone (seed 100, up to 8,400 steps): without the anchor, or with ten times the learning rate,
     # it soon fell below the clone; near these settings it stayed as good as the clone, not better.
-    "sac": SacSettings(
+    "sac-camera": CameraSacSettings(
         demonstrated_steps=1200,
         steps=12_000,
         episode_steps=200,
@@ -330,7 +463,9 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-finger": ("Finger",),
     "ppo-rig": ("Finger",),
     "cloning": ("Car",),
-    "sac": ("Tank",),
+    "sac": (),
+    "tqc": (),
+    "sac-camera": ("Tank",),
 }
 """The envs that the settings of each learner were tuned on; all others inherit them."""
 
@@ -342,7 +477,7 @@ def tuning_text(learner: str, env: str) -> str:
         learner: Name of the learner.
         env: Id of the env.
     """
-    if learner not in TUNED_ON:
+    if not TUNED_ON.get(learner):
         return "Nobody has stated what these settings were tuned on."
     name = env.rpartition("/")[2].removesuffix("-v1")
     tuned = " and ".join(TUNED_ON[learner])
@@ -362,25 +497,69 @@ def learner_settings(name: str) -> Settings:
     return LEARNERS[name]
 
 
-def change_settings(learner: str, changed: Mapping[str, Any]) -> Settings:
-    """Return the shipped settings of a learner with some of them replaced.
+def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Settings]:
+    """Return the name and the settings of a learner, with some of them replaced.
 
     Args:
-        learner: Name of the learner.
-        changed: New values by name, as TOML or JSON hold them.
+        learner: Name of shipped settings; a TOML file; or `module:name`, a class of models that is
+            compatible with Stable-Baselines3, or a function that builds one.
+        changed: New values by name, as TOML or JSON hold them. With `module:name`, those that are
+            no settings of ours are arguments of the class or function.
 
     Raises:
         UnknownName: If there is no such learner, or it has no such setting.
-        StudyError: If a value is of the wrong type, or impossible.
+        StudyError: If a value is of the wrong type, or impossible, or the file cannot be read.
     """
-    settings = learner_settings(learner)
-    known: dict[str, Any] = msgspec.structs.asdict(settings)
-    for name in changed:
-        if name not in known:
-            raise UnknownName(f"setting of {learner}", name, known)
+    if learner.endswith(".toml"):
+        return _read_learner(Path(learner), changed)
+    if ":" in learner:
+        return learner, _imported(learner, changed)
+    return learner, _changed(learner, learner_settings(learner), changed)
+
+
+def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings]:
+    """Read a TOML with a learner, or with `preset`, and with settings of it."""
     try:
-        return msgspec.convert(
-            {**msgspec.to_builtins(settings), **changed}, type(settings), strict=True
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UnknownName("learner", str(path), LEARNERS) from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"The learner {path} cannot be read: {error}.") from error
+    start = given.pop("preset", None) or given.pop("algorithm", None)
+    if not isinstance(start, str) or start.endswith(".toml"):
+        raise StudyError(
+            f"{path} names what it starts from: `preset` is one of {', '.join(LEARNERS)}, or "
+            "`algorithm` is a class or function as module:name."
         )
+    try:
+        _, settings = resolve_learner(start, {**given, **changed})
+    except (StudyError, UnknownName) as error:
+        raise StudyError(f"{path}: {error}") from error
+    return path.stem, settings
+
+
+def _imported(algorithm: str, changed: Mapping[str, Any]) -> Settings:
+    from shapechanger.transfer.learners.algorithms import checked_settings
+
+    ours = {field.name for field in msgspec.structs.fields(ImportedSettings)}
+    own = {name: value for name, value in changed.items() if name in ours}
+    own["arguments"] = {name: value for name, value in changed.items() if name not in ours}
+    return checked_settings(
+        _converted(algorithm, ImportedSettings, {"algorithm": algorithm, **own})
+    )
+
+
+def _changed(name: str, settings: Settings, changed: Mapping[str, Any]) -> Settings:
+    known: dict[str, Any] = msgspec.structs.asdict(settings)
+    for setting in changed:
+        if setting not in known:
+            raise UnknownName(f"setting of {name}", setting, known)
+    values: dict[str, Any] = {**msgspec.to_builtins(settings), **changed}
+    return _converted(name, type(settings), values)
+
+
+def _converted(name: str, kind: type[_Kind], values: dict[str, Any]) -> _Kind:
+    try:
+        return msgspec.convert(values, kind, strict=True)
     except msgspec.ValidationError as error:
-        raise StudyError(f"The settings of {learner} are wrong: {error}.") from None
+        raise StudyError(f"The settings of {name} are wrong: {error}.") from None

@@ -11,7 +11,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
 __all__ = ["Evolution", "bodies_between"]
@@ -32,9 +32,11 @@ class Evolution(Method):
     paper = "X. Liu, D. Pathak and K. M. Kitani, REvolveR, ICML 2022"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse bodies of two families, and learners other than PPO."""
-        if not isinstance(settings, PpoSettings):
-            raise StudyError(f"{self.name} needs PPO: leave this arm out.")
+        """Refuse bodies of two families, and learners that are not of Stable-Baselines3."""
+        if not isinstance(settings, Sb3Settings):
+            raise StudyError(
+                f"{self.name} needs a learner of Stable-Baselines3: leave this arm out."
+            )
         if not source.family or source.family != target.family:
             raise StudyError(
                 f"{self.name} needs two bodies of one family, such as two ants: leave this arm out."
@@ -42,7 +44,7 @@ class Evolution(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train along the path, and then on the target."""
-        assert isinstance(run.settings, PpoSettings)  # As `require` has seen.
+        assert isinstance(run.settings, Sb3Settings)  # As `require` has seen.
         stage = run.settings.whole_updates(run.settings.eval_every)
         n_stages = int(_ON_THE_WAY * run.steps) // stage
         path = bodies_between(run.source, run.target, n_stages)

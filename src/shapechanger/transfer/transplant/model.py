@@ -9,7 +9,8 @@ from typing import Any, Final, TypeVar, cast
 import gymnasium as gym
 import numpy as np
 import torch
-from stable_baselines3 import PPO, SAC
+from sb3_contrib.tqc import policies as tqc
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import NStepReplayBuffer
 from stable_baselines3.common.distributions import DiagGaussianDistribution
 from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
@@ -41,8 +42,9 @@ from shapechanger.transfer.transplant.layers import (
 
 __all__ = ["check_supported", "new_model", "transplant"]
 
-Model = TypeVar("Model", PPO, SAC)
+Model = TypeVar("Model", bound=BaseAlgorithm)
 
+_POLICIES: Final = (ActorCriticPolicy, SACPolicy, tqc.TQCPolicy)
 _GIVEN_ANEW: Final = frozenset({"self", "policy", "env", "seed", "device", "_init_setup_model"})
 # Arguments that a model stores under another name.
 _KEPT_AS: Final = {"stats_window_size": "_stats_window_size"}
@@ -68,7 +70,7 @@ def new_model(
         TransplantError: If the source uses action noise and `changes` does not replace it.
     """
     kept: dict[str, Any] = {}
-    for name in inspect.signature(type(source).__init__).parameters:
+    for name in inspect.signature(cast("Any", type(source)).__init__).parameters:
         attribute = _KEPT_AS.get(name, name)
         if name not in _GIVEN_ANEW and hasattr(source, attribute):
             kept[name] = getattr(source, attribute)
@@ -78,15 +80,21 @@ def new_model(
             "the target, as in transplant(..., action_noise=None)."
         )
     kept["policy_kwargs"] = copy.deepcopy(source.policy_kwargs)
-    if isinstance(source, SAC):
+    if _is_squashed(source):
         _undo_set_up(source, kept)
     kept |= {"policy": source.policy_class, "env": env, "seed": seed, "device": device}
     return type(source)(**(kept | changes))
 
 
-def _undo_set_up(source: SAC, kept: dict[str, Any]) -> None:
+def _is_squashed(model: BaseAlgorithm) -> bool:
+    """Whether a model has a policy as SAC's, which squashes its actions to the bounds."""
+    return isinstance(model.policy, SACPolicy | tqc.TQCPolicy)
+
+
+def _undo_set_up(model: BaseAlgorithm, kept: dict[str, Any]) -> None:
     """Turn resolved "auto" settings back into "auto", because they depend on the body."""
-    if source.target_entropy == -float(cast("Any", source).action_space.shape[0]):
+    source = cast("Any", model)
+    if source.target_entropy == -float(source.action_space.shape[0]):
         kept["target_entropy"] = "auto"
     if source.replay_buffer_class is NStepReplayBuffer:
         kept["replay_buffer_class"] = None
@@ -99,35 +107,39 @@ def check_supported(model: object) -> None:
     """Refuse a model whose weights cannot be transplanted.
 
     Raises:
-        TransplantError: If it is not PPO or SAC with an `MlpPolicy` on flat observations and plain
-            Gaussian exploration.
+        TransplantError: If its policy is not the `MlpPolicy` of PPO, SAC or TQC, on flat
+            observations and with plain Gaussian exploration.
     """
     problem = _problem(model)
     if problem:
         raise TransplantError(
-            f"{problem} Only PPO and SAC with an MlpPolicy can be transplanted, on flat "
-            "observations and continuous actions, without gSDE."
+            f"{problem} Only models with the MlpPolicy of PPO, SAC or TQC can be transplanted, on "
+            "flat observations and continuous actions, without gSDE."
         )
 
 
 def _problem(model: object) -> str:
     """Return why the model is not supported, as a sentence; empty if it is."""
-    if not isinstance(model, PPO | SAC):
+    if not isinstance(model, BaseAlgorithm):
         return f"This model is {type(model).__name__}."
-    extractors = [m for m in model.policy.modules() if isinstance(m, BaseFeaturesExtractor)]
+    policy = model.policy
+    if type(policy) not in _POLICIES:
+        return f"This model has a {type(policy).__name__}."
+    extractors = [m for m in policy.modules() if isinstance(m, BaseFeaturesExtractor)]
     others = [type(m).__name__ for m in extractors if type(m) is not FlattenExtractor]
     if others:
         return f"This policy extracts features with {others[0]}."
     if model.use_sde:
         return "This policy explores with gSDE."
-    if isinstance(model, SAC):
-        policy = model.policy
+    if isinstance(policy, SACPolicy):
         parts = (policy.actor, Actor), (policy.critic, ContinuousCritic)
+    elif isinstance(policy, tqc.TQCPolicy):
+        parts = (policy.actor, tqc.Actor), (policy.critic, tqc.Critic)
     else:
-        policy = model.policy
+        ours = cast("ActorCriticPolicy", policy)
         parts = (
-            (policy.mlp_extractor, MlpExtractor),
-            (policy.action_dist, DiagGaussianDistribution),
+            (ours.mlp_extractor, MlpExtractor),
+            (ours.action_dist, DiagGaussianDistribution),
         )
     for part, expected in parts:
         if type(part) is not expected:
@@ -152,7 +164,8 @@ def transplant(
 ) -> Model:
     """Return a model that does in the target what the source model does through the map.
 
-    The actor, PPO's value network, SAC's critics and their targets, log standard deviations and the
+    The actor, PPO's value network, the critics of SAC and TQC and their targets, log standard
+    deviations and the
     entropy coefficient are moved; optimisers, buffers and step counts are new. An action to be
     learned gets the weights, and with PPO the log standard deviation, of an untrained policy. A
     constant action gets the mean log standard deviation of the source, so that it is explored.
@@ -166,7 +179,8 @@ def transplant(
     `VecNormalize` is on both sides.
 
     Args:
-        source_model: PPO or SAC with an `MlpPolicy` of any `net_arch`, trained on the source.
+        source_model: A model with the `MlpPolicy` of PPO, SAC or TQC, of any `net_arch`, trained on
+            the source.
         body_map: Map between the bodies.
         target_env: The env to continue training in; flat spaces of the map's target sizes.
         normalisation: Normalisation of the source's observations; by default that of the model's
@@ -190,7 +204,7 @@ def transplant(
     check_size("target observation", target.observation_space, body_map.target_observation)
     source_space = check_size("source action", source.action_space, body_map.source_action)
     target_space = check_size("target action", target.action_space, body_map.target_action)
-    if isinstance(source_model, SAC):
+    if _is_squashed(source_model):
         outputs = squashed_outputs(body_map, source_space, target_space)
     else:
         outputs = gaussian_outputs(body_map)
@@ -200,16 +214,16 @@ def transplant(
         normalisation or source_model.get_vec_normalize_env(),
         model.get_vec_normalize_env(),
     )
-    if isinstance(source_model, SAC):
+    if _is_squashed(source_model):
         judged = critic_actions(body_map, outputs, source_space)
-        edges = _sac_edges(source_model.policy, sensed, outputs, judged)
+        edges = _squashed_edges(cast("SACPolicy", source_model.policy), sensed, outputs, judged)
     else:
-        edges = _ppo_edges(source_model.policy, sensed, outputs)
+        edges = _gaussian_edges(cast("ActorCriticPolicy", source_model.policy), sensed, outputs)
     parameters = move_parameters(source_model.policy, model.policy, edges)
     model.policy.to(dtype=next(source_model.policy.parameters()).dtype)
     model.policy.load_state_dict(parameters)
-    if isinstance(source_model, SAC) and isinstance(model, SAC):
-        _move_entropy_coefficient(source_model, model)
+    if _is_squashed(source_model):
+        _move_entropy_coefficient(source, model)
     return model
 
 
@@ -254,7 +268,7 @@ def _statistics(source: RunningMeanStd | VecNormalize | None) -> RunningMeanStd 
     return source
 
 
-def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs) -> Edges:
+def _gaussian_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs) -> Edges:
     """Layers of PPO's policy and value network that depend on the body."""
     extractor = policy.mlp_extractor
     edges = Edges(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
@@ -266,8 +280,10 @@ def _ppo_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs
     return edges
 
 
-def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine) -> Edges:
-    """Layers of SAC's actor and critics that depend on the body."""
+def _squashed_edges(
+    policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine
+) -> Edges:
+    """Layers of the actor and the critics of SAC and TQC that depend on the body."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
     edges = Edges(outputs=dict(heads))
     for layer in first_linear(policy.actor.latent_pi, "actor.latent_pi", heads):
@@ -288,7 +304,7 @@ def _sac_edges(policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged
     return edges
 
 
-def _move_entropy_coefficient(source: SAC, target: SAC) -> None:
+def _move_entropy_coefficient(source: Any, target: Any) -> None:
     """Copy a learned entropy coefficient; a constant one is a setting."""
     if source.log_ent_coef is not None and target.log_ent_coef is not None:
         with torch.no_grad():

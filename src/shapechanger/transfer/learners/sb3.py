@@ -1,4 +1,4 @@
-"""PPO of Stable-Baselines3 as a learner: training, with evaluations along the way."""
+"""Stable-Baselines3 as a learner: training, with evaluations along the way."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
 from shapechanger.transfer.learners import PolicyOrigin
+from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
@@ -29,16 +30,20 @@ from shapechanger.transfer.learners.policy_file import (
     TrainedPolicy,
     actor,
     load_policy,
-    ppo_arguments,
     save_policy,
 )
-from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.learners.settings import (
+    OffPolicySettings,
+    PpoSettings,
+    Sb3Settings,
+    Settings,
+)
 from shapechanger.transfer.transplant import transplant
 
 try:
     import torch
-    from stable_baselines3 import PPO
     from stable_baselines3.common import env_util
+    from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 except ImportError as error:
@@ -50,7 +55,7 @@ if TYPE_CHECKING:
 __all__ = [
     "OnEvaluation",
     "OnSteps",
-    "PpoLearner",
+    "Sb3Learner",
     "ThreadVecEnv",
     "require_budget",
     "train",
@@ -64,15 +69,15 @@ OnSteps = Callable[[int], None]
 _Indices = None | int | Iterable[int]
 
 
-class PpoLearner:
-    """PPO: a `shapechanger.transfer.learners.Learner`.
+class Sb3Learner:
+    """Any algorithm of Stable-Baselines3: a `shapechanger.transfer.learners.Learner`.
 
     Args:
         name: Name of the learner.
         settings: Its settings.
     """
 
-    def __init__(self, name: str, settings: PpoSettings) -> None:
+    def __init__(self, name: str, settings: Sb3Settings) -> None:
         self._name = name
         self._settings = settings
 
@@ -98,7 +103,7 @@ class PpoLearner:
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
     ) -> TrainedPolicy:
-        """Train a policy; PPO needs no demonstrations and is always evaluated along the way."""
+        """Train a policy without demonstrations; it is always evaluated along the way."""
         del demonstrations, only_last
         return train(
             env,
@@ -126,7 +131,7 @@ class PpoLearner:
 
     def load(self, path: Path) -> TrainedPolicy:
         """Load a policy."""
-        return load_policy(path)
+        return load_policy(path, self._settings.algorithm)
 
     def save(self, policy: TrainedPolicy, path: Path) -> None:
         """Write a policy to a file."""
@@ -143,16 +148,21 @@ class PpoLearner:
         if is_clone(path):
             raise StudyError(
                 f"{path} is a clone, and {self._name} does not learn from pictures: give "
-                f"--learner cloning or sac, or a policy trained with {self._name}."
+                f"--learner cloning or sac-camera, or a policy trained with {self._name}."
             )
-        card = load_policy(path).card
+        card = self.load(path).card
+        if card.settings.algorithm != self._settings.algorithm:
+            raise StudyError(
+                f"{path} was trained with {card.settings.algorithm}, and {self._name} is "
+                f"{self._settings.algorithm}: give --learner {card.learner}."
+            )
         return PolicyOrigin(card.env, card.steps)
 
 
 def train(
     env: EnvRef,
     learner: str,
-    settings: PpoSettings,
+    settings: Sb3Settings,
     steps: int,
     seed: int,
     *,
@@ -182,32 +192,42 @@ def train(
             default: a study runs as many trainings at a time as there are cores.
 
     Raises:
-        StudyError: If `steps` is smaller than one evaluation.
+        StudyError: If `steps` is smaller than one evaluation, or the training diverges.
+        TransplantError: If the source policy is of a kind that cannot be transplanted.
     """
     require_budget(steps, settings)
     # These import the module of the id, if it names one.
     eval_envs = evaluation_envs(env, settings)
     if single := is_single_instance(eval_envs[0]):
-        # It is trained in the env that it is evaluated in, with as many steps per update.
-        n_steps = settings.n_envs * settings.n_steps
-        settings = msgspec.structs.replace(settings, n_envs=1, n_steps=n_steps)
+        # It is trained in the env that it is evaluated in.
+        settings = _for_one_env(settings)
         together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
     else:
         together = training_vec_env(env, settings.n_envs, threads)
     envs: VecEnv = VecMonitor(together)
     if settings.normalise:
-        envs = VecNormalize(envs, gamma=settings.gamma)
+        envs = VecNormalize(envs, gamma=settings.model_arguments.get("gamma", 0.99))
+    logs = None if tensorboard is None else str(tensorboard)
     try:
         if source is None or body_map is None:
-            model = _fresh_model(envs, settings, seed, tensorboard)
+            model = build_model(settings, envs, seed, logs)
         else:
-            model = _transplanted_model(envs, settings, seed, tensorboard, source, body_map)
+            model = _transplanted_model(envs, settings, seed, logs, source, body_map)
         # Before `learn`: it starts with a reset, which already changes the running statistics.
         act = actor(model, _statistics(envs))
         on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, episodes=settings.eval_episodes))
-        evaluations = _PeriodicEvaluation(settings, eval_envs, single, on_evaluation, on_steps)
-        callbacks = [evaluations] if callback is None else [callback, evaluations]
-        cast("Any", model).learn(settings.whole_updates(steps), callback=callbacks)
+        evaluations = _PeriodicEvaluation(
+            settings, eval_envs, single, on_evaluation, on_steps, learner
+        )
+        callbacks: list[BaseCallback] = [] if callback is None else [callback]
+        if source is not None and isinstance(settings, OffPolicySettings):
+            callbacks.append(_ActFirst(settings.learning_starts))
+        callbacks.append(evaluations)
+        try:
+            cast("Any", model).learn(settings.whole_updates(steps), callback=callbacks)
+        except ValueError as error:  # PyTorch refuses distributions of NaN.
+            _require_finite(model, learner)
+            raise error
         evaluations.evaluate_now()
         card = PolicyCard(
             env,
@@ -360,42 +380,56 @@ def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
     return DummyVecEnv([env.make for _ in range(num_envs)])
 
 
-def _fresh_model(envs: VecEnv, settings: PpoSettings, seed: int, tensorboard: Path | None) -> PPO:
-    return PPO(
-        "MlpPolicy",
-        envs,
-        seed=seed,
-        policy_kwargs={
-            "net_arch": list(settings.net_arch),
-            "log_std_init": settings.log_std_init,
-        },
-        tensorboard_log=str(tensorboard) if tensorboard else None,
-        **ppo_arguments(settings),
-    )
+def _for_one_env(settings: Sb3Settings) -> Sb3Settings:
+    """Settings with as many steps per update in a single env."""
+    each = settings.update_steps
+    if isinstance(settings, PpoSettings):
+        return msgspec.structs.replace(settings, n_envs=1, n_steps=each)
+    if isinstance(settings, OffPolicySettings):
+        return msgspec.structs.replace(settings, n_envs=1, train_freq=each)
+    if settings.n_envs > 1:
+        raise StudyError(
+            f"Only one instance of this env can exist: set n_envs=1, not {settings.n_envs}."
+        )
+    return settings
 
 
 def _transplanted_model(
     envs: VecEnv,
-    settings: PpoSettings,
+    settings: Sb3Settings,
     seed: int,
-    tensorboard: Path | None,
+    tensorboard: str | None,
     source: TrainedPolicy,
     body_map: BodyMap,
-) -> PPO:
+) -> BaseAlgorithm:
     """The source policy in the target's shapes, with its statistics, ready for training."""
     statistics = source.normalisation
     if statistics is not None and isinstance(envs, VecNormalize):
         # The critic predicts rewards divided by these.
         envs.ret_rms = statistics.reward.copy()
+    arguments = {
+        name: value for name, value in settings.model_arguments.items() if name != "policy_kwargs"
+    }
     return transplant(
         source.model,
         body_map,
         envs,
         normalisation=None if statistics is None else statistics.observation,
         seed=seed,
-        tensorboard_log=str(tensorboard) if tensorboard else None,
-        **ppo_arguments(settings),
+        device="cpu",
+        tensorboard_log=tensorboard,
+        **arguments,
     )
+
+
+def _require_finite(model: BaseAlgorithm, learner: str) -> None:
+    """Refuse a model whose weights are not all finite."""
+    weights = cast("Any", model.policy).state_dict().values()
+    if not all(torch.isfinite(one).all() for one in weights):
+        raise StudyError(
+            f"{learner} diverged after {model.num_timesteps} steps: its weights are not finite. "
+            "Try a smaller learning rate or a milder body."
+        )
 
 
 def _statistics(envs: VecEnv) -> Normalisation | None:
@@ -404,18 +438,40 @@ def _statistics(envs: VecEnv) -> Normalisation | None:
     return Normalisation(envs.obs_rms, envs.ret_rms)  # pyright: ignore[reportArgumentType]
 
 
+class _ActFirst(BaseCallback):
+    """Lets a transplanted policy act itself before the first update, where a new one is random."""
+
+    def __init__(self, learning_starts: int) -> None:
+        super().__init__()
+        self._learning_starts = learning_starts
+        self._gradient_steps = 0
+
+    def _on_training_start(self) -> None:
+        model = cast("Any", self.model)
+        self._gradient_steps = model.gradient_steps
+        model.learning_starts = 0
+        model.gradient_steps = 0
+
+    def _on_step(self) -> bool:
+        if self.num_timesteps > self._learning_starts:
+            cast("Any", self.model).gradient_steps = self._gradient_steps
+        return True
+
+
 class _PeriodicEvaluation(BaseCallback):
     """Evaluates between updates, when the policy reflects all steps so far."""
 
     def __init__(
         self,
-        settings: PpoSettings,
+        settings: Sb3Settings,
         envs: list[gym.Env[Any, Any]],
         single: bool,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
+        learner: str,
     ) -> None:
         super().__init__()
+        self._learner = learner
         self._every = settings.eval_every
         self._episodes = settings.eval_episodes
         self._envs = envs
@@ -437,7 +493,7 @@ class _PeriodicEvaluation(BaseCallback):
 
     def evaluate_now(self) -> None:
         """Evaluate the current policy."""
-        assert isinstance(self.model, PPO)
+        _require_finite(self.model, self._learner)
         act = actor(self.model, _statistics(self.training_env))
         result = evaluate(
             act, self._envs, EVALUATION_SEED, self.num_timesteps, episodes=self._episodes

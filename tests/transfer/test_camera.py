@@ -16,16 +16,16 @@ from shapechanger.errors import StudyError
 from shapechanger.reports.study import write_report
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.camera import MixedReplay, train_camera_policy, train_camera_sac
 from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.sac import MixedReplay, train_camera_policy, train_sac
-from shapechanger.transfer.learners.settings import SacSettings, learner_settings
+from shapechanger.transfer.learners.settings import CameraSacSettings, learner_settings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, LANE, TINY_CLONING
 from tests.transfer.studies import BIG
 
-TINY_SAC = SacSettings(
+TINY_SAC = CameraSacSettings(
     demonstrated_steps=60,
     steps=120,
     episode_steps=20,
@@ -55,7 +55,7 @@ def _learned(
     folder: Path, steps: int = 120, seed: int = 5, *, only_last: bool = False
 ) -> tuple[CameraPolicy, list[Evaluation]]:
     found: list[Evaluation] = []
-    policy = train_sac(
+    policy = train_camera_sac(
         LANE,
         TINY_SAC,
         steps,
@@ -110,7 +110,7 @@ def test_half_of_a_batch_is_demonstrated() -> None:
 
 def test_a_study_of_it_is_a_study_as_any(tmp_path: Path) -> None:
     """Arms see the same demonstrations, fine-tuning begins with the source policy, and so on."""
-    plan = make_plan(TransferTask(DRY, ICY), "sac", TINY_SAC, seeds=2)
+    plan = make_plan(TransferTask(DRY, ICY), "sac-camera", TINY_SAC, seeds=2)
     assert (plan.steps, plan.source_steps) == (120, 90)
     study = run_study(plan, tmp_path / "study", executor=Serial())
     zero_shot, tuned = study.of("zero-shot"), study.of("fine-tune")
@@ -129,7 +129,7 @@ def test_a_budget_ends_with_an_evaluation() -> None:
     assert [TINY_SAC.whole_updates(steps) for steps in (1, 60, 90, 91, 120)] == [
         *(90, 90, 90, 120, 120)
     ]
-    shipped = learner_settings("sac")
+    shipped = learner_settings("sac-camera")
     assert shipped.whole_updates(shipped.steps) == shipped.steps == 12_000
 
 
@@ -144,7 +144,7 @@ def test_the_anchor_keeps_it_near_to_what_was_shown(tmp_path: Path) -> None:
     wild = msgspec.structs.replace(TINY_SAC, learning_rate=3e-2, critic_warm_up=0)
     errors: list[float] = []
     for rate in (0.0, 3e-2):
-        policy = train_sac(
+        policy = train_camera_sac(
             LANE,
             msgspec.structs.replace(wild, anchor_rate=rate),
             120,
@@ -163,16 +163,16 @@ def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
     """Before anything is learned, with the name of the env."""
     task = TransferTask(*(LANE, BIG)[::order])
     with pytest.raises(
-        StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and sac"
+        StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and sac-camera"
     ):
-        make_plan(task, "sac", TINY_SAC, seeds=2)
+        make_plan(task, "sac-camera", TINY_SAC, seeds=2)
 
 
 def test_training_without_a_camera_is_refused(tmp_path: Path) -> None:
-    """As `train Ant --learner sac` does: the sentence names what is missing."""
+    """As `train Ant --learner sac-camera` does: the sentence names what is missing."""
     ant = EnvRef("shapechanger/Ant-v1")
     with pytest.raises(
-        StudyError, match="Ant-v1 has no camera and no demonstrator, and sac learns"
+        StudyError, match="Ant-v1 has no camera and no demonstrator, and sac-camera learns"
     ):
         train_camera_policy(
             ant,

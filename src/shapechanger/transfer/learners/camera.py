@@ -37,7 +37,7 @@ from shapechanger.transfer.learners.cloning import (
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy
-from shapechanger.transfer.learners.settings import CloningSettings, SacSettings
+from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
 
 try:
     from stable_baselines3 import SAC
@@ -53,7 +53,7 @@ __all__ = [
     "CameraTrainingOptions",
     "MixedReplay",
     "train_camera_policy",
-    "train_sac",
+    "train_camera_sac",
 ]
 
 # As in cloning: where the loss turns from quadratic to linear.
@@ -61,7 +61,7 @@ _HUBER_BETA: Final = 0.1
 
 
 class CameraTrainingOptions(TypedDict):
-    """Keyword arguments of both `train_clones` and `train_sac`."""
+    """Keyword arguments of both `train_clones` and `train_camera_sac`."""
 
     demonstrations: Required[DemonstrationFile]
     start: NotRequired[CameraPolicy | None]
@@ -87,7 +87,7 @@ class CameraLearner:
         settings: Its settings.
     """
 
-    def __init__(self, name: str, settings: CloningSettings | SacSettings) -> None:
+    def __init__(self, name: str, settings: CloningSettings | CameraSacSettings) -> None:
         self._name = name
         self._settings = settings
 
@@ -162,19 +162,19 @@ class CameraLearner:
 
 def train_camera_policy(
     env: EnvRef,
-    settings: CloningSettings | SacSettings,
+    settings: CloningSettings | CameraSacSettings,
     steps: int,
     seed: int,
     **options: Unpack[CameraTrainingOptions],
 ) -> CameraPolicy:
-    """Train with cloning or SAC, as the settings are; see `train_clones` and `train_sac`.
+    """Train with cloning or SAC, as the settings are; see `train_clones` and `train_camera_sac`.
 
     Args:
         env: The env.
         settings: The settings.
         steps: Budget, in steps.
         seed: Seed of the training.
-        **options: Keyword arguments of `train_clones` and `train_sac`.
+        **options: Keyword arguments of `train_clones` and `train_camera_sac`.
 
     Raises:
         StudyError: If the env has no camera or no demonstrator.
@@ -184,21 +184,21 @@ def train_camera_policy(
         traits = env_traits(made)
     finally:
         made.close()
-    name = "cloning" if isinstance(settings, CloningSettings) else "sac"
+    name = "cloning" if isinstance(settings, CloningSettings) else "sac-camera"
     CameraLearner(name, settings).require(env, traits)
     return _train(env, settings, steps, seed, **options)
 
 
 def _train(
     env: EnvRef,
-    settings: CloningSettings | SacSettings,
+    settings: CloningSettings | CameraSacSettings,
     steps: int,
     seed: int,
     **options: Unpack[CameraTrainingOptions],
 ) -> CameraPolicy:
     if isinstance(settings, CloningSettings):
         return train_clones(env, settings, steps, seed, **options)
-    return train_sac(env, settings, steps, seed, **options)
+    return train_camera_sac(env, settings, steps, seed, **options)
 
 
 class AnchoredSAC(SAC):
@@ -227,9 +227,9 @@ class AnchoredSAC(SAC):
             self.anchor.step()  # pyright: ignore[reportUnknownMemberType]
 
 
-def train_sac(
+def train_camera_sac(
     env: EnvRef,
-    settings: SacSettings,
+    settings: CameraSacSettings,
     steps: int,
     seed: int,
     *,
@@ -326,7 +326,7 @@ def _as_replay(shown: Demonstrations, policy: CameraPolicy, model: SAC) -> Repla
     return replay
 
 
-def _warm_up_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) -> None:
+def _warm_up_critics(model: SAC, replay: ReplayBuffer, settings: CameraSacSettings) -> None:
     """Train the critics on the demonstrations with the actor fixed."""
     learner = cast("Any", model)
     for _ in range(settings.critic_warm_up):
@@ -345,7 +345,7 @@ def _warm_up_critics(model: SAC, replay: ReplayBuffer, settings: SacSettings) ->
 
 
 def _add_anchor(
-    model: SAC, shown: Demonstrations, policy: CameraPolicy, settings: SacSettings
+    model: SAC, shown: Demonstrations, policy: CameraPolicy, settings: CameraSacSettings
 ) -> None:
     """Add the cloning step, if the settings have one."""
     if not settings.anchor_rate or not isinstance(model, AnchoredSAC):
@@ -361,7 +361,7 @@ class _PeriodicEvaluation(BaseCallback):
     def __init__(
         self,
         env: EnvRef,
-        settings: SacSettings,
+        settings: CameraSacSettings,
         first: CameraPolicy,
         steps: int,
         only_last: bool,

@@ -1,0 +1,180 @@
+"""The algorithms of Stable-Baselines3, sb3-contrib and others, built from settings."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from typing import Any, Final, cast
+
+import gymnasium as gym
+import msgspec
+
+from shapechanger.errors import MissingExtra, StudyError, UnknownName
+from shapechanger.transfer.learners.settings import ImportedSettings, Sb3Settings
+
+try:
+    from sb3_contrib import TQC
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.base_class import BaseAlgorithm
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError as error:
+    raise MissingExtra("stable-baselines3 and sb3-contrib", "learn") from error
+
+__all__ = ["SpacesOnly", "build_model", "checked_settings", "is_class", "require_class"]
+
+_SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
+# Arguments that are no settings.
+_GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
+
+
+def build_model(
+    settings: Sb3Settings, envs: VecEnv, seed: int, tensorboard: str | None = None
+) -> BaseAlgorithm:
+    """Build an untrained model on the CPU.
+
+    Args:
+        settings: Settings of the learner.
+        envs: Its envs.
+        seed: Its seed.
+        tensorboard: Folder of TensorBoard's logs; None for none.
+
+    Raises:
+        StudyError: If a function of the user's returns something else, or refuses its arguments.
+        UnknownName: If the algorithm cannot be imported.
+    """
+    made = _load(settings.algorithm)
+    arguments = dict(settings.model_arguments)
+    try:
+        if is_class(made):
+            arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
+            arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
+            return made("MlpPolicy", envs, **arguments)
+        model = made(envs, seed, **arguments)
+    except (TypeError, ValueError, AssertionError) as error:
+        if not isinstance(settings, ImportedSettings):
+            raise
+        raise StudyError(f"{settings.algorithm} refuses its arguments: {error}.") from error
+    if not isinstance(model, BaseAlgorithm):
+        raise StudyError(
+            f"{settings.algorithm} returned {type(model).__name__}: it must return a model of "
+            "Stable-Baselines3."
+        )
+    return model
+
+
+def is_class(algorithm: object) -> bool:
+    """Return whether this is a class of models, not a function that builds one.
+
+    Args:
+        algorithm: The object.
+    """
+    return isinstance(algorithm, type) and issubclass(algorithm, BaseAlgorithm)
+
+
+def require_class(algorithm: str) -> None:
+    """Refuse an algorithm that is not a class of models.
+
+    Args:
+        algorithm: Its name.
+
+    Raises:
+        ValueError: If it is a function, or cannot be imported.
+    """
+    try:
+        known = is_class(_load(algorithm))
+    except UnknownName as error:
+        raise ValueError(f"its algorithm {algorithm} cannot be imported") from error
+    if not known:
+        raise ValueError(f"its algorithm {algorithm} is a function, which a file may not call")
+
+
+def checked_settings(settings: ImportedSettings) -> ImportedSettings:
+    """Import an algorithm, check its arguments by name, and fill in how often it updates.
+
+    Args:
+        settings: Settings as the user gave them.
+
+    Raises:
+        UnknownName: If it cannot be imported, or takes no argument of a name.
+        StudyError: If it can neither be called nor is a class of models.
+    """
+    made = _load(settings.algorithm)
+    if not callable(made) or (isinstance(made, type) and not is_class(made)):
+        raise StudyError(
+            f"{settings.algorithm} is neither a class of models nor a function that builds one."
+        )
+    takes = inspect.signature(made).parameters
+    known = [name for name in takes if name not in _GIVEN]
+    anything = any(each.kind is each.VAR_KEYWORD for each in takes.values())
+    for name in settings.arguments:
+        if name not in known and not anything:
+            raise UnknownName(f"setting of {settings.algorithm}", name, known)
+    for name in ("n_steps", "train_freq"):
+        # Off-policy algorithms have both, and there `n_steps` is that of the returns.
+        if name == "n_steps" and "buffer_size" in takes:
+            continue
+        default: Any = takes[name].default if name in takes else None
+        every = settings.arguments.get(name, default)
+        if isinstance(every, int):
+            return msgspec.structs.replace(settings, steps_per_update=every)
+    return settings
+
+
+def _load(algorithm: str) -> Any:
+    """Return the class or function of a name."""
+    if algorithm in _SHIPPED:
+        return _SHIPPED[algorithm]
+    module, _, name = algorithm.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise UnknownName("algorithm", algorithm, _SHIPPED) from error
+
+
+class SpacesOnly(VecEnv):
+    """Envs that have spaces and cannot be stepped, for models that only act.
+
+    Args:
+        num_envs: Number of envs.
+        observation_space: Space of an observation.
+        action_space: Space of an action.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+    ) -> None:
+        cast("Any", super()).__init__(num_envs, observation_space, action_space)
+
+    def reset(self) -> Any:
+        """Refuse."""
+        raise NotImplementedError
+
+    def step_async(self, actions: Any) -> None:
+        """Refuse."""
+        raise NotImplementedError
+
+    def step_wait(self) -> Any:
+        """Refuse."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Return None for each env."""
+        return [None] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refuse."""
+        raise NotImplementedError
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **more: Any) -> Any:
+        """Refuse."""
+        raise NotImplementedError
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Return False for each env."""
+        return [False] * len(list(self._get_indices(indices)))
