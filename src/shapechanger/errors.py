@@ -48,6 +48,7 @@ __all__ = [
     "DemosError",
     "EmptyShift",
     "EnvArgumentError",
+    "FailedRuns",
     "FingerError",
     "ForeignStudy",
     "LayoutError",
@@ -155,6 +156,10 @@ class TransplantError(ShapechangerError, ValueError):
 
 class StudyError(ShapechangerError, ValueError):
     """A study that cannot start as it was asked for."""
+
+
+class FailedRuns(StudyError):
+    """Runs of a study that failed on a cluster, while all others ended."""
 
 
 class ForeignStudy(StudyError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -42,3 +43,13 @@ def wait_for_ever(pid_file: str, report: ReportSteps) -> None:
 def run_for_ever(pid_file: str) -> None:
     """A parent whose only job never ends."""
     Processes(1).run([Job("endless", wait_for_ever, (pid_file,))], lambda *_: None)
+
+
+def end_when_there_is_one(mark: str, go: str, report: ReportSteps) -> None:
+    """Note each attempt, and end once a file is there."""
+    with Path(mark).open("a") as log:
+        log.write("attempt\n")
+    never = threading.Event()
+    while not Path(go).exists():
+        report(time.monotonic_ns())
+        never.wait(0.05)

@@ -6,7 +6,8 @@ import json
 import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, Final, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 
@@ -22,17 +23,23 @@ from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
+if TYPE_CHECKING:
+    from shapechanger.transfer.executor import Executor
+
 __all__ = [
     "asked",
     "default_learner",
     "driven",
     "env_ref",
+    "executor_of",
     "opened",
     "options_of",
+    "policy_file",
     "require_seed",
     "settings_of",
 ]
 
+_REFERENCE: Final = "reference"
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
 
@@ -141,6 +148,48 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
     if not isinstance(options, dict):
         raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
     return cast("dict[str, Any]", options)
+
+
+def executor_of(kind: str, workers: int | None, address: str | None) -> Executor:
+    """Return what runs the jobs of a study.
+
+    Args:
+        kind: "processes" or "ray".
+        workers: Number of processes; None for one per core.
+        address: Address of the Ray cluster; None to start Ray on this machine.
+
+    Raises:
+        StudyError: If an option belongs to the other kind, or there are no workers.
+        MissingExtra: If Ray is not installed.
+    """
+    if kind == "ray":
+        if workers is not None:
+            raise StudyError("Ray runs one run on each core of its nodes: leave out --workers.")
+        from shapechanger.transfer.ray_executor import RayCluster
+
+        return RayCluster(address)
+    if address is not None:
+        raise StudyError("--address is that of a Ray cluster: give --executor ray, too.")
+    from shapechanger.transfer.executor import Processes
+
+    return Processes(workers)
+
+
+def policy_file(given: Path, env: EnvRef) -> Path:
+    """Return a policy's file: the one given, or the one that ships for an env.
+
+    Args:
+        given: A file, or the word "reference".
+        env: The env.
+
+    Raises:
+        UnknownName: If no reference policy ships for the env.
+    """
+    if str(given) != _REFERENCE or given.exists():
+        return given
+    from shapechanger.transfer.references import reference_policy
+
+    return reference_policy(env.id)
 
 
 def settings_of(given: Sequence[str]) -> dict[str, Any]:

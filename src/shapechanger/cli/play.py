@@ -11,7 +11,7 @@ import tyro
 from numpy.typing import NDArray
 
 from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import env_ref, opened, require_seed
+from shapechanger.cli.env_arguments import env_ref, opened, policy_file, require_seed
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
 
@@ -29,8 +29,9 @@ class Play:
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
     """Id of the env, such as BigAnt."""
     policy: Path | None = None
-    """A policy that `train`, a study or `policies export` has written; random actions if not given.
-    One of another body acts through the body map of same names."""
+    """A policy that `train`, a study or `policies export` has written, or `reference` for the one
+    that ships for the env; random actions if not given. One of another body acts through the body
+    map of same names."""
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     out: Path | None = None
@@ -55,8 +56,10 @@ class Play:
         console = plain_console()
         frames: list[NDArray[Any]] = []
         mode = "human" if out is None else "rgb_array"
-        with opened(env_ref(self.env, self.body), render_mode=mode) as env:
-            acting, act = self._policy(env)
+        ref = env_ref(self.env, self.body)
+        policy = self.policy and policy_file(self.policy, ref)
+        with opened(ref, render_mode=mode) as env:
+            acting, act = self._acting(env, policy)
             for episode in range(self.episodes):
                 observation, _ = acting.reset(seed=self.seed + episode)
                 worth, steps, over = 0.0, 0, False
@@ -74,27 +77,27 @@ class Play:
                 write_film(frames, out, float(env.metadata["render_fps"]))
                 console.print(f"wrote {out}")
 
-    def _policy(self, env: Any) -> tuple[Any, Any]:
-        """Return the env and the policy."""
+    def _acting(self, env: Any, file: Path | None) -> tuple[Any, Any]:
+        """Return the env and the policy in it."""
         from shapechanger.transfer.learners.evaluation import random_actions
 
-        if self.policy is None:
+        if file is None:
             return env, random_actions(env.action_space, self.seed)
         from shapechanger.transfer.body_map import BodyMap, MappedEnv
         from shapechanger.transfer.env_ref import layouts_of
 
         policy: TrainedPolicy | OnnxPolicy
-        if self.policy.suffix == ".onnx":  # Without PyTorch.
+        if file.suffix == ".onnx":  # Without PyTorch.
             from shapechanger.transfer.onnx_policy import OnnxPolicy
 
-            policy = OnnxPolicy(self.policy)
+            policy = OnnxPolicy(file)
         else:
             from shapechanger.transfer.learners.cloning import is_clone, load_clone
             from shapechanger.transfer.learners.policy_file import load_policy
 
-            if is_clone(self.policy):
-                return env, load_clone(self.policy).predict_many
-            policy = load_policy(self.policy)
+            if is_clone(file):
+                return env, load_clone(file).predict_many
+            policy = load_policy(file)
         observation, action = layouts_of(env)
         if (observation, action) == (policy.card.observation, policy.card.action):
             return env, policy.act

@@ -58,10 +58,16 @@ class ListPolicies:
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
     """The folder."""
+    references: bool = False
+    """List the policies that ship instead, one for each env."""
 
     def run(self) -> None:
         """Print a line for each policy; a file that is none gets its reason."""
         from shapechanger.transfer.learners.policy_file import load_policy
+
+        if self.references:
+            self._print_references()
+            return
 
         table = Table("file", "env", "learner", "steps", "seed", box=None)
         for path in sorted(self.folder.rglob("*.safetensors")):
@@ -74,6 +80,19 @@ class ListPolicies:
             table.add_row(name, str(card.env), card.learner, f"{card.steps:,}", str(card.seed))
         if not table.rows:
             raise StudyError(f"There is no policy in {self.folder}: train one, or name a folder.")
+        plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH).print(table)
+
+    def _print_references(self) -> None:
+        """Print a line for each env, with its floor and what each seed reached."""
+        from shapechanger.transfer.references import load_references
+
+        table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
+        for env, reference in load_references().items():
+            measure = next(iter(reference.ends))
+            floor = max(values[measure] for values in reference.floor.values())
+            ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
+            steps = f"{reference.steps:,}"
+            table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
         plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH).print(table)
 
 

@@ -12,16 +12,22 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
 import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
-from shapechanger.cli.env_arguments import default_learner, driven, env_ref, require_seed
+from shapechanger.cli.env_arguments import (
+    default_learner,
+    driven,
+    env_ref,
+    executor_of,
+    require_seed,
+)
 from shapechanger.cli.transfer import run_steps, write_study_report
-from shapechanger.errors import RenderError, StudyError, UnknownName
+from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
@@ -210,12 +216,15 @@ class Suite:
     """The suite's folder; results/NAME if not given."""
     seed: int | None = None
     """Number that the seeds of all runs are drawn from; the suite's own if not given."""
+    executor: Literal["processes", "ray"] = "processes"
+    """Where runs run: in processes of this machine, or on a Ray cluster."""
+    address: str | None = None
+    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
     workers: int | None = None
     """Runs at a time; one for each core if not given."""
 
     def run(self) -> None:
         """Run the studies, write their reports, and print the joint table."""
-        from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.study import inspect_task, unfinished_runs
         from shapechanger.transfer.suite import open_study_folder, run_in_suite
 
@@ -229,7 +238,8 @@ class Suite:
         command = shlex.join(["shapechanger", *sys.argv[1:]])
         # Files have no width; do not wrap tables in them.
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        executor = Processes(self.workers)
+        executor = executor_of(self.executor, self.workers, self.address)
+        failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
             traits = inspect_task(tasks[name])
@@ -246,6 +256,9 @@ class Suite:
                         command=command,
                         traits=traits,
                     )
+            except FailedRuns as error:
+                failed.append(f"{name}: {error}")
+                continue
             except KeyboardInterrupt:
                 raise Interrupted(f"Stopped. Go on with: {command}") from None
             write_study_report(study, folder)
@@ -255,12 +268,14 @@ class Suite:
         console.print(_table(found))
         halves = sum(outcome.halves for outcome in found)
         console.print(
-            "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the end "
-            "of the best arm), with 95 % intervals over seeds.\n"
+            "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
+            "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
             f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
             "half of scratch's steps.",
             soft_wrap=True,
         )
+        if failed:
+            raise FailedRuns(" ".join(failed))
 
     def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
         """The plan of one study."""

@@ -18,8 +18,10 @@ from shapechanger.cli.env_arguments import (
     default_learner,
     driven,
     env_ref,
+    executor_of,
     opened,
     options_of,
+    policy_file,
     require_seed,
     settings_of,
 )
@@ -63,7 +65,8 @@ class Transfer:
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
-    """A given source policy, instead of training one for each seed."""
+    """A given source policy, instead of training one for each seed: a file, or `reference` for the
+    one that ships for the source."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
@@ -95,12 +98,15 @@ class Transfer:
     """Whether actions are mapped directly or by the torque that they produce."""
     seed: int = 0
     """Number that the seeds of all runs are drawn from."""
+    executor: Literal["processes", "ray"] = "processes"
+    """Where runs run: in processes of this machine, or on a Ray cluster."""
+    address: str | None = None
+    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
     workers: int | None = None
     """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
     def run(self) -> None:
         """Run the study, print its table, and write its report."""
-        from shapechanger.transfer.executor import Processes
         from shapechanger.transfer.study import (
             inspect_task,
             is_folder_of,
@@ -115,9 +121,11 @@ class Transfer:
         console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         task = self._task()
         traits = inspect_task(task)
-        plan = self._plan(task, traits)
+        given = self.source_policy and policy_file(self.source_policy, task.source)
+        plan = self._plan(task, traits, given)
         _ = traits.shift  # An empty shift is refused before anything is written.
-        executor = Processes(1 if plan.exclusive else self.workers)
+        workers = 1 if plan.exclusive and self.executor == "processes" else self.workers
+        executor = executor_of(self.executor, workers, self.address)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
@@ -127,7 +135,7 @@ class Transfer:
                 study = run_study(
                     plan,
                     out,
-                    source_policy=self.source_policy,
+                    source_policy=given,
                     executor=executor,
                     on_progress=progress,
                     command=_command(),
@@ -169,7 +177,7 @@ class Transfer:
             target.having(options_of(self.target_options, "--target-options")),
         )
 
-    def _plan(self, task: TransferTask, traits: TaskTraits) -> Plan:
+    def _plan(self, task: TransferTask, traits: TaskTraits, given: Path | None) -> Plan:
         """The plan of the study."""
         from shapechanger.transfer.learners.settings import resolve_learner
         from shapechanger.transfer.study import default_arms, make_plan
@@ -190,7 +198,7 @@ class Transfer:
             seeds=5 if seeds is None else seeds,
             steps=steps,
             source_steps=self.source_steps,
-            source_policy=self.source_policy,
+            source_policy=given,
             arms=self.arms or default_arms(traits),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),

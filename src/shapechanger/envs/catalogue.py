@@ -113,18 +113,18 @@ _EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
 _UP: Final = 950.0
 _RUNS: Final = 6000.0
 
-_PLANAR: Final = "shapechanger.envs.runners"
-_HUMANOID: Final = "shapechanger.envs.runners"
+_RUNNERS: Final = "shapechanger.envs.runners"
 _DOUBLE_PENDULUM: Final = "shapechanger.envs.pendulum"
 
-# Gymnasium's other bodies, unedited: name, summary, module, and the reward threshold of its v5 id.
+# Gymnasium's other bodies, unedited: name, summary, module, learner, and the reward threshold of
+# its v5 id.
 _OTHERS: Final = (
-    ("HalfCheetah", "half a cheetah that runs in a plane", _PLANAR, 4800.0),
-    ("Hopper", "one leg that hops in a plane", _PLANAR, 3800.0),
-    ("Walker2d", "two legs that walk in a plane", _PLANAR, None),
-    ("Swimmer", "three links that swim", _PLANAR, 360.0),
-    ("Humanoid", "two legs, two arms and a waist", _HUMANOID, None),
-    ("InvertedDoublePendulum", "two poles on a cart", _DOUBLE_PENDULUM, 9100.0),
+    ("HalfCheetah", "half a cheetah that runs in a plane", _RUNNERS, "ppo-run", 4800.0),
+    ("Hopper", "one leg that hops in a plane", _RUNNERS, "ppo-planar", 3800.0),
+    ("Walker2d", "two legs that walk in a plane", _RUNNERS, "ppo-planar", None),
+    ("Swimmer", "three links that swim", _RUNNERS, "ppo-swim", 360.0),
+    ("Humanoid", "two legs, two arms and a waist", _RUNNERS, "ppo-run", None),
+    ("InvertedDoublePendulum", "two poles on a cart", _DOUBLE_PENDULUM, "ppo-planar", 9100.0),
 )
 
 CATALOGUE: Final[dict[str, CatalogueEntry]] = {
@@ -185,11 +185,11 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
                 name,
                 summary,
                 f"{module}:{name}Env",
-                "ppo-balance" if module == _DOUBLE_PENDULUM else "ppo-run",
+                learner,
                 name,
                 threshold,
             )
-            for name, summary, module, threshold in _OTHERS
+            for name, summary, module, learner, threshold in _OTHERS
         ),
     )
 }

@@ -36,7 +36,7 @@ from shapechanger.transfer.learners.settings import (
     Settings,
     tuning_text,
 )
-from shapechanger.transfer.metrics import Summary
+from shapechanger.transfer.metrics import Reference, Summary
 from shapechanger.transfer.study import Study
 
 __all__ = ["Pictures", "report_html", "write_report"]
@@ -204,18 +204,22 @@ def _scale(summary: Summary) -> str:
     zero, one = number(reference.zero), number(reference.one)
     if summary.unit == "value":
         return (
-            f"There are no scores: the best arm, {reference.one_of}, ended at {one}, which is not "
-            f"above {zero}, which takes no skill ({reference.zero_of}). Gains are in units of the "
+            f"There are no scores: {reference.one_of} ended at {one}, which is not above "
+            f"{zero}, which takes no skill ({reference.zero_of}). Gains are in units of the "
             "measure."
         )
     return (
         "Values are normalised to scores by (value - zero) / (one - zero), both of the target: "
         f"zero = {zero} is the most that takes no skill, here {reference.zero_of}, of random "
         "actions, the action zero and untrained policies; one = "
-        f"{one} is the mean of the last {summary.last_k} evaluations of the best arm, here "
-        f"{reference.one_of}. The intervals take these two numbers as given. A gain in values is "
-        f"one in scores times {number(reference.one - reference.zero)}."
+        f"{one} is the mean of the last {summary.last_k} evaluations of {reference.one_of}, "
+        f"{_why_one(reference)}. The intervals take these two numbers as given. A gain in values "
+        f"is one in scores times {number(reference.one - reference.zero)}."
     )
+
+
+def _why_one(reference: Reference) -> str:
+    return "which ships with its policy" if reference.shipped else "the best arm"
 
 
 def _arm_cells(row: ArmRow) -> tuple[Any, ...]:

@@ -246,14 +246,18 @@ def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
 def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
     """Final scores of each arm in studies of one target, whose scale they share.
 
-    0 is what takes no skill, as in each study, and 1 the end of the best arm of all.
+    0 is what takes no skill, as in each study, and 1 the target's reference, or the end of the best
+    arm of all where it has none.
     """
     values = {
         arm: [finals(study, arm) for study in studies if arm in study.plan.arms]
         for arm in dict.fromkeys(arm for study in studies for arm in study.plan.arms)
     }
-    zero = max(next(iter(study.summaries.values())).reference.zero for study in studies)
+    scales = [next(iter(study.summaries.values())).reference for study in studies]
+    zero = max(scale.zero for scale in scales)
     one = max(float(group.mean()) for groups in values.values() for group in groups)
+    if scales[0].shipped:
+        one = scales[0].one
     reference = Reference(zero, one)
     if not reference.defined:
         return {}

@@ -30,6 +30,7 @@ from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, SOURCE, Plan, Run, TransferTask
+from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 
 __all__ = [
@@ -314,6 +315,11 @@ def run_study(
     ]
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
+        if missing := unfinished_runs(plan, out):
+            raise StudyError(
+                f"The results of {', '.join(run.name for run in missing)} are not in {out}: all "
+                "nodes of a cluster must share this folder."
+            )
     results = [load_result(plan, out, run) for run in plan.runs()]
     study = _study(plan, [result for result in results if result is not None], command, shift)
     study = msgspec.structs.replace(study, looks=_looks(plan, out / STUDY_FILE))
@@ -419,6 +425,7 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
             "untrained policies": float(scratch.returns[:, 0].mean()),
         },
         {arm: float(curves[arm].returns[:, -last_k:].mean()) for arm in plan.arms},
+        _shipped_reference(plan),
     )
     summaries: dict[str, Summary] = {
         arm: summarise(
@@ -441,6 +448,13 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
         source_return=tuple(r.curve[-1].mean_return for r in by_kind.get("source", [])),
         summaries=summaries,
     )
+
+
+def _shipped_reference(plan: Plan) -> tuple[str, float] | None:
+    """Name and value of the target's reference, if one ships."""
+    reference = reference_of(plan.task.target)
+    value = None if reference is None else reference.end(plan.measure)
+    return None if reference is None or value is None else (reference.text, value)
 
 
 def _curves(plan: Plan, results: list[RunResult]) -> LearningCurves:

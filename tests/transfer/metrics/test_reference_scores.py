@@ -23,6 +23,17 @@ def test_scores_run_from_zero_to_one() -> None:
     np.testing.assert_array_equal(scores.steps, STEPS)
 
 
+def test_a_reference_that_ships_wins_over_the_best_arm() -> None:
+    """Its scale is the same for every study of the target, so a better arm scores above 1."""
+    floors, ends = {"random actions": -100.0}, {"scratch": 100.0, "fine-tune": 500.0}
+    of_arms = Reference.of(floors, ends)
+    assert (of_arms.one, of_arms.one_of, of_arms.shipped) == (500.0, "fine-tune", False)
+    shipped = Reference.of(floors, ends, ("the reference", 300.0))
+    assert (shipped.one, shipped.one_of, shipped.shipped) == (300.0, "the reference", True)
+    scores = shipped.scores(LearningCurves(STEPS, np.array([[-100.0, 300.0, 500.0]])))
+    np.testing.assert_allclose(scores.returns, [[0.0, 1.0, 1.5]])
+
+
 def test_clipped_scores_stay_between_0_and_1() -> None:
     """Forward transfer takes 1 for the most that can be reached."""
     reference = Reference(zero=-100.0, one=300.0)

@@ -115,19 +115,22 @@ class TrainedPolicy:
         return actor(self.model, self.normalisation)
 
 
-def actor(model: BaseAlgorithm, normalisation: Normalisation | None) -> Act:
-    """Return a function from the env's observations to the model's mean actions.
+def actor(
+    model: BaseAlgorithm, normalisation: Normalisation | None, *, deterministic: bool = True
+) -> Act:
+    """Return a function from the env's observations to the model's actions.
 
     Args:
         model: The model.
         normalisation: Its statistics; None if it is not normalised.
+        deterministic: Whether actions are the mean ones, without exploration noise.
     """
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
         if normalisation is not None:
             inputs = _normalised(observations, normalisation.observation)
-        return model.predict(inputs, deterministic=True)[0]
+        return model.predict(inputs, deterministic=deterministic)[0]
 
     return act
 

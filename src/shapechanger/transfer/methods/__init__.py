@@ -37,6 +37,8 @@ _SHIPPED: Final = {
     "frozen-trunk": f"{_HERE}.frozen_trunk:FrozenTrunk",
     "kickstart": f"{_HERE}.kickstart:Kickstart",
     "evolution": f"{_HERE}.evolution:Evolution",
+    "prefilled-replay": f"{_HERE}.replay:PrefilledReplay",
+    "off-dynamics": f"{_HERE}.replay:OffDynamics",
     "shuffled-map": f"{_HERE}.shuffled_map:ShuffledMap",
     "randomised": f"{_HERE}.adapted_source:Randomised",
     "identified": f"{_HERE}.adapted_source:Identified",

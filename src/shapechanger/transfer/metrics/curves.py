@@ -1,7 +1,7 @@
 """Learning curves and scores.
 
 A curve is linear between two evaluations. Every measure uses that, so areas, crossings and values
-between evaluations are consistent. A score of 0 takes no skill, and 1 is the end of the best arm.
+between evaluations are consistent. A score of 0 takes no skill, and 1 is the target's reference.
 """
 
 from __future__ import annotations
@@ -205,9 +205,10 @@ class Reference(msgspec.Struct, frozen=True):
 
     Attributes:
         zero: Value without skill.
-        one: Value at the end of the best arm.
+        one: Value of the target's reference, or at the end of the best arm where it has none.
         zero_of: What earned zero, such as "random actions".
-        one_of: Arm that earned one.
+        one_of: What earned one: the reference, or the name of an arm.
+        shipped: Whether one is the value of a reference that ships.
 
     Raises:
         StudyError: If one of them is not finite.
@@ -217,6 +218,7 @@ class Reference(msgspec.Struct, frozen=True):
     one: float
     zero_of: str = ""
     one_of: str = ""
+    shipped: bool = False
 
     def __post_init__(self) -> None:
         """Check that both are finite."""
@@ -224,12 +226,18 @@ class Reference(msgspec.Struct, frozen=True):
             raise StudyError(f"A reference needs finite values, got {self.zero} and {self.one}.")
 
     @classmethod
-    def of(cls, floors: Mapping[str, float], ends: Mapping[str, float]) -> Reference:
+    def of(
+        cls,
+        floors: Mapping[str, float],
+        ends: Mapping[str, float],
+        shipped: tuple[str, float] | None = None,
+    ) -> Reference:
         """Measure the reference of a target.
 
         Args:
             floors: Mean values of what takes no skill, by name; at least one.
             ends: Mean values at the end of each arm, by name; at least one.
+            shipped: Name and value of the target's own reference; None if it has none.
 
         Raises:
             StudyError: If there are none.
@@ -237,7 +245,8 @@ class Reference(msgspec.Struct, frozen=True):
         if not floors or not ends:
             raise StudyError("A reference needs a floor and the end of an arm.")
         zero_of, one_of = max(floors, key=floors.__getitem__), max(ends, key=ends.__getitem__)
-        return cls(floors[zero_of], ends[one_of], zero_of, one_of)
+        name, value = shipped or (one_of, ends[one_of])
+        return cls(floors[zero_of], value, zero_of, name, shipped is not None)
 
     @property
     def defined(self) -> bool:

@@ -1,0 +1,172 @@
+"""Reference policies: each env learned from scratch with its own settings, and its floor.
+
+Each training is done once; policies and curves lie in `results/references`, and what is there
+already is not trained again. `ONLY` names envs, `SEEDS` says how many trainings each has. The
+values and the best policy of each env are written into the package.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import msgspec
+import numpy as np
+
+import shapechanger
+from benchmarks.row import Row
+from shapechanger.cli.env_arguments import default_learner
+from shapechanger.transfer.env_ref import EnvRef, measures_of
+from shapechanger.transfer.files import read_json, write_atomic, write_json
+from shapechanger.transfer.learners.evaluation import (
+    EVALUATION_SEED,
+    Evaluation,
+    evaluate,
+    evaluation_envs,
+    random_actions,
+    zero_actions,
+)
+from shapechanger.transfer.learners.policy_file import save_policy
+from shapechanger.transfer.learners.sb3 import train, use_one_thread
+from shapechanger.transfer.learners.settings import Sb3Settings, learner_settings
+from shapechanger.transfer.references import FOLDER, EnvReference, load_references
+
+__all__ = ["references"]
+
+RESULTS: Final = Path("results", "references")
+COMMAND: Final = "python -m benchmarks.run references"
+# Evaluations at the end of a training that count, and episodes of the floor.
+LAST: Final = 3
+FLOOR_EPISODES: Final = 20
+
+
+class Target(NamedTuple):
+    """What an env is trained for.
+
+    Attributes:
+        steps: Env steps.
+        measure: What counts.
+        wanted: What a reference policy should reach; None for whatever comes out.
+        seeds: Number of trainings.
+    """
+
+    steps: int
+    measure: str
+    wanted: float | None
+    seeds: int
+
+
+TARGETS: Final = {
+    "InvertedPendulum": Target(24_576, "return", 1000.0, 10),
+    "SmallInvertedPendulum": Target(49_152, "return", 1000.0, 10),
+    "BigInvertedPendulum": Target(24_576, "return", 1000.0, 10),
+    "InvertedDoublePendulum": Target(524_288, "return", 9100.0, 3),
+    "HalfCheetah": Target(1_572_864, "return", 5000.0, 3),
+    "Hopper": Target(1_048_576, "return", 2500.0, 3),
+    "Walker2d": Target(1_048_576, "return", 2500.0, 3),
+    "Swimmer": Target(1_048_576, "return", 300.0, 3),
+    "Humanoid": Target(1_048_576, "return", None, 1),
+    "Ant": Target(2_097_152, "forward speed", 3.0, 3),
+    "AmputatedAnt": Target(2_097_152, "forward speed", 2.0, 3),
+    "BigAnt": Target(2_097_152, "forward speed", 2.0, 3),
+    "ExtendedAnt": Target(2_097_152, "forward speed", 2.0, 3),
+}
+
+
+def references() -> list[Row]:
+    """Train what is not there yet, and write what ships."""
+    names = os.environ.get("ONLY", "").split() or list(TARGETS)
+    most = int(os.environ.get("SEEDS", "10"))
+    wanted = [(name, seed) for name in names for seed in range(min(most, TARGETS[name].seeds))]
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        curves = list(pool.map(_trained, *zip(*wanted, strict=True)))
+    found = dict(load_references())
+    rows: list[Row] = []
+    for name in names:
+        of_env = [curve for (one, _), curve in zip(wanted, curves, strict=True) if one == name]
+        rows.append(_write(name, of_env, found))
+    ordered = {_env(name).id: found[_env(name).id] for name in TARGETS if _env(name).id in found}
+    write_atomic(
+        FOLDER / "references.json",
+        msgspec.json.format(msgspec.json.encode(ordered), indent=1) + b"\n",
+    )
+    load_references.cache_clear()
+    return rows
+
+
+def _env(name: str) -> EnvRef:
+    return EnvRef(f"shapechanger/{name}-v1")
+
+
+def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
+    """The curve of a training, which is done unless it was."""
+    place = RESULTS / f"{name}-{seed}.json"
+    if place.exists():
+        return read_json(place, tuple[Evaluation, ...], f"delete {place}")
+    use_one_thread()
+    env = _env(name)
+    learner = default_learner(env)
+    settings = learner_settings(learner)
+    assert isinstance(settings, Sb3Settings)
+    curve: list[Evaluation] = []
+    policy = train(env, learner, settings, TARGETS[name].steps, seed, on_evaluation=curve.append)
+    save_policy(policy, place.with_suffix(".safetensors"))
+    write_json(place, tuple(curve))
+    return tuple(curve)
+
+
+def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, EnvReference]) -> Row:
+    """Copy the best policy of an env into the package, with its numbers."""
+    env, target = _env(name), TARGETS[name]
+    floor, measures = _floor(env)
+    ends = {
+        measure: tuple(
+            float(np.mean([one.value(measure) for one in curve[-LAST:]])) for curve in curves
+        )
+        for measure in measures
+    }
+    best = int(np.argmax([curve[-1].value(target.measure) for curve in curves]))
+    reference = EnvReference(
+        learner=default_learner(env),
+        steps=curves[0][-1].steps,
+        seeds=tuple(range(len(curves))),
+        version=shapechanger.__version__,
+        command=COMMAND,
+        floor=floor,
+        ends=ends,
+        policy_seed=best,
+    )
+    found[env.id] = reference
+    shutil.copyfile(RESULTS / f"{name}-{best}.safetensors", FOLDER / f"{name}-v1.safetensors")
+    values = ends[target.measure]
+    last = curves[best][-1].value(target.measure)
+    return Row(
+        f"reference of {name}: {target.measure} of the policy that ships, "
+        f"{reference.learner}, {reference.steps:,} steps",
+        f"{last:.4g}",
+        f"{len(values)} seeds end at " + ", ".join(f"{value:.4g}" for value in values),
+        "none: whatever comes out" if target.wanted is None else f"at least {target.wanted:g}",
+        target.wanted is None or last >= target.wanted,
+    )
+
+
+def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
+    """The value of each measure without skill, and the names of the measures."""
+    settings = learner_settings(default_learner(env))
+    envs = evaluation_envs(env, settings)
+    try:
+        measures = [measure.name for measure in measures_of(envs[0])]
+        floor: dict[str, dict[str, float]] = {}
+        for label, draw in (("random actions", random_actions), ("the zero action", zero_actions)):
+            act = draw(envs[0].action_space, 0)
+            found = evaluate(act, envs, EVALUATION_SEED, episodes=FLOOR_EPISODES)
+            floor[label] = {measure: found.value(measure) for measure in measures}
+        return floor, measures
+    finally:
+        for one in envs:
+            one.close()

@@ -1,0 +1,342 @@
+"""Methods for learners with a replay buffer: mapped source data, and corrected source rewards."""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple, cast
+
+import msgspec
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from torch import Tensor, nn
+from torch.nn import functional
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate, evaluation_envs
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
+from shapechanger.transfer.learners.settings import OffPolicySettings, Settings
+from shapechanger.transfer.methods import Method, MethodRun
+
+__all__ = ["DomainClassifiers", "OffDynamics", "PrefilledReplay", "Transitions", "collect"]
+
+# Share of the target steps as which so many source transitions are prefilled.
+_PREFILLED: Final = 0.5
+# Classifiers of the paper: widths, standard deviation of the noise on their inputs, batch.
+_WIDTH: Final = 256
+_NOISE: Final = 0.1
+_BATCH: Final = 256
+# Source steps between two gradient steps of the classifiers.
+_CLASSIFY_EVERY: Final = 4
+# Corrections beyond this are the classifiers' errors: a transition that they are sure of.
+_LARGEST_CORRECTION: Final = 10.0
+
+
+class Transitions(NamedTuple):
+    """Transitions of one env, in the order in which they happened.
+
+    Attributes:
+        observations: Shape (n, observations).
+        actions: Shape (n, actions).
+        rewards: Shape (n,).
+        next_observations: Shape (n, observations).
+        terminated: Shape (n,), whether the task ended; a time limit does not count.
+    """
+
+    observations: NDArray[np.float64]
+    actions: NDArray[np.float32]
+    rewards: NDArray[np.float64]
+    next_observations: NDArray[np.float64]
+    terminated: NDArray[np.bool_]
+
+
+class PrefilledReplay(Method):
+    """Learn the target with a new policy whose replay buffer starts with mapped source transitions.
+
+    The source policy acts in the source with its exploration noise for half as many steps as there
+    are target steps. Observations are mapped by the names of the two bodies, actions by the study's
+    body map, rewards stay. Nothing marks them as another body's.
+    """
+
+    name = "prefilled-replay"
+    paper = "A. Lazaric, M. Restelli and A. Bonarini, Transfer of Samples in Batch RL, ICML 2008"
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse learners without a replay buffer."""
+        del source, target
+        _require_replay(self.name, settings)
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train on the target."""
+        steps = int(_PREFILLED * run.steps)
+        seen = collect(run.source, run.source_policy(), steps, run.seed)
+        return run.train(
+            run.target,
+            run.steps,
+            callback=_Prefill(_mapped(seen, run.body_map)),
+            on_evaluation=run.report,
+        )
+
+
+class OffDynamics(Method):
+    """Learn in the source, with rewards corrected for how the target's dynamics differ (DARC).
+
+    Two classifiers tell source from target, one by (s, a, s') and one by (s, a). Their difference
+    estimates log p_target(s' | s, a) - log p_source(s' | s, a), which is added to the source's
+    reward: what only the source's body can do is no longer worth doing. The policy learns from
+    source steps alone, as many as a source policy has; it also acts on the target for the budget of
+    target steps, from which only the classifiers learn.
+    """
+
+    name = "off-dynamics"
+    paper = "B. Eysenbach and others, Off-Dynamics Reinforcement Learning (DARC), ICLR 2021"
+    uses_source_policy = False
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse learners without a replay buffer, or that normalise, and bodies of two spaces."""
+        _require_replay(self.name, settings)
+        same = (source.observation_layout, source.action_layout) == (
+            target.observation_layout,
+            target.action_layout,
+        )
+        if not same:
+            raise StudyError(f"{self.name} needs two bodies with the same spaces: leave it out.")
+        if cast("OffPolicySettings", settings).normalise:
+            raise StudyError(f"{self.name} needs a learner with normalise=false: leave it out.")
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train in the source, beside acting on the target."""
+        correction = _Correction(run)
+        try:
+            return run.train(run.source, run.source_steps, callback=correction)
+        finally:
+            correction.close()
+
+
+def _require_replay(name: str, settings: Settings) -> None:
+    if not isinstance(settings, OffPolicySettings):
+        raise StudyError(
+            f"{name} needs a learner with a replay buffer, sac or tqc: leave this arm out."
+        )
+
+
+def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:
+    """Let a policy act in an env with its exploration noise.
+
+    Args:
+        env: The env.
+        policy: The policy.
+        steps: Number of steps.
+        seed: Seed of the first start; it increases by one per episode.
+    """
+    made = env.make()
+    act = actor(policy.model, policy.normalisation, deterministic=False)
+    rows: list[tuple[Any, ...]] = []
+    try:
+        torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
+        seen, _ = made.reset(seed=seed)
+        for _ in range(steps):
+            action = act(np.asarray(seen)[None])[0]
+            then, reward, terminated, truncated, _ = made.step(action)
+            rows.append((seen, action, float(reward), then, terminated))
+            seen = then
+            if terminated or truncated:
+                seed += 1
+                seen, _ = made.reset(seed=seed)
+    finally:
+        made.close()
+    return Transitions(*(np.asarray(column) for column in zip(*rows, strict=True)))
+
+
+def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
+    """Transitions of the source as the target's, by the names of the two bodies."""
+    onto_target = BodyMap.between(
+        body_map.target_observation,
+        body_map.source_observation,
+        body_map.target_action,
+        body_map.source_action,
+    )
+    return seen._replace(
+        observations=onto_target.adapt_observation(seen.observations),
+        actions=body_map.adapt_action(seen.actions).astype(np.float32),
+        next_observations=onto_target.adapt_observation(seen.next_observations),
+    )
+
+
+class _Prefill(BaseCallback):
+    """Fills the replay buffer before the first step."""
+
+    def __init__(self, transitions: Transitions) -> None:
+        super().__init__()
+        self._transitions = transitions
+
+    def _on_training_start(self) -> None:
+        model = cast("Any", self.model)
+        space = model.action_space
+        together = model.n_envs
+        whole = len(self._transitions.rewards) // together * together
+        for at in range(0, whole, together):
+            seen, acted, rewards, then, ended = (
+                column[at : at + together] for column in self._transitions
+            )
+            inside = np.clip(acted, space.low, space.high)
+            model.replay_buffer.add(
+                seen, then, model.policy.scale_action(inside), rewards, ended, [{}] * together
+            )
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class DomainClassifiers(nn.Module):
+    """Two classifiers that tell source from target, by (s, a, s') and by (s, a).
+
+    Args:
+        n_observations: Size of an observation.
+        n_actions: Size of an action.
+        learning_rate: Learning rate of Adam.
+    """
+
+    def __init__(self, n_observations: int, n_actions: int, learning_rate: float = 3e-4) -> None:
+        super().__init__()  # pyright: ignore[reportUnknownMemberType]
+        both = n_observations + n_actions
+        self._of_step = _classifier(both + n_observations)
+        self._of_action = _classifier(both)
+        self._optimiser = torch.optim.Adam(self.parameters(), lr=learning_rate)
+
+    def forward(self, seen: Tensor, acted: Tensor, then: Tensor) -> tuple[Tensor, Tensor]:
+        """Return log p(target) - log p(source) by each classifier, each of shape (n,)."""
+        of_action = torch.cat([seen, acted], dim=1).float()
+        of_step = torch.cat([of_action, then.float()], dim=1)
+        return self._of_step(of_step).squeeze(1), self._of_action(of_action).squeeze(1)
+
+    def correction(self, seen: Tensor, acted: Tensor, then: Tensor) -> Tensor:
+        """Estimate log p_target(s' | s, a) - log p_source(s' | s, a), shape (n,)."""
+        with torch.no_grad():
+            of_step, of_action = self(seen, acted, then)
+        return (of_step - of_action).clamp(-_LARGEST_CORRECTION, _LARGEST_CORRECTION)
+
+    def fit(self, source: tuple[Tensor, ...], target: tuple[Tensor, ...]) -> float:
+        """Take one gradient step; return the loss.
+
+        Args:
+            source: (s, a, s') of the source, each of shape (n, ...).
+            target: (s, a, s') of the target, as many.
+        """
+        inputs = [torch.cat(pair) for pair in zip(source, target, strict=True)]
+        # Noise keeps classifiers of nearly deterministic dynamics from being sure.
+        noisy = [one + _NOISE * torch.randn_like(one) for one in inputs]
+        labels = torch.cat([torch.zeros(len(source[0])), torch.ones(len(target[0]))])
+        loss = torch.stack(
+            [functional.binary_cross_entropy_with_logits(one, labels) for one in self(*noisy)]
+        ).sum()
+        self._optimiser.zero_grad()
+        loss.backward()  # pyright: ignore[reportUnknownMemberType]
+        self._optimiser.step()  # pyright: ignore[reportUnknownMemberType]
+        return loss.item()
+
+
+def _classifier(inputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inputs, _WIDTH), nn.ReLU(), nn.Linear(_WIDTH, 1))
+
+
+class _CorrectedReplay(ReplayBuffer):
+    """A replay buffer that adds the present correction to the rewards that it returns."""
+
+    classifiers: DomainClassifiers | None = None
+
+    def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
+        """Sample transitions with corrected rewards."""
+        batch = super().sample(batch_size, env)
+        if self.classifiers is None:
+            return batch
+        extra = self.classifiers.correction(
+            batch.observations, batch.actions, batch.next_observations
+        )
+        return batch._replace(rewards=batch.rewards + extra.unsqueeze(1))
+
+
+class _Correction(BaseCallback):
+    """Acts on the target beside the training in the source, and corrects the rewards."""
+
+    def __init__(self, run: MethodRun) -> None:
+        super().__init__()
+        self._run = run
+        self._env = run.target.make()
+        self._judges = evaluation_envs(run.target, run.settings)
+        self._seen, _ = self._env.reset(seed=run.seed)
+        self._next = 0
+        self._steps = 0
+
+    def close(self) -> None:
+        """Close the target's envs."""
+        for one in (self._env, *self._judges):
+            one.close()
+
+    def _on_training_start(self) -> None:
+        model = cast("Any", self.model)
+        torch.manual_seed(self._run.seed)  # pyright: ignore[reportUnknownMemberType]
+        spaces = model.observation_space, model.action_space
+        self._classifiers = DomainClassifiers(spaces[0].shape[0], spaces[1].shape[0])
+        size = min(model.buffer_size, self._run.source_steps)
+        corrected = _CorrectedReplay(size, *spaces, device="cpu", n_envs=model.n_envs)
+        corrected.classifiers = self._classifiers
+        model.replay_buffer = corrected
+        self._of_target = ReplayBuffer(self._run.steps, *spaces, device="cpu")
+
+    def _on_step(self) -> bool:
+        run = self._run
+        # Target steps are spread evenly over the source steps.
+        due = min(run.steps, self.num_timesteps * run.steps // run.source_steps)
+        while self._steps < due:
+            self._evaluate_if_due()
+            self._act()
+        if self.n_calls % _CLASSIFY_EVERY == 0 and self._of_target.size() >= _BATCH:
+            model = cast("Any", self.model)
+            self._classifiers.fit(
+                _steps_of(ReplayBuffer.sample(model.replay_buffer, _BATCH)),
+                _steps_of(self._of_target.sample(_BATCH)),
+            )
+        return True
+
+    def _on_training_end(self) -> None:
+        self._evaluate_if_due(last=True)
+
+    def _act(self) -> None:
+        """Take one step on the target with the policy's exploration noise."""
+        model = cast("Any", self.model)
+        action, _ = model.predict(self._seen)
+        then, reward, terminated, truncated, _ = self._env.step(action)
+        scaled = model.policy.scale_action(action)
+        self._of_target.add(
+            np.asarray(self._seen),
+            np.asarray(then),
+            scaled,
+            np.array([reward]),
+            np.array([terminated]),
+            [{}],
+        )
+        self._steps += 1
+        self._seen = self._env.reset()[0] if terminated or truncated else then
+
+    def _evaluate_if_due(self, *, last: bool = False) -> None:
+        """Evaluate on the target, at the steps at which scratch is."""
+        run = self._run
+        if not last and self._steps < self._next:
+            return
+        self._next += run.settings.eval_every
+        found = evaluate(
+            actor(cast("Any", self.model), None),
+            self._judges,
+            EVALUATION_SEED,
+            episodes=run.settings.eval_episodes,
+        )
+        run.report(msgspec.structs.replace(found, steps=run.steps if last else self._steps))
+
+
+def _steps_of(batch: ReplayBufferSamples) -> tuple[Tensor, ...]:
+    return batch.observations, batch.actions, batch.next_observations

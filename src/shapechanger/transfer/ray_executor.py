@@ -1,0 +1,214 @@
+"""Run the jobs of a study on a Ray cluster.
+
+The study's folder must be on a file system that all nodes share, and the package be installed on
+each of them. Ray sends Python objects between its nodes by pickle, so a cluster must be one that
+only its users can reach.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+import traceback
+from collections.abc import Sequence
+from typing import Any, Final
+
+from shapechanger.errors import FailedRuns, MissingExtra, ShapechangerError, StudyError
+from shapechanger.transfer.executor import Job, OnProgress, ReportSteps
+
+# Before Ray is imported, which reads it: otherwise it reports its use to its makers.
+os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+
+try:
+    import ray
+    from ray.exceptions import RayError
+except ImportError as error:
+    raise MissingExtra("ray", "ray") from error
+
+__all__ = ["RayCluster"]
+
+_ATTEMPTS: Final = 3
+_CONNECT_S: Final = 5.0
+_REPORT_EVERY_S: Final = 0.5
+# How a client of gRPC begins, and the type of the frame that a server answers with (RFC 9113, 3.4).
+_HTTP2_PREFACE: Final = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
+_HTTP2_SETTINGS: Final = 4
+_ray: Any = ray
+
+
+class RayCluster:
+    """Runs jobs on the nodes of a Ray cluster, one job per core.
+
+    A job whose worker or node is lost is repeated on another, up to three times. A job that fails
+    is reported at the end, and the others go on, except those that need its result.
+
+    Args:
+        address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for the one that
+            this machine is a node of; None to start Ray on this machine for the time of the study.
+    """
+
+    def __init__(self, address: str | None = None) -> None:
+        self._address = address
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        """Run all jobs; see `Executor.run`.
+
+        Raises:
+            StudyError: If the cluster does not answer.
+            FailedRuns: If jobs have failed; all others are complete.
+        """
+        own = not _ray.is_initialized()
+        if own:
+            self._connect()
+        try:
+            _Schedule(jobs, on_progress).run()
+        finally:
+            if own:
+                _ray.shutdown()
+
+    def _connect(self) -> None:
+        if self._address not in (None, "auto", "local"):
+            _require_answer(str(self._address))
+        try:
+            _ray.init(address=self._address, logging_level="ERROR", log_to_driver=False)
+        except (ConnectionError, ValueError, RuntimeError, RayError) as error:
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
+            raise _no_answer(self._address or "this machine", reason) from error
+
+
+def _require_answer(address: str) -> None:
+    """Refuse an address at which nothing listens, before Ray waits for a minute."""
+    host, colon, port = address.rpartition("://")[2].rpartition(":")
+    if not colon or not port.isdigit():
+        raise StudyError(f"The address of a Ray cluster is HOST:PORT or auto, not {address!r}.")
+    try:
+        with socket.create_connection((host, int(port)), timeout=_CONNECT_S) as connection:
+            connection.sendall(_HTTP2_PREFACE)
+            answer = connection.recv(9)
+    except OSError as error:
+        raise _no_answer(address, str(error)) from error
+    if len(answer) < 9 or answer[3] != _HTTP2_SETTINGS:
+        raise _no_answer(address, "what listens there is not Ray")
+
+
+def _no_answer(address: str, reason: str) -> StudyError:
+    return StudyError(
+        f"Ray at {address} does not answer ({reason}): start it with `ray start --head`, or give "
+        "the --address that it prints."
+    )
+
+
+class _Schedule:
+    """The jobs that wait, run, have ended and have failed."""
+
+    def __init__(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        self._on_progress = on_progress
+        self._waiting = list(jobs)
+        names = {job.name for job in jobs}
+        self._ended = {name for job in jobs for name in job.after} - names
+        self._failed: dict[str, str] = {}
+        self._attempts = dict.fromkeys(names, 0)
+        self._running: dict[Any, Job] = {}
+        self._steps: dict[str, int] = {}
+        self._board: Any = _ray.remote(num_cpus=0)(_Board).remote()
+        self._perform: Any = _ray.remote(num_cpus=1, max_retries=0)(_perform)
+
+    def run(self) -> None:
+        """Run until every job has ended or cannot start."""
+        try:
+            while self._start_ready() or self._running:
+                done, _ = _ray.wait(list(self._running), timeout=_REPORT_EVERY_S)
+                self._report()
+                for task in done:
+                    self._finish(self._running.pop(task), task)
+        except BaseException:
+            for task in self._running:
+                _ray.cancel(task, force=True)
+            raise
+        if self._failed:
+            reasons = "; ".join(f"{name} ({reason})" for name, reason in self._failed.items())
+            skipped = ", ".join(job.name for job in self._waiting)
+            raise FailedRuns(
+                f"These runs failed: {reasons}. "
+                + (f"These need them: {skipped}. " if skipped else "")
+                + "All others have ended; the same command tries these again."
+            )
+
+    def _start_ready(self) -> bool:
+        """Start the jobs whose dependencies have ended; return whether there were any."""
+        ready = [job for job in self._waiting if self._ended.issuperset(job.after)]
+        for job in ready:
+            self._waiting.remove(job)
+            self._attempts[job.name] += 1
+            self._steps[job.name] = 0
+            task = self._perform.remote(job.function, job.arguments, job.name, self._board)
+            self._running[task] = job
+        return bool(ready)
+
+    def _finish(self, job: Job, task: Any) -> None:
+        try:
+            failure: str = _ray.get(task)
+        except RayError as error:  # The worker or its node is gone.
+            if self._attempts[job.name] < _ATTEMPTS:
+                self._waiting.append(job)
+                return
+            failure = f"lost {_ATTEMPTS} times, at last with {type(error).__name__}"
+        if failure:
+            self._failed[job.name] = failure
+            return
+        self._ended.add(job.name)
+        self._on_progress(job.name, self._steps[job.name], True)
+
+    def _report(self) -> None:
+        try:
+            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
+        except RayError:  # Its node is gone; progress is not worth a study.
+            self._board = _ray.remote(num_cpus=0)(_Board).remote()
+            return
+        running = {job.name for job in self._running.values()}
+        for name, steps in found.items():
+            if name in running and steps != self._steps[name]:
+                self._steps[name] = steps
+                self._on_progress(name, steps, False)
+
+
+class _Board:
+    """Holds the steps of each job: a Ray actor."""
+
+    def __init__(self) -> None:
+        self._steps: dict[str, int] = {}
+
+    def put(self, name: str, steps: int) -> None:
+        """Store the steps of a job."""
+        self._steps[name] = steps
+
+    def take(self) -> dict[str, int]:
+        """Return the steps of every job that has changed since the last call."""
+        steps, self._steps = self._steps, {}
+        return steps
+
+
+def _perform(function: Any, arguments: tuple[Any, ...], name: str, board: Any) -> str:
+    """Perform a job on a node; return why it failed, or nothing."""
+    try:
+        function(*arguments, _throttled(name, board))
+    except ShapechangerError as error:
+        return str(error).rstrip(".")
+    except Exception:  # It crosses to the program that started the study.
+        return traceback.format_exc()
+    return ""
+
+
+def _throttled(name: str, board: Any) -> ReportSteps:
+    """Return a callback that forwards two numbers a second."""
+    last = 0.0
+
+    def report(steps: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _REPORT_EVERY_S:
+            last = now
+            board.put.remote(name, steps)
+
+    return report

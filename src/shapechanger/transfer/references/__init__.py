@@ -1,0 +1,89 @@
+"""What each env is worth: its floor, what learning from scratch reaches, and a policy that does it.
+
+`references.json` and the policies beside it are written by `python -m benchmarks.run references`;
+`README.md` is their card.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from shapechanger.errors import UnknownName
+from shapechanger.transfer.env_ref import EnvRef
+
+__all__ = ["FOLDER", "EnvReference", "load_references", "reference_of", "reference_policy"]
+
+FOLDER: Final = Path(__file__).parent
+"""Folder of the references and of their policies."""
+
+
+class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
+    """Measured values of an env, with where they come from.
+
+    Attributes:
+        learner: Name of the learner's settings.
+        steps: Env steps of each training.
+        seeds: Seeds of the trainings.
+        version: Version of Shapechanger.
+        command: The command that measured it.
+        floor: Values of each measure, by what takes no skill: random actions and the action zero.
+        ends: Values of each measure at the end of each training, the mean of its last evaluations.
+        policy_seed: Seed of the policy that ships.
+    """
+
+    learner: str
+    steps: int
+    seeds: tuple[int, ...]
+    version: str
+    command: str
+    floor: dict[str, dict[str, float]]
+    ends: dict[str, tuple[float, ...]]
+    policy_seed: int
+
+    def end(self, measure: str) -> float | None:
+        """Return the mean value at the end over the seeds; None if it was not measured.
+
+        Args:
+            measure: Name of a measure, or "return".
+        """
+        values = self.ends.get(measure)
+        return sum(values) / len(values) if values else None
+
+    @property
+    def text(self) -> str:
+        """Where it comes from, in words."""
+        return f"the reference ({self.learner}, {self.steps:,} steps, {len(self.seeds)} seeds)"
+
+
+@cache
+def load_references() -> dict[str, EnvReference]:
+    """Return all references by the ids of their envs."""
+    content = (FOLDER / "references.json").read_bytes()
+    return msgspec.json.decode(content, type=dict[str, EnvReference])
+
+
+def reference_of(env: EnvRef) -> EnvReference | None:
+    """Return the reference of an env; None if there is none for this env with these arguments.
+
+    Args:
+        env: The env.
+    """
+    return None if env.kwargs else load_references().get(env.id)
+
+
+def reference_policy(env_id: str) -> Path:
+    """Return the file of the policy that ships for an env.
+
+    Args:
+        env_id: Id of the env.
+
+    Raises:
+        UnknownName: If none ships.
+    """
+    if env_id not in load_references():
+        raise UnknownName("reference policy", env_id, load_references())
+    return FOLDER / f"{env_id.rpartition('/')[2]}.safetensors"

@@ -1,0 +1,137 @@
+"""Methods for learners with a replay buffer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.settings import OffPolicySettings, resolve_learner
+from shapechanger.transfer.methods.replay import (
+    DomainClassifiers,
+    Transitions,
+    _mapped,  # pyright: ignore[reportPrivateUsage]
+    collect,
+)
+from shapechanger.transfer.plan import TransferTask
+from shapechanger.transfer.study import run_study
+from tests.transfer.studies import SMALL, TINY, tiny_plan
+
+SHORT: dict[str, Any] = {
+    "net_arch": [8],
+    "steps": 96,
+    "eval_every": 32,
+    "eval_episodes": 2,
+    "batch_size": 8,
+    "learning_starts": 16,
+    "buffer_size": 96,
+}
+
+
+def short(**more: Any) -> OffPolicySettings:
+    """Settings of SAC that learn nothing in a second."""
+    _, settings = resolve_learner("sac", {**SHORT, **more})
+    assert isinstance(settings, OffPolicySettings)
+    return settings
+
+
+@pytest.mark.parametrize("more", [{}, {"n_envs": 2}], ids=["one env", "two envs"])
+def test_a_study_with_both(tmp_path: Path, more: dict[str, Any]) -> None:
+    """Both are evaluated on the target at the steps at which scratch is."""
+    plan = tiny_plan(
+        short(**more),
+        steps=64,
+        source_steps=320,
+        arms=("scratch", "prefilled-replay", "off-dynamics"),
+    )
+    study = run_study(plan, tmp_path)
+    wanted = study.curves("scratch").steps.tolist()
+    for arm in ("prefilled-replay", "off-dynamics"):
+        assert study.curves(arm).steps.tolist() == wanted == [0.0, 32.0, 64.0]
+
+
+def test_corrections_are_of_what_differs() -> None:
+    """A step that only the source makes counts less, one of the target more, a common one 0."""
+    torch.manual_seed(0)
+    classifiers = DomainClassifiers(1, 1, learning_rate=3e-3)
+
+    def batch(goes: float) -> tuple[torch.Tensor, ...]:
+        seen, acted = torch.randn(256, 1), torch.randn(256, 1)
+        return seen, acted, seen + goes * torch.sign(acted)
+
+    for _ in range(300):
+        classifiers.fit(batch(1.0), batch(-1.0))
+    of_source = classifiers.correction(*batch(1.0))
+    of_target = classifiers.correction(*batch(-1.0))
+    assert of_source.mean() < -1.0
+    assert of_target.mean() > 1.0
+    same = DomainClassifiers(1, 1, learning_rate=3e-3)
+    for _ in range(300):
+        same.fit(batch(1.0), batch(1.0))
+    assert same.correction(*batch(1.0)).abs().mean() < 0.3
+
+
+def test_transitions_are_those_of_the_env() -> None:
+    """Each starts where the last one went, unless the episode ended."""
+    policy = train(SMALL, "sac", short(), 32, 0, on_evaluation=_ignore)
+    seen = collect(SMALL, policy, 50, 3)
+    assert seen.observations.shape == seen.next_observations.shape == (50, 4)
+    goes_on = ~seen.terminated[:-1]
+    np.testing.assert_array_equal(
+        seen.next_observations[:-1][goes_on], seen.observations[1:][goes_on]
+    )
+    assert seen.terminated.any()
+    again = collect(SMALL, policy, 50, 3)
+    np.testing.assert_array_equal(again.actions, seen.actions)
+
+
+def test_mapped_transitions_are_those_of_the_target() -> None:
+    """In its sizes, with each number under its name."""
+    bodies = [EnvRef(f"shapechanger/{name}-v1").make() for name in ("Ant", "ExtendedAnt")]
+    (seen, acts), (sees, does) = (layouts_of(body) for body in bodies)
+    for body in bodies:
+        body.close()
+    body_map = BodyMap.between(seen, sees, acts, does)
+    rng = np.random.default_rng(0)
+    ours = Transitions(
+        rng.normal(size=(3, seen.size)),
+        rng.uniform(-1.0, 1.0, size=(3, acts.size)).astype(np.float32),
+        np.zeros(3),
+        rng.normal(size=(3, seen.size)),
+        np.zeros(3, bool),
+    )
+    theirs = _mapped(ours, body_map)
+    assert theirs.observations.shape == (3, sees.size)
+    assert theirs.actions.shape == (3, does.size)
+    for name in set(seen.names) & set(sees.names):
+        np.testing.assert_array_equal(
+            theirs.observations[:, sees.slices[name]], ours.observations[:, seen.slices[name]]
+        )
+
+
+@pytest.mark.parametrize("arm", ["prefilled-replay", "off-dynamics"])
+def test_learners_without_a_replay_buffer_are_refused(arm: str) -> None:
+    """PPO has none."""
+    with pytest.raises(StudyError, match=f"{arm} needs a learner with a replay buffer"):
+        tiny_plan(TINY, arms=("scratch", arm))
+
+
+def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
+    """Its classifiers compare numbers of the two bodies."""
+    ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
+    with pytest.raises(StudyError, match="the same spaces"):
+        tiny_plan(short(), task=ants, arms=("scratch", "off-dynamics"))
+    with pytest.raises(StudyError, match="normalise=false"):
+        tiny_plan(short(normalise=True), arms=("scratch", "off-dynamics"))
+
+
+def _ignore(evaluation: Evaluation) -> None:
+    del evaluation

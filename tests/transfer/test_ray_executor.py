@@ -1,0 +1,134 @@
+"""A study on a Ray cluster: two nodes of this machine, of which one is killed."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.errors import StudyError
+from shapechanger.transfer.executor import Job, Serial
+from shapechanger.transfer.ray_executor import RayCluster
+from shapechanger.transfer.study import run_study
+from tests.transfer import jobs
+from tests.transfer.studies import tiny_plan
+
+pytestmark = [pytest.mark.system, pytest.mark.filterwarnings("ignore::FutureWarning:ray")]
+
+_MEMORY = 80_000_000
+# Reports of the other job, two a second, after which the worker of a killed node has ended.
+_UNTIL_DEAD = 6
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """A head node without cores for jobs, so that all run on nodes that may be killed."""
+    from ray.cluster_utils import Cluster
+
+    # Workers import the jobs of the tests.
+    root = str(Path(__file__).parents[2])
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (root, before)))
+    nodes: Any = Cluster(
+        initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": _MEMORY}
+    )
+    nodes.add_node(num_cpus=1, object_store_memory=_MEMORY)
+    yield nodes
+    nodes.shutdown()
+    if before is None:
+        del os.environ["PYTHONPATH"]
+    else:
+        os.environ["PYTHONPATH"] = before
+
+
+def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -> None:
+    """Same seeds, same numbers; progress arrives."""
+    seen: set[str] = set()
+
+    def on_progress(name: str, steps: int, ended: bool) -> None:
+        del steps
+        if ended:
+            seen.add(name)
+
+    plan = tiny_plan()
+    there = run_study(
+        plan, tmp_path / "there", executor=RayCluster(cluster.address), on_progress=on_progress
+    )
+    here = run_study(plan, tmp_path / "here", executor=Serial())
+    assert [run.curve for run in there.runs] == [run.curve for run in here.runs]
+    assert seen == {run.name for run in plan.runs()}
+
+
+def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path) -> None:
+    """Half-way through its first attempt."""
+    doomed = cluster.add_node(num_cpus=1, object_store_memory=_MEMORY)
+    marks = [tmp_path / f"job-{i}" for i in range(2)]
+    killed, since = False, 0
+
+    def attempts() -> int:
+        return sum(len(mark.read_text().splitlines()) for mark in marks if mark.exists())
+
+    def on_progress(name: str, steps: int, ended: bool) -> None:
+        nonlocal killed, since
+        del name, steps, ended
+        since += killed
+        if attempts() == 2 and not killed:  # One on each node.
+            killed = True
+            cluster.remove_node(doomed, allow_graceful=False)
+        if since == _UNTIL_DEAD:
+            (tmp_path / "go").touch()
+
+    RayCluster(cluster.address).run(
+        [
+            Job(mark.name, jobs.end_when_there_is_one, (str(mark), str(tmp_path / "go")))
+            for mark in marks
+        ],
+        on_progress,
+    )
+    assert killed
+    assert attempts() == 3
+
+
+def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_path: Path) -> None:
+    """A mistake at once; a worker that is lost three times at last; what needs them is named."""
+    mark = tmp_path / "mark"
+    with pytest.raises(StudyError) as caught:
+        RayCluster(cluster.address).run(
+            [
+                Job("refuse", jobs.refuse, ()),
+                Job("vanish", jobs.vanish, ()),
+                Job("needs", jobs.leave_a_mark, (str(tmp_path / "never"),), ("refuse",)),
+                Job("others", jobs.leave_a_mark, (str(mark),)),
+            ],
+            lambda *_: None,
+        )
+    text = str(caught.value)
+    assert "refuse (No thing matches 'this'" in text
+    assert "vanish (lost 3 times" in text
+    assert "These need them: needs." in text
+    assert mark.exists()
+    assert not (tmp_path / "never").exists()
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:9", "nowhere", "ray://127.0.0.1:9"])
+def test_an_address_that_does_not_answer_is_one_sentence(address: str) -> None:
+    """Within ten seconds."""
+    began = time.monotonic()
+    with pytest.raises(StudyError, match=r"does not answer|HOST:PORT"):
+        RayCluster(address).run([], lambda *_: None)
+    assert time.monotonic() - began < 10.0
+
+
+def test_what_listens_but_is_no_ray_is_one_sentence() -> None:
+    """Something else may have the port."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        began = time.monotonic()
+        with pytest.raises(StudyError, match="does not answer"):
+            RayCluster(f"127.0.0.1:{port}").run([], lambda *_: None)
+        assert time.monotonic() - began < 10.0
