@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.cli.films import film_study
-from shapechanger.cli.suite import Suite, load_suite, suite_tasks
+from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
@@ -189,7 +189,7 @@ def _suite(name: str) -> dict[str, Study]:
     """Run a suite, or what is missing of it, and write the numbers of its runs."""
     suite, out = load_suite(name), Path("results", name)
     seeds = int(os.environ.get("SEEDS", suite.seeds))
-    Suite(name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
+    RunSuite(name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
     studies = _finished(name)
     write_json(RESULTS / f"atlas-{name}-runs.json", {one: _runs(s) for one, s in studies.items()})
     return studies

@@ -13,7 +13,7 @@ from typing import Final, Literal
 import msgspec
 
 from benchmarks.row import Row
-from shapechanger.cli.suite import Suite
+from shapechanger.cli.suite import RunSuite
 from shapechanger.cli.transfer import Transfer
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.study import STUDY_FILE, Study
@@ -58,7 +58,7 @@ def tries() -> list[Row]:
 
 def _suite(name: Literal["vehicles", "lenses"]) -> list[StudyOutcome]:
     out = Path("results", name)
-    Suite(name, seeds=_seeds(), out=out).run()
+    RunSuite(name, seeds=_seeds(), out=out).run()
     return msgspec.json.decode((out / "suite.json").read_bytes(), type=list[StudyOutcome])
 
 

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import shlex
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
 pytestmark = pytest.mark.system
 
-_SUITE = ["suite", "vehicles", "--seeds", "2"]
+_SUITE = ["suite", "run", "vehicles", "--seeds", "2"]
 # The target of one is the target of another, and so with the sources.
 _PAIRS = [f"{a}-to-{b}" for a, b in (("Dry", "Wet"), ("Dry", "Icy"), ("Wet", "Dry"))]
 _PAIRS += [f"{a}-to-{b}" for a, b in (("Wet", "Icy"), ("Icy", "Dry"), ("Icy", "Wet"))]
@@ -107,7 +108,7 @@ def test_a_suite_is_one_command(undisturbed: tuple[Path, _Counting, str]) -> Non
         assert f"wrote {out / name / 'report.html'}" in said
         assert (out / name / "report.html").stat().st_size > 10_000
         command = json.loads((out / name / "study.json").read_text())["command"]
-        assert command == f"shapechanger suite vehicles --seeds 2 --out {out}"
+        assert command == f"shapechanger suite run vehicles --seeds 2 --out {out}"
     assert "of 6 fine-tuning came to what scratch ends with in less than half of" in said
 
 
@@ -169,6 +170,75 @@ def test_a_suite_that_was_stopped_goes_on_to_the_same_numbers(
     assert again.done == []
 
 
+def test_folders_of_two_machines_are_merged(
+    undisturbed: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One study was done on one, two on the other, and one of them on both: the numbers agree."""
+    monkeypatch.setattr(suite_command, "write_study_report", lambda study, folder: folder)
+    whole = undisturbed[0]
+    parts = {"a": _PAIRS[:2], "b": _PAIRS[1:3]}
+    for part, names in parts.items():
+        for name in names:
+            shutil.copytree(whole / name, tmp_path / part / name)
+    # The other machine had been stopped in one of its studies.
+    shutil.rmtree(tmp_path / "b" / _PAIRS[2] / "runs" / "fine-tune-1")
+    merge = ["suite", "merge", "vehicles", str(tmp_path / "a"), str(tmp_path / "b")]
+    code, said, complained = _run(tmp_path / "ab", _Counting(), arguments=merge)
+    assert code == 0, complained
+    assert f"{_PAIRS[2]} lacks fine-tune-1." in said
+    found = json.loads((tmp_path / "ab" / "suite.json").read_text())
+    alone = {one["name"]: one for one in json.loads((whole / "suite.json").read_text())}
+    assert [one["name"] for one in found] == _PAIRS[:2]
+    assert all(one == alone[one["name"]] for one in found)
+
+
+def test_what_cannot_be_merged_is_refused(
+    undisturbed: tuple[Path, _Counting, str], tmp_path: Path
+) -> None:
+    """Another result of the same run, another study, and the folder that is written."""
+    name = _PAIRS[0]
+    for part in ("a", "b"):
+        shutil.copytree(undisturbed[0] / name, tmp_path / part / name)
+    result = tmp_path / "b" / name / "runs" / "random-0" / "run.json"
+    content = json.loads(result.read_text())
+    content["curve"][0]["mean_return"] += 1.0
+    result.write_text(json.dumps(content))
+    merge = ["suite", "merge", "vehicles", str(tmp_path / "a"), str(tmp_path / "b")]
+    code, _, complained = _run(tmp_path / "ab", _Counting(), arguments=merge)
+    assert code == 2
+    assert "The result of random-0 in" in complained
+    plan = tmp_path / "b" / name / "plan.json"
+    plan.write_text(plan.read_text().replace('"seed": 0', '"seed": 7'))
+    code, _, complained = _run(tmp_path / "abc", _Counting(), arguments=merge)
+    assert code == 2
+    assert "which differ in seed" in complained
+    code, _, complained = _run(tmp_path / "a", _Counting(), arguments=merge)
+    assert code == 2
+    assert "one of the folders to merge" in complained
+
+
+def test_a_suite_can_be_watched(
+    undisturbed: tuple[Path, _Counting, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its complete studies, and a run at work with its last evaluation."""
+    shutil.copytree(undisturbed[0], tmp_path / "all")
+    at_work = tmp_path / "all" / _PAIRS[0] / "runs" / "fine-tune-1"
+    (at_work / "run.json").unlink()
+    curve = at_work / "curve.jsonl"
+    first, *_ = curve.read_text().splitlines(keepends=True)
+    curve.write_text(first + '{"steps": 2')  # A line that is being written.
+    main(["suite", "watch", str(tmp_path / "all")])
+    lines = capsys.readouterr().out.splitlines()
+    (row,) = (line for line in lines if line.strip().startswith(_PAIRS[0]))
+    assert "10 of 11" in row
+    assert "fine-tune-1" in row
+    assert "after 0" in row
+    assert sum("11 of 11" in line for line in lines) == 5
+    with pytest.raises(SystemExit):
+        main(["suite", "watch", str(tmp_path / "nothing")])
+    assert "There is no study in" in capsys.readouterr().err
+
+
 def test_another_suite_in_the_folder_is_refused(
     undisturbed: tuple[Path, _Counting, str],
 ) -> None:
@@ -183,10 +253,10 @@ def test_another_suite_in_the_folder_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["suite", "vehicles", "--seeds", "1"], "at least 2 seeds"),
-        (["suite", "vehicles", "--steps", "5"], "smaller than one evaluation"),
-        (["suite", "vehicles", "--seed", "-1"], "A seed is a whole number from 0"),
-        (["suite", "vehicles", "--workers", "0"], "at least one worker"),
+        (["suite", "run", "vehicles", "--seeds", "1"], "at least 2 seeds"),
+        (["suite", "run", "vehicles", "--steps", "5"], "smaller than one evaluation"),
+        (["suite", "run", "vehicles", "--seed", "-1"], "A seed is a whole number from 0"),
+        (["suite", "run", "vehicles", "--workers", "0"], "at least one worker"),
     ],
 )
 def test_nonsense_gets_one_sentence(

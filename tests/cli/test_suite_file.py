@@ -16,7 +16,7 @@ from shapechanger.transfer.plan import TransferTask
 def test_a_suite_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     """The message names those that are, and the nearest."""
     with pytest.raises(SystemExit) as stop:
-        main(["suite", "vehicle"])
+        main(["suite", "run", "vehicle"])
     assert stop.value.code == 2
     message = capsys.readouterr().err
     assert "Did you mean 'vehicles'?" in message
@@ -81,7 +81,7 @@ def test_a_wrong_file_gets_one_sentence(
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(SystemExit) as stop:
-        main(["suite", str(file), "--out", str(tmp_path / "out")])
+        main(["suite", "run", str(file), "--out", str(tmp_path / "out")])
     message = capsys.readouterr().err
     assert stop.value.code == 2
     assert words in message

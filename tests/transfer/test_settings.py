@@ -50,6 +50,8 @@ def test_every_learner_says_what_it_was_tuned_on() -> None:
     for names in TUNED_ON.values():
         for name in names:
             assert f"shapechanger/{name}-v1" in gym.registry
-    assert tuning_text("ppo-run", "shapechanger/Ant-v1") == "The settings were tuned on Ant."
+    assert tuning_text("ppo-swim", "shapechanger/Swimmer-v1") == (
+        "The settings were tuned on Swimmer."
+    )
     assert tuning_text("ppo-run", "shapechanger/Hopper-v1").endswith("not on Hopper.")
     assert "Nobody has stated" in tuning_text("mine", "shapechanger/Ant-v1")

@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import sys
+import time
 import tomllib
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
 import tyro
+from rich.console import Console
+from rich.live import Live
 from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
@@ -195,8 +198,8 @@ def _name(env: _Env) -> str:
 
 
 @dataclass(frozen=True)
-class Suite:
-    """Run a suite of studies: one study and report per pair, and a joint table.
+class RunSuite:
+    """Run a suite of studies: one study and report per pair, and a joint page.
 
     Run the same command again to resume, or with more seeds to add to it.
     """
@@ -264,16 +267,7 @@ class Suite:
             write_study_report(study, folder)
             page.add(name, study)
             console.print(f"wrote {folder / 'report.html'} and {page.path}", soft_wrap=True)
-        found = page.outcomes()
-        console.print(_table(found))
-        halves = sum(outcome.halves for outcome in found)
-        console.print(
-            "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
-            "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
-            f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
-            "half of scratch's steps.",
-            soft_wrap=True,
-        )
+        _print_outcomes(page.outcomes(), console)
         if failed:
             raise FailedRuns(" ".join(failed))
 
@@ -297,6 +291,149 @@ class Suite:
             measure=suite.measure,
             traits=traits,
         )
+
+
+@dataclass(frozen=True)
+class WatchSuite:
+    """Watch a suite that runs elsewhere: its runs, and where the last evaluations stand."""
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
+    """The suite's folder, such as results/ants."""
+    every: float = 5.0
+    """Seconds between two looks, where the output is a terminal; elsewhere there is one look."""
+
+    def run(self) -> None:
+        """Show a table until every study is complete."""
+        if self.every <= 0.0:
+            raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
+        table, complete = _progress_table(self.folder)
+        if not sys.stdout.isatty():
+            plain_console(width=_FILE_WIDTH).print(table)
+            return
+        with Live(table, console=plain_console(), auto_refresh=False) as live:
+            while not complete:
+                time.sleep(self.every)
+                table, complete = _progress_table(self.folder)
+                live.update(table, refresh=True)
+
+
+@dataclass(frozen=True)
+class MergeSuites:
+    """Merge folders of one suite that were run on several machines, and write its page."""
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
+    """A TOML file, or the name of a suite that comes with Shapechanger."""
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
+    """The folders; a study may be in several of them, with other seeds and arms."""
+    out: Path | None = None
+    """The folder to write; results/NAME if not given."""
+
+    def run(self) -> None:
+        """Copy what has ended, and report the studies that are complete."""
+        from shapechanger.transfer.executor import Serial
+        from shapechanger.transfer.study import PLAN_FILE, run_study, unfinished_runs
+        from shapechanger.transfer.suite import merge_study
+
+        suite = load_suite(self.name)
+        tasks = dict(suite_tasks(suite))
+        out = self.out or Path("results", Path(self.name).stem)
+        if out.resolve() in [folder.resolve() for folder in self.folders]:
+            raise StudyError(f"{out} is one of the folders to merge: give another --out.")
+        for folder in self.folders:
+            if not any((folder / name / PLAN_FILE).exists() for name in tasks):
+                raise StudyError(f"{folder} holds no study of the suite {self.name}.")
+        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
+        command = shlex.join(["shapechanger", *sys.argv[1:]])
+        page = _Page(suite, Path(self.name).stem, out, tasks)
+        for name in tasks:
+            parts = [one / name for one in self.folders if (one / name / PLAN_FILE).exists()]
+            if not parts:
+                continue
+            plan = merge_study(parts, out / name)
+            if missing := unfinished_runs(plan, out / name):
+                console.print(f"{name} lacks {', '.join(run.name for run in missing)}.")
+                continue
+            study = run_study(plan, out / name, executor=Serial(), command=command)
+            write_study_report(study, out / name)
+            page.add(name, study)
+            console.print(f"wrote {out / name / 'report.html'} and {page.path}", soft_wrap=True)
+        _print_outcomes(page.outcomes(), console)
+
+
+@dataclass(frozen=True)
+class ListSuites:
+    """List the suites that come with Shapechanger."""
+
+    def run(self) -> None:
+        """Print a line for each."""
+        table = Table("suite", "studies", "seeds", "arms", box=None)
+        for name in shipped_suites():
+            suite = load_suite(name)
+            studies = str(len(suite_tasks(suite)))
+            table.add_row(name, studies, str(suite.seeds), ", ".join(suite.arms) or "the default")
+        plain_console().print(table)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Run, watch and merge suites: many studies with one page."""
+
+    command: (
+        Annotated[RunSuite, tyro.conf.subcommand("run")]
+        | Annotated[WatchSuite, tyro.conf.subcommand("watch")]
+        | Annotated[MergeSuites, tyro.conf.subcommand("merge")]
+        | Annotated[ListSuites, tyro.conf.subcommand("list")]
+    )
+
+    def run(self) -> None:
+        """Run the subcommand."""
+        self.command.run()
+
+
+def _progress_table(out: Path) -> tuple[Table, bool]:
+    """A row for each study in a suite's folder, and whether all are complete.
+
+    Raises:
+        StudyError: If there is none.
+    """
+    from shapechanger.transfer.files import read_json
+    from shapechanger.transfer.plan import SOURCE, Plan
+    from shapechanger.transfer.runs import last_evaluation, load_result
+    from shapechanger.transfer.study import PLAN_FILE
+
+    table = Table("study", "runs", "steps", "at work", box=None)
+    complete = True
+    for path in sorted(out.glob(f"*/{PLAN_FILE}")):
+        plan = read_json(path, Plan, f"delete {path.parent}")
+        ended, done, total = 0, 0, 0
+        at_work: list[str] = []
+        for run in plan.runs():
+            steps = plan.steps_of(run.kind)
+            total += steps
+            if load_result(plan, path.parent, run) is not None:
+                ended, done = ended + 1, done + steps
+            elif (last := last_evaluation(path.parent, run)) is not None:
+                done += last.steps
+                value = last.value(plan.measure if run.kind != SOURCE else "return")
+                at_work.append(f"{run.name} {value:.4g} after {last.steps:,}")
+        complete = complete and ended == len(plan.runs())
+        share = f"{100 * done // max(total, 1)} %"
+        table.add_row(path.parent.name, f"{ended} of {len(plan.runs())}", share, "; ".join(at_work))
+    if not table.rows:
+        raise StudyError(f"There is no study in {out}: name the folder of a suite.")
+    return table, complete
+
+
+def _print_outcomes(found: list[StudyOutcome], console: Console) -> None:
+    console.print(_table(found))
+    halves = sum(outcome.halves for outcome in found)
+    console.print(
+        "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
+        "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
+        f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
+        "half of scratch's steps.",
+        soft_wrap=True,
+    )
 
 
 class _Page:

@@ -35,6 +35,7 @@ from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
 __all__ = [
     "RunResult",
+    "last_evaluation",
     "learner_of",
     "load_result",
     "perform_run",
@@ -94,6 +95,24 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
     if result.run != run or result.seed != plan.seed_of(run) or not complete:
         raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
     return result
+
+
+def last_evaluation(study: Path, run: Run) -> Evaluation | None:
+    """Return the last evaluation of a run so far; None if there is none yet.
+
+    Args:
+        study: Folder of the study.
+        run: The run.
+    """
+    path = run.folder(study) / _CURVE
+    try:
+        # The last line may be half-written.
+        *_, last = (
+            line for line in path.read_bytes().splitlines(keepends=True) if line[-1:] == b"\n"
+        )
+        return msgspec.json.decode(last, type=Evaluation)
+    except (FileNotFoundError, ValueError, msgspec.MsgspecError):
+        return None
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:

@@ -8,13 +8,13 @@ runs from the finished studies of its suite.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
-from shapechanger.errors import OutputError
+from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
@@ -23,7 +23,13 @@ from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result
 from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
 
-__all__ = ["StudyOutcome", "open_study_folder", "run_in_suite", "study_outcomes"]
+__all__ = [
+    "StudyOutcome",
+    "merge_study",
+    "open_study_folder",
+    "run_in_suite",
+    "study_outcomes",
+]
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
@@ -117,6 +123,49 @@ def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
         if other.parent != folder:
             _share(plan, folder, other.parent)
     return folder
+
+
+def merge_study(folders: Sequence[Path], out: Path) -> Plan:
+    """Copy the finished runs of one study, done in several folders, into one.
+
+    Args:
+        folders: Folders of the study, from other machines; they may differ in seeds and arms.
+        out: Folder of the whole study.
+
+    Returns:
+        Its plan, with all arms and the most seeds.
+
+    Raises:
+        ForeignStudy: If the folders hold different studies.
+        CorruptStudy: If one cannot be read, or two of them disagree on the result of a run.
+        OutputError: If `out` cannot be written.
+    """
+    plans = [read_json(one / PLAN_FILE, Plan, f"leave out {one}") for one in folders]
+    arms = tuple(dict.fromkeys(arm for plan in plans for arm in plan.arms))
+    seeds = max(plan.seeds for plan in plans)
+    whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds)
+    for plan, folder in zip(plans, folders, strict=True):
+        if whole != plan and not whole.extends(plan):
+            raise ForeignStudy(
+                f"{folders[0]} and {folder} hold different studies, which differ in "
+                f"{whole.difference(plan)}."
+            )
+    claim_folder(whole, out)
+    for run in whole.runs():
+        kept = load_result(whole, out, run)
+        for plan, folder in zip(plans, folders, strict=True):
+            found = load_result(plan, folder, run) if run in plan.runs() else None
+            if found is None:
+                continue
+            if kept is None:
+                _copy_atomic(run.folder(folder), run.folder(out))
+                kept = found
+            elif found.curve != kept.curve:
+                raise CorruptStudy(
+                    f"The result of {run.name} in {folder} is not the one in {out}: delete one of "
+                    "them. Processors that round differently can be the reason."
+                )
+    return whole
 
 
 def study_outcomes(studies: Mapping[str, Study]) -> list[StudyOutcome]:
