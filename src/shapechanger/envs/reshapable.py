@@ -49,7 +49,7 @@ _DIVERGED: Final = (
     mujoco.mjtWarning.mjWARN_BADQACC,
 )
 # Arguments of every env that Gymnasium's constructors do not have.
-_OWN_ARGUMENTS: Final = {"shadows": None, "fast_model": True}
+_OWN_ARGUMENTS: Final = {"shadows": None, "fast_model": True, "towards": None}
 
 
 class Reshapable(MujocoEnv):
@@ -61,7 +61,7 @@ class Reshapable(MujocoEnv):
     An env without a `render_mode` stores the textures of bodies and skies at half their width and
     height, which saves a third of its memory.
 
-    Two arguments are available in every env:
+    Three arguments are available in every env:
 
     - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
       more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
@@ -69,6 +69,8 @@ class Reshapable(MujocoEnv):
     - `fast_model`: whether a cheaper model that moves equally to the last bit may step the physics,
       while MuJoCo's profiling timer (`data.timer`) is paused. Ants and pendulums have such a model;
       other envs accept the argument and always step their own.
+    - `towards`: another body of the family with the same spaces. Each reset then draws the body
+      uniformly on the way from `body` to it, unless the reset names one.
 
     Attributes:
         family: The bodies that the env can have.
@@ -105,6 +107,10 @@ class Reshapable(MujocoEnv):
         self._shadows: bool | None = arguments.pop("shadows", None)
         self.fast_model = arguments.pop("fast_model", True)
         self.body = self.family.body(body)
+        towards: BodyLike | None = arguments.pop("towards", None)
+        # Both ends of the way on which each reset draws a body.
+        self._ends = None if towards is None else (self.body, self.family.body(towards))
+        self._body_rng = np.random.default_rng()
         mode = arguments.get("render_mode")
         self._draws = mode is not None
         if mode == "human":
@@ -135,6 +141,8 @@ class Reshapable(MujocoEnv):
             self._ezpickle_kwargs["shadows"] = self._shadows
         if not self.fast_model:
             self._ezpickle_kwargs["fast_model"] = False
+        if self._ends is not None:
+            self._ezpickle_kwargs["towards"] = to_json(self._ends[1])
 
     # `gym.make`, Minari and vector envs build the env again from its spec.
 
@@ -149,7 +157,9 @@ class Reshapable(MujocoEnv):
         self._record_body()
 
     def _record_body(self) -> None:
-        """Record the present body for pickling and in the spec."""
+        """Record the present body for pickling and in the spec; a drawn one passes."""
+        if self._ends is not None:
+            return
         if self._spec is not None:
             self._spec.kwargs["body"] = to_json(self.body)
         self._ezpickle_kwargs["body"] = to_json(self.body)
@@ -205,8 +215,12 @@ class Reshapable(MujocoEnv):
         for name in options or {}:
             if name != "body":
                 raise UnknownName("option of reset", name, ("body",))
+        if seed is not None:
+            self._body_rng = np.random.default_rng(seed)
         if options:
             self._change_body(self.family.body(options["body"]))
+        elif self._ends is not None:
+            self._change_body(interpolate(*self._ends, float(self._body_rng.uniform())))
         return cast("Any", super()).reset(seed=seed, options=options)
 
     def step(self, action: Any) -> Any:
@@ -382,6 +396,16 @@ class Reshapable(MujocoEnv):
             MorphologyError: If `alpha` lies outside [0, 1].
         """
         return {"body": to_json(interpolate(self.body, target.body, alpha))}
+
+    def arguments_between(self, target: Reshapable) -> dict[str, Any]:
+        """Return arguments that draw a body between this one and another env's at each reset.
+
+        Args:
+            target: An env of the same family and spaces.
+        """
+        ends = {"body": to_json(self.body), "towards": to_json(target.body)}
+        # A fast model that serves one episode takes longer to find than it saves.
+        return {**ends, "fast_model": False}
 
     @property
     def reach(self) -> float:

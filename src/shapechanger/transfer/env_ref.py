@@ -122,6 +122,14 @@ class HasBodyFamily(Protocol):
         """
         ...
 
+    def arguments_between(self, target: Any) -> dict[str, Any]:
+        """Return arguments that draw a body between this one and another env's at each reset.
+
+        Args:
+            target: An env of the same family and spaces.
+        """
+        ...
+
 
 @runtime_checkable
 class SourceAdaptation(Protocol):

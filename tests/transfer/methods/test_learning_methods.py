@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -204,3 +205,16 @@ def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) 
     shuffled = run_study(plan, tmp_path / "study", executor=Serial())
     start = shuffled.of("shuffled-map")[0].curve[0]
     assert start.mean_return != made.of("fine-tune")[0].curve[0].mean_return
+
+
+def test_a_randomised_source_is_one_of_bodies_between(tmp_path: Path) -> None:
+    """Its env is noted; bodies of other spaces are refused."""
+    plan = tiny_plan(TINY, steps=64, source_steps=64, arms=("scratch", "randomised"))
+    study = run_study(plan, tmp_path, executor=Serial())
+    assert study.curves("randomised").n_evals == 1
+    noted = json.loads((tmp_path / "runs" / "randomised-0" / "source.json").read_text())
+    assert noted["id"] == SMALL.id
+    assert noted["kwargs"]["towards"]
+    ants = TransferTask(ANT, EXTENDED)
+    with pytest.raises(StudyError, match="one family with the same spaces"):
+        tiny_plan(TINY, task=ants, arms=("scratch", "randomised"))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.env_ref import EnvTraits, SourceAdaptation
+from shapechanger.transfer.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
 from shapechanger.transfer.files import write_json
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import Method, MethodRun
@@ -23,6 +23,65 @@ class AdaptedSource(Method):
     uses_source_policy = False
     learns_on_target = False
 
+    def learn(self, run: MethodRun) -> Any:
+        """Adapt the source, train in it, and evaluate on the target."""
+        source, target = run.source.make(), run.target.make()
+        try:
+            env = run.source.having(self.arguments(source.unwrapped, target.unwrapped, run.seed))
+        finally:
+            source.close()
+            target.close()
+        write_json(run.folder / _SOURCE, env)
+        policy = run.train(env, run.source_steps)
+        run.report(run.evaluate(policy))
+        return policy
+
+    @abstractmethod
+    def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
+        """Return the arguments that make the source more like the target.
+
+        Args:
+            source: The source env.
+            target: The target env.
+            seed: Seed of what is random.
+        """
+
+
+class Randomised(AdaptedSource):
+    """Learn in a source whose body is drawn anew for each episode.
+
+    A target that knows the plausible range of its body, as a finger does, gives it. Otherwise, in a
+    family of bodies, each body lies on the way from the source to the target, both ends included.
+    """
+
+    name = "randomised"
+    paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Refuse envs that are not of one family with the same spaces, or a target with a range."""
+        del settings
+        alike = source.family and source.family == target.family
+        if target.adapts_source or (alike and _same_layouts(source, target)):
+            return
+        raise StudyError(
+            f"{self.name} needs two bodies of one family with the same spaces, or a target that "
+            "can adapt the source to itself, such as a finger: leave this arm out."
+        )
+
+    def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
+        """Return the range of bodies."""
+        del seed
+        if isinstance(target, SourceAdaptation):
+            return target.randomised_source()
+        return cast("HasBodyFamily", source).arguments_between(target)
+
+
+class Identified(AdaptedSource):
+    """Learn in a source whose parameters are identified from motions of the target."""
+
+    name = "identified"
+    paper = "J. Tan and others, Sim-to-Real: Learning Agile Locomotion, RSS 2018"
+
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
         """Refuse a target that cannot adapt its source."""
         del source, settings
@@ -32,48 +91,14 @@ class AdaptedSource(Method):
                 "finger: leave this arm out."
             )
 
-    def learn(self, run: MethodRun) -> Any:
-        """Adapt the source, train in it, and evaluate on the target."""
-        made = run.target.make()
-        try:
-            target = made.unwrapped
-            assert isinstance(target, SourceAdaptation)  # As `require` has seen.
-            env = run.source.having(self.arguments(target, run.seed))
-        finally:
-            made.close()
-        write_json(run.folder / _SOURCE, env)
-        policy = run.train(env, run.source_steps)
-        run.report(run.evaluate(policy))
-        return policy
-
-    @abstractmethod
-    def arguments(self, target: SourceAdaptation, seed: int) -> dict[str, Any]:
-        """Return the arguments that make the source more like the target.
-
-        Args:
-            target: The target env.
-            seed: Seed of what is random.
-        """
-
-
-class Randomised(AdaptedSource):
-    """Learn in a source whose body is drawn anew for each episode."""
-
-    name = "randomised"
-    paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
-
-    def arguments(self, target: SourceAdaptation, seed: int) -> dict[str, Any]:
-        """Return the plausible range of bodies."""
-        del seed
-        return target.randomised_source()
-
-
-class Identified(AdaptedSource):
-    """Learn in a source whose parameters are identified from motions of the target."""
-
-    name = "identified"
-    paper = "J. Tan and others, Sim-to-Real: Learning Agile Locomotion, RSS 2018"
-
-    def arguments(self, target: SourceAdaptation, seed: int) -> dict[str, Any]:
+    def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Move the target, and return what was identified."""
-        return target.identified_source(seed)
+        del source
+        return cast("SourceAdaptation", target).identified_source(seed)
+
+
+def _same_layouts(source: EnvTraits, target: EnvTraits) -> bool:
+    return (source.observation_layout, source.action_layout) == (
+        target.observation_layout,
+        target.action_layout,
+    )
