@@ -1,8 +1,8 @@
 """Reference policies: each env learned from scratch with its own settings, and its floor.
 
 Each training is done once; policies and curves lie in `results/references`, and what is there
-already is not trained again. `ONLY` names envs, `SEEDS` says how many trainings each has. The
-values and the best policy of each env are written into the package.
+already is not trained again and always counts. `ONLY` names envs, `SEEDS` says how many trainings
+each has at least. The values and the best policy of each env are written into the package.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.policy_file import save_policy
+from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import train, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings, learner_settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
@@ -39,9 +39,9 @@ __all__ = ["references"]
 
 RESULTS: Final = Path("results", "references")
 COMMAND: Final = "python -m benchmarks.run references"
-# Evaluations at the end of a training that count, and episodes of the floor.
+# Evaluations at the end of a training that count, and episodes of the floor and of the policy.
 LAST: Final = 3
-FLOOR_EPISODES: Final = 20
+EPISODES: Final = 20
 
 
 class Target(NamedTuple):
@@ -81,7 +81,7 @@ def references() -> list[Row]:
     """Train what is not there yet, and write what ships."""
     names = os.environ.get("ONLY", "").split() or list(TARGETS)
     most = int(os.environ.get("SEEDS", "10"))
-    wanted = [(name, seed) for name in names for seed in range(min(most, TARGETS[name].seeds))]
+    wanted = [(name, seed) for name in names for seed in range(_seeds(name, most))]
     RESULTS.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         curves = list(pool.map(_trained, *zip(*wanted, strict=True)))
@@ -97,6 +97,14 @@ def references() -> list[Row]:
     )
     load_references.cache_clear()
     return rows
+
+
+def _seeds(name: str, most: int) -> int:
+    """Number of trainings of an env: as many as asked for, or as there are."""
+    done = 0
+    while (RESULTS / f"{name}-{done}.json").exists():
+        done += 1
+    return max(done, min(most, TARGETS[name].seeds))
 
 
 def _env(name: str) -> EnvRef:
@@ -144,15 +152,27 @@ def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, Env
     found[env.id] = reference
     shutil.copyfile(RESULTS / f"{name}-{best}.safetensors", FOLDER / f"{name}-v1.safetensors")
     values = ends[target.measure]
-    last = curves[best][-1].value(target.measure)
+    last = _played(env, FOLDER / f"{name}-v1.safetensors").value(target.measure)
     return Row(
         f"reference of {name}: {target.measure} of the policy that ships, "
         f"{reference.learner}, {reference.steps:,} steps",
         f"{last:.4g}",
-        f"{len(values)} seeds end at " + ", ".join(f"{value:.4g}" for value in values),
+        f"{EPISODES} episodes; {len(values)} seeds end at "
+        + ", ".join(f"{value:.4g}" for value in values),
         "none: whatever comes out" if target.wanted is None else f"at least {target.wanted:g}",
         target.wanted is None or last >= target.wanted,
     )
+
+
+def _played(env: EnvRef, policy: Path) -> Evaluation:
+    """Evaluate a policy over as many episodes as the floor."""
+    envs = evaluation_envs(env, learner_settings(default_learner(env)))
+    try:
+        act = load_policy(policy).act
+        return evaluate(act, envs, EVALUATION_SEED, episodes=EPISODES)
+    finally:
+        for one in envs:
+            one.close()
 
 
 def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
@@ -164,7 +184,7 @@ def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
         floor: dict[str, dict[str, float]] = {}
         for label, draw in (("random actions", random_actions), ("the zero action", zero_actions)):
             act = draw(envs[0].action_space, 0)
-            found = evaluate(act, envs, EVALUATION_SEED, episodes=FLOOR_EPISODES)
+            found = evaluate(act, envs, EVALUATION_SEED, episodes=EPISODES)
             floor[label] = {measure: found.value(measure) for measure in measures}
         return floor, measures
     finally:
