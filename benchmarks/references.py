@@ -1,7 +1,7 @@
 """Reference policies: each env learned from scratch with its own settings, and its floor.
 
 Each training is done once; policies and curves lie in `results/references`, and what is there
-already is not trained again and always counts. `ONLY` names envs, `SEEDS` says how many trainings
+already is not trained again and always counts; so are the sources of the suite of ants. `ONLY` names envs, `SEEDS` says how many trainings
 each has at least. The values and the best policy of each env are written into the package.
 """
 
@@ -34,6 +34,7 @@ from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import train, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings, learner_settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
+from shapechanger.transfer.runs import RunResult
 
 __all__ = ["references"]
 
@@ -69,10 +70,10 @@ TARGETS: Final = {
     "Hopper": Target(1_048_576, "return", 2500.0, 3),
     "Walker2d": Target(1_048_576, "return", 2500.0, 3),
     "Swimmer": Target(1_048_576, "return", 300.0, 3),
-    "Humanoid": Target(1_048_576, "return", None, 1),
+    "Humanoid": Target(524_288, "return", None, 1),
     "Ant": Target(2_097_152, "forward speed", 3.0, 3),
-    "AmputatedAnt": Target(2_097_152, "forward speed", 2.0, 3),
-    "BigAnt": Target(2_097_152, "forward speed", 2.0, 3),
+    "AmputatedAnt": Target(1_048_576, "forward speed", 2.0, 3),
+    "BigAnt": Target(1_048_576, "forward speed", 2.0, 3),
     "ExtendedAnt": Target(2_097_152, "forward speed", 2.0, 3),
 }
 
@@ -116,6 +117,8 @@ def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
     place = RESULTS / f"{name}-{seed}.json"
     if place.exists():
         return read_json(place, tuple[Evaluation, ...], f"delete {place}")
+    if _taken_from_atlas(name, seed, place):
+        return _trained(name, seed)
     use_one_thread()
     env = _env(name)
     learner = default_learner(env)
@@ -128,6 +131,18 @@ def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
     return tuple(curve)
 
 
+def _taken_from_atlas(name: str, seed: int, place: Path) -> bool:
+    """Copy a source of the suite of ants, which is the same training if its budget is the same."""
+    for run in Path("results", "ants").glob(f"{name}-to-*/runs/source-{seed}"):
+        policy = run / "policy.safetensors"
+        if policy.exists() and load_policy(policy).card.steps == TARGETS[name].steps:
+            shutil.copyfile(policy, place.with_suffix(".safetensors"))
+            result = read_json(run / "run.json", RunResult, f"delete {run}")
+            write_json(place, result.curve)
+            return True
+    return False
+
+
 def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, EnvReference]) -> Row:
     """Copy the best policy of an env into the package, with its numbers."""
     env, target = _env(name), TARGETS[name]
@@ -138,16 +153,19 @@ def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, Env
         )
         for measure in measures
     }
+    seeds = tuple(
+        load_policy(RESULTS / f"{name}-{i}.safetensors").card.seed for i in range(len(curves))
+    )
     best = int(np.argmax([curve[-1].value(target.measure) for curve in curves]))
     reference = EnvReference(
         learner=default_learner(env),
         steps=curves[0][-1].steps,
-        seeds=tuple(range(len(curves))),
+        seeds=seeds,
         version=shapechanger.__version__,
         command=COMMAND,
         floor=floor,
         ends=ends,
-        policy_seed=best,
+        policy_seed=seeds[best],
     )
     found[env.id] = reference
     shutil.copyfile(RESULTS / f"{name}-{best}.safetensors", FOLDER / f"{name}-v1.safetensors")

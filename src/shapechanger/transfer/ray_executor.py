@@ -8,7 +8,8 @@ only its users can reach.
 from __future__ import annotations
 
 import os
-import socket
+import subprocess
+import sys
 import time
 import traceback
 from collections.abc import Sequence
@@ -29,11 +30,8 @@ except ImportError as error:
 __all__ = ["RayCluster"]
 
 _ATTEMPTS: Final = 3
-_CONNECT_S: Final = 5.0
+_CONNECT_S: Final = 8.0
 _REPORT_EVERY_S: Final = 0.5
-# How a client of gRPC begins, and the type of the frame that a server answers with (RFC 9113, 3.4).
-_HTTP2_PREFACE: Final = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
-_HTTP2_SETTINGS: Final = 4
 _ray: Any = ray
 
 
@@ -78,18 +76,19 @@ class RayCluster:
 
 
 def _require_answer(address: str) -> None:
-    """Refuse an address at which nothing listens, before Ray waits for a minute."""
-    host, colon, port = address.rpartition("://")[2].rpartition(":")
-    if not colon or not port.isdigit():
+    """Refuse an address at which no Ray answers; Ray itself would try for half a minute.
+
+    Raises:
+        StudyError: If it is no address, or nothing answers within eight seconds.
+    """
+    host, colon, port = address.rpartition(":")
+    if not colon or not port.isdigit() or "/" in host:
         raise StudyError(f"The address of a Ray cluster is HOST:PORT or auto, not {address!r}.")
+    command = [sys.executable, "-m", "ray.scripts.scripts", "health-check", "--address", address]
     try:
-        with socket.create_connection((host, int(port)), timeout=_CONNECT_S) as connection:
-            connection.sendall(_HTTP2_PREFACE)
-            answer = connection.recv(9)
-    except OSError as error:
-        raise _no_answer(address, str(error)) from error
-    if len(answer) < 9 or answer[3] != _HTTP2_SETTINGS:
-        raise _no_answer(address, "what listens there is not Ray")
+        subprocess.run(command, check=True, capture_output=True, timeout=_CONNECT_S)
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+        raise _no_answer(address, "nothing there is healthy") from error
 
 
 def _no_answer(address: str, reason: str) -> StudyError:
