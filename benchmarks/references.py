@@ -1,8 +1,9 @@
 """Reference policies: each env learned from scratch with its own settings, and its floor.
 
-Each training is done once; policies and curves lie in `results/references`, and what is there
-already is not trained again and always counts; so are the sources of the suite of ants. `ONLY` names envs, `SEEDS` says how many trainings
-each has at least. The values and the best policy of each env are written into the package.
+Each training is done once. Policies and curves lie in `results/references`; what is there already
+is not trained again and always counts, and so do the sources of the suite of ants. `ONLY` names
+envs, `SEEDS` says how many trainings each has at least. The values and the best policy of each env
+are written into the package.
 """
 
 from __future__ import annotations
@@ -175,7 +176,7 @@ def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, Env
         f"reference of {name}: {target.measure} of the policy that ships, "
         f"{reference.learner}, {reference.steps:,} steps",
         f"{last:.4g}",
-        f"{EPISODES} episodes; {len(values)} seeds end at "
+        f"{EPISODES} episodes; {len(values)} seed{'s' * (len(values) > 1)} end at "
         + ", ".join(f"{value:.4g}" for value in values),
         "none: whatever comes out" if target.wanted is None else f"at least {target.wanted:g}",
         target.wanted is None or last >= target.wanted,

@@ -159,6 +159,22 @@ def test_the_camera_follows_a_body_that_runs(body: str) -> None:
     assert not border.any()
 
 
+@pytest.mark.parametrize("name", ["HalfCheetah", "Hopper", "Walker2d", "Swimmer"])
+def test_the_camera_follows_a_body_that_runs_in_a_plane(name: str) -> None:
+    """Ten metres on it is still there, as large as before."""
+    seen = []
+    for x in (0.0, 10.0):
+        with gym.make(f"shapechanger/{name}-v1", render_mode="rgb_array", **_SIZE) as env:
+            env.reset(seed=0)
+            inner = env.unwrapped
+            pose = inner.init_qpos.copy()
+            pose[0] = x
+            inner.set_state(pose, inner.init_qvel)
+            seen.append(_seen(env).mean())
+    assert min(seen) > 0.01
+    assert seen[1] == pytest.approx(seen[0], rel=0.2)
+
+
 def test_a_camera_that_is_told_where_to_look_stays() -> None:
     """The world is looked at, and the body runs out of it."""
     camera = {"lookat": np.array([0.0, 0.0, 0.5]), "distance": 6.0, "elevation": -30.0}

@@ -115,9 +115,7 @@ def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_pat
     assert not (tmp_path / "never").exists()
 
 
-@pytest.mark.parametrize(
-    "address", ["127.0.0.1:9", "10.255.255.1:6379", "nowhere", "ray://127.0.0.1:9"]
-)
+@pytest.mark.parametrize("address", ["127.0.0.1:9", "nowhere", "ray://127.0.0.1:9"])
 def test_an_address_that_does_not_answer_is_one_sentence(address: str) -> None:
     """Within ten seconds."""
     began = time.monotonic()

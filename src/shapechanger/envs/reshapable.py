@@ -32,7 +32,7 @@ from shapechanger.morphology.pose import (
     StartRules,
     standing_height,
     start_pose,
-    trunk_joint,
+    travelling_body,
 )
 
 if TYPE_CHECKING:
@@ -320,8 +320,8 @@ class Reshapable(MujocoEnv):
         """Render the present body from here on."""
         renderer = self.mujoco_renderer
         renderer.close()
-        trunk = trunk_joint(self.model)
-        camera = self._given_camera or cast("dict[str, Any]", renderer.default_cam_config)
+        trunk = travelling_body(self.model)
+        camera = self._given_camera or cast("dict[str, Any]", renderer.default_cam_config or {})
         if trunk is not None and self._given_camera is None:
             camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
         self.mujoco_renderer = Renderer(
@@ -331,9 +331,7 @@ class Reshapable(MujocoEnv):
             self.width,
             self.height,
             # A camera with a given `lookat` does not follow the body.
-            follow=None
-            if trunk is None or "lookat" in camera
-            else int(self.model.jnt_bodyid[trunk]),
+            follow=None if "lookat" in camera else trunk,
             **self._renderer_arguments,
         )
 

@@ -15,6 +15,7 @@ __all__ = [
     "keep_within_limits",
     "standing_height",
     "start_pose",
+    "travelling_body",
     "trunk_joint",
     "trunk_lift",
 ]
@@ -62,6 +63,20 @@ def trunk_joint(model: mujoco.MjModel) -> int | None:
     """The number of the first free joint; None for a body that is fixed to the world."""
     free = np.flatnonzero(model.jnt_type == _J.mjJNT_FREE)
     return int(free[0]) if free.size else None
+
+
+def travelling_body(model: mujoco.MjModel) -> int | None:
+    """Return the number of the body that can go anywhere; None for one that stays at its place.
+
+    That of the first free joint; without one, the first body on the world that slides without
+    limits, as those that run in a plane do.
+    """
+    trunk = trunk_joint(model)
+    if trunk is not None:
+        return int(model.jnt_bodyid[trunk])
+    slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
+    found = np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0))
+    return int(model.jnt_bodyid[found[0]]) if found.size else None
 
 
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
