@@ -26,7 +26,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix check bench clean
+.PHONY: help setup demo test test-system test-all test-matrix check bench docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -58,6 +58,9 @@ check: $(INSTALLED_DEV)  ## check format, lint and types
 
 bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 	$(RUN) -m benchmarks.run
+
+docs: $(INSTALLED_DEV)  ## run the examples of the documentation and follow its links
+	$(PYTEST) tests/test_docs.py
 
 clean:  ## remove build products and environments; keep results/
 	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \

@@ -17,6 +17,7 @@ ShapechangerError
 ├── MapError (ValueError)           body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    policy whose weights cannot be transplanted
 ├── StudyError (ValueError)         study that cannot start
+│   ├── FailedRuns                  runs that failed on a cluster, while all others ended
 │   ├── ForeignStudy                output folder of something else
 │   └── CorruptStudy                unreadable file of a study
 ├── DemosError (ValueError)         demonstrations that cannot be recorded, read or learned from
