@@ -201,7 +201,7 @@ class Layout(msgspec.Struct, frozen=True):
         """Read what `to_json` wrote.
 
         Raises:
-            LayoutError: If the text is no layout.
+            LayoutError: If the text is not a layout.
         """
         try:
             return msgspec.json.decode(text, type=cls)

@@ -54,7 +54,7 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
     [
         ("seeds = 3\nsed = 4\n", "line 2: a suite has no key 'sed'. Did you mean 'seed'?"),
         ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
-        ("envs = [", "is no TOML"),
+        ("envs = [", "is not valid TOML"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
         ("sources = ['Ant']\n", "in one way"),
         ("envs = ['Ant', 'Bigant', 'Hopper']\n", "Did you mean"),

@@ -144,7 +144,7 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
     try:
         options = json.loads(given)
     except ValueError as error:
-        raise StudyError(f"{flag} are no JSON ({error}), but {given!r}.") from None
+        raise StudyError(f"{flag} must be JSON ({error}), got {given!r}.") from None
     if not isinstance(options, dict):
         raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
     return cast("dict[str, Any]", options)

@@ -180,7 +180,7 @@ class Convert:
 
         Raises:
             StudyError: If it is not trusted, or its network is of another kind.
-            CorruptStudy: If the file is no such zip.
+            CorruptStudy: If the file is not such a zip.
         """
         import shapechanger
         from shapechanger.transfer.body_map.envs import check_size
@@ -231,7 +231,7 @@ def _load_zip(path: Path) -> Any:
     except FileNotFoundError:
         raise CorruptStudy(f"There is no policy file {path}.") from None
     except Exception as error:  # A damaged pickle can raise anything.
-        raise CorruptStudy(f"{path} is no zip of Stable-Baselines3's PPO ({error}).") from error
+        raise CorruptStudy(f"{path} is not a zip of Stable-Baselines3's PPO ({error}).") from error
 
 
 def _settings(model: Any) -> PpoSettings:

@@ -116,7 +116,7 @@ def load_suite(name: str) -> SuiteFile:
 
     Raises:
         UnknownName: If there is no such file or suite.
-        StudyError: If the file is no TOML, or a key or value of it is wrong; with its line.
+        StudyError: If the file is not valid TOML, or a key or value of it is wrong; with its line.
     """
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
     try:
@@ -128,7 +128,7 @@ def load_suite(name: str) -> SuiteFile:
     try:
         return msgspec.convert(tomllib.loads(text), SuiteFile)
     except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{path} is no TOML: {error}.") from None
+        raise StudyError(f"{path} is not valid TOML: {error}.") from None
     except msgspec.ValidationError as error:
         raise StudyError(f"{path}{_explain(text, str(error))}") from None
 

@@ -281,7 +281,7 @@ class StepScorer:
         self._touched = False
 
     def start(self, seen: Observation) -> None:
-        """Begin an episode; an obstacle that the robot touches already is no new collision."""
+        """Begin an episode; an obstacle that is touched already does not count as a collision."""
         self._touched = bool(self._touches(seen)[0])
 
     def judge(

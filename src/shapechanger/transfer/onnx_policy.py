@@ -185,7 +185,7 @@ class OnnxPolicy:
 
     Raises:
         MissingExtra: If onnxruntime is not installed.
-        CorruptStudy: If the file is missing or is no such policy.
+        CorruptStudy: If the file is missing or is not such a policy.
     """
 
     def __init__(self, path: Path) -> None:

@@ -79,7 +79,7 @@ def _require_answer(address: str) -> None:
     """Refuse an address at which no Ray answers; Ray itself would try for half a minute.
 
     Raises:
-        StudyError: If it is no address, or nothing answers within eight seconds.
+        StudyError: If it is not an address, or nothing answers within eight seconds.
     """
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:

@@ -71,7 +71,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
         (["Car", "--driver", "text.zip"], "not a policy"),
         (["Car", "--corrected-by", "expert"], "needs no correction"),
         (["Car", "--corrected-by", "me"], "corrected by expert"),
-        (["Car", "--options", "{"], "no JSON"),
+        (["Car", "--options", "{"], "must be JSON"),
         (["Car", "--options", "[1]"], "a JSON object"),
         (["Car", "--options", '{"colour": 3}'], "colour"),
         (["Car", "--seed", "-1"], "A seed is"),

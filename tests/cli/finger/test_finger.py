@@ -48,7 +48,7 @@ def test_what_cannot_be_recorded_is_refused(
     assert "is not a finger env" in refused(capsys, "record", "Ant", *out)
     assert "Did you mean" in refused(capsys, "record", "Fingr", *out)
     assert "--seconds is more than 0" in refused(capsys, "record", "Finger", *out, "--seconds", "0")
-    assert "--options are no JSON" in refused(capsys, "record", "Finger", *out, "--options", "a")
+    assert "--options must be JSON" in refused(capsys, "record", "Finger", *out, "--options", "a")
     assert "omit `goal`" in refused(capsys, "record", "Finger", *out, "--options", '{"goal": true}')
     assert "real-like" in refused(capsys, "record", "Finger", *out, "--gap", "real-lik")
 

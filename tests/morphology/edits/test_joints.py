@@ -96,7 +96,7 @@ def test_ranges_that_the_model_makes_empty_are_refused() -> None:
 def test_free_joints_have_no_range(edit: Edit) -> None:
     """And are not locked either."""
     with pytest.raises(
-        MorphologyError, match="'root' is no hinge and no slide, so it has no range"
+        MorphologyError, match="'root' is neither a hinge nor a slide, so it has no range"
     ):
         built(ant(), edit)
 

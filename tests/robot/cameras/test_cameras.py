@@ -99,7 +99,7 @@ def test_bad_file_is_named_and_left_out(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(b"broken")
     (tmp_path / "b.jpg").write_bytes(_jpeg(90))
     camera = open_camera(_plan("file", path=str(tmp_path)))
-    with pytest.raises(RobotError, match=r"a\.jpg: .*no whole JPEG"):
+    with pytest.raises(RobotError, match=r"a\.jpg: .*an incomplete JPEG"):
         camera.read()
     assert camera.read().jpeg == _jpeg(90)
 

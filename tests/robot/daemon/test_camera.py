@@ -73,9 +73,9 @@ GOOD = picture(3)
 @pytest.mark.parametrize(
     ("jpeg", "captured_ns", "words"),
     [
-        (b"", 2, "no whole JPEG"),
-        (b"garbage" * 100, 2, "no whole JPEG"),
-        (GOOD[: len(GOOD) // 2], 2, "no whole JPEG"),
+        (b"", 2, "an incomplete JPEG"),
+        (b"garbage" * 100, 2, "an incomplete JPEG"),
+        (GOOD[: len(GOOD) // 2], 2, "an incomplete JPEG"),
         (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "Corrupt|Premature|JPEG"),
         (picture(3, (80, 64)), 2, "80 by 64 pixels"),
         (picture(1), 2, "same frame"),
@@ -142,7 +142,7 @@ def test_garbage_without_end_opens_the_camera_again(camera: FakeCamera, watched:
     camera.put(Frame(picture(1), 100))
     watched.until(lambda: len(watched.frames) == 1)
     assert camera.opened == 2
-    assert len([text for text in watched.reports if "no whole JPEG" in text]) == 1
+    assert len([text for text in watched.reports if "an incomplete JPEG" in text]) == 1
 
 
 def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:

@@ -264,7 +264,7 @@ def test_gyroscope_zero_follows_slowly() -> None:
 
 def test_other_chip_or_none_is_named() -> None:
     """With what it calls itself, since there are many that look the same."""
-    with pytest.raises(RobotError, match="calls itself 0x71, not 0x68"):
+    with pytest.raises(RobotError, match="identifies itself as 0x71, not 0x68"):
         FakeHardware({0x68: {0x75: 0x71}}).sensor("mpu6050", bus=1, address=0x68)
     with pytest.raises(RobotError, match="0x68 on I2C bus 1 does not answer"):
         FakeHardware().sensor("mpu6050", bus=1, address=0x68)

@@ -50,7 +50,7 @@ def test_files_that_are_no_profile(tmp_path: Path) -> None:
         load_profile(tmp_path)
     path = tmp_path / "x.toml"
     path.write_bytes(b"# One.\n\xff")
-    with pytest.raises(ProfileError, match=r"x\.toml, line 2: this is no UTF-8 text"):
+    with pytest.raises(ProfileError, match=r"x\.toml, line 2: this is not UTF-8 text"):
         load_profile(path)
     path.write_bytes(b"#" * (1024 * 1024 + 1))
     with pytest.raises(ProfileError, match="longer than a profile can be"):

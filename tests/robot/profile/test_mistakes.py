@@ -579,21 +579,21 @@ MISTAKES = [
         'name = "rover"',
         'name = "rover',
         'name = "rover',
-        "this is no TOML: illegal character '\\n' at column 14",
+        "this is not valid TOML: illegal character '\\n' at column 14",
     ),
     (
         'name = "rover"',
         "name = rover",
         "name = rover",
-        "this is no TOML: invalid value at column 8",
+        "this is not valid TOML: invalid value at column 8",
     ),
     (
         "[stop]",
         "[limits]",
         "[limits]",
-        "this is no TOML: cannot declare ('limits',) twice at column 8",
+        "this is not valid TOML: cannot declare ('limits',) twice at column 8",
     ),
-    ("", "[end", "[end", "this is no TOML: expected ']' at the end of a table declaration"),
+    ("", "[end", "[end", "this is not valid TOML: expected ']' at the end of a table declaration"),
     ("", f"x = {'9' * 5000}", "x = 9", "a number has too many digits"),
 ]
 
@@ -633,7 +633,9 @@ def test_no_text_is_a_crash(cut: int, length: int, put: str) -> None:
 
 def test_nested_too_deeply() -> None:
     """Brackets without end are refused, not a crash."""
-    with pytest.raises(ProfileError, match=r"rover\.toml is no profile: it is nested too deeply\."):
+    with pytest.raises(
+        ProfileError, match=r"rover\.toml is not a profile: it is nested too deeply\."
+    ):
         read("x = " + "[" * 5000)
 
 

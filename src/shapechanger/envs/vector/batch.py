@@ -36,7 +36,7 @@ class SubEnv:
 
     A simulation has diverged when the env's info says so, when MuJoCo found a position, velocity or
     acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
-    restarts from the model's own pose, which is no result of the action: the env is terminated, the
+    restarts from the model's own pose, which the action did not cause: the env is terminated, the
     reward is 0, and the info has `diverged`. Observations that are not finite read 0.
 
     Args:

@@ -111,7 +111,7 @@ class Certificate(msgspec.Struct, frozen=True):
         """Read what `to_json` wrote.
 
         Raises:
-            MorphologyError: If the text is no certificate.
+            MorphologyError: If the text is not a certificate.
         """
         try:
             return msgspec.json.decode(text, type=cls)

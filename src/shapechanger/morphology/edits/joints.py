@@ -127,7 +127,7 @@ def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
         MorphologyError: For other joints.
     """
     if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
-        raise MorphologyError(f"{joint.name!r} is no hinge and no slide, so it has no range.")
+        raise MorphologyError(f"{joint.name!r} is neither a hinge nor a slide, so it has no range.")
     lower, upper = (float(x) for x in joint.range)
     automatic = joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     if joint.limited != mujoco.mjtLimited.mjLIMITED_TRUE and not automatic:

@@ -1,6 +1,6 @@
 """Contact parameters of pairs of geoms, combined as MuJoCo does.
 
-A geom's friction is no fact of the simulation: the contact takes the larger of the two geoms'
+A geom's friction alone decides nothing: the contact takes the larger of the two geoms'
 coefficients, so a slippery foot on a rough floor is a rough foot. These are the rules by which
 MuJoCo 4.0.0 combines what the two say (`mujoco/doc/modeling.rst`, "Contact parameters"). The tests
 compare them with the contacts of simulated scenes.

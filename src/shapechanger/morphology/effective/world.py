@@ -1,4 +1,4 @@
-"""The part of an effective model that is no rigid element: options, sizes, flexes, constants."""
+"""The part of an effective model outside its rigid bodies: options, sizes, flexes, constants."""
 
 from __future__ import annotations
 

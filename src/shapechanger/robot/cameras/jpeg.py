@@ -37,11 +37,11 @@ def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
     if len(jpeg) > MAX_JPEG:
         raise RobotError(f"The camera gave {len(jpeg)} bytes; a picture has {MAX_JPEG} at most.")
     if not simplejpeg.is_jpeg(jpeg):
-        raise RobotError("The camera gave something that is no whole JPEG.")
+        raise RobotError("The camera returned an incomplete JPEG.")
     try:
         height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
     except ValueError as error:
-        raise RobotError(f"The camera gave something that is no JPEG: {error}.") from error
+        raise RobotError(f"The camera returned invalid JPEG data: {error}.") from error
     if (int(width), int(height)) != size:
         raise RobotError(
             f"The camera gave a picture of {width} by {height} pixels; "
@@ -77,7 +77,8 @@ def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
         plan: Settings of the camera.
 
     Raises:
-        RobotError: If the data is no complete JPEG of that size, or cannot be decoded to rotate it.
+        RobotError: If the data is not a complete JPEG of that size, or cannot be decoded to rotate
+            it.
     """
     check_jpeg(jpeg, plan.size)
     if not plan.flip:

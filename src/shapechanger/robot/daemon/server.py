@@ -60,7 +60,7 @@ def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
     """Return the reason why a web page must not open a connection, or "" if it may.
 
     Args:
-        origin: The `Origin` header; None from a program that is no browser.
+        origin: The `Origin` header; None from a program other than a browser.
         host: The `Host` header.
         is_open: Whether the robot accepts every client. The host name must then be one that a
             foreign name server cannot point at the robot (DNS rebinding).

@@ -53,7 +53,7 @@ class Mpu6050:
             identity = bus.read_byte_data(address, _WHO_AM_I)
             if identity != _IDENTITY:
                 raise RobotError(
-                    f"{name} is no MPU-6050: it calls itself 0x{identity:02x}, "
+                    f"{name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
                     f"not 0x{_IDENTITY:02x}."
                 )
             bus.write_byte_data(address, _PWR_MGMT_1, _AWAKE)

@@ -87,7 +87,7 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise ProfileError(f"{os.fspath(path)}, line {line}: this is no UTF-8 text.") from None
+        raise ProfileError(f"{os.fspath(path)}, line {line}: this is not UTF-8 text.") from None
 
 
 _NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)

@@ -162,14 +162,14 @@ def _toml(text: str, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ProfileError(f"{path} is no profile: it is nested too deeply.") from None
+        raise ProfileError(f"{path} is not a profile: it is nested too deeply.") from None
     except tomllib.TOMLDecodeError as error:
         words = str(error)
         line = text.count("\n") + 1
         if (at := _AT.fullmatch(words)) is not None:
             line = int(at[2])
             words = f"{at[1]} at column {at[3]}"
-        what = f"this is no TOML: {words[:1].lower()}{words[1:]}"
+        what = f"this is not valid TOML: {words[:1].lower()}{words[1:]}"
     except ValueError:  # Python refuses to parse integers with thousands of digits.
         long = _DIGITS.search(text)
         line = text.count("\n", 0, long.start() if long else 0) + 1

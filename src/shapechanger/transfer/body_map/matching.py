@@ -88,7 +88,7 @@ def resolve(
     Args:
         side: The half of the map.
         rules: Rules by name or glob; the first glob that matches counts. A key that is the exact
-            name of a feature is no glob.
+            name of a feature is not a glob.
         otherwise: The rule of the remaining features: zero, hold or learn.
         units: What a scale of 1 preserves, see `BodyMap.between`.
 
@@ -291,7 +291,7 @@ def read_toml(text: str) -> MapText:
     """Parse a map in TOML.
 
     Raises:
-        MapError: If it is no TOML, or has an unknown key, word or type.
+        MapError: If it is not valid TOML, or has an unknown key, word or type.
     """
     try:
         table = tomllib.loads(text)

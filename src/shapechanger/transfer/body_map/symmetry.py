@@ -42,8 +42,8 @@ class Symmetry(msgspec.Struct, frozen=True):
         action: The same for each action feature.
 
     Raises:
-        MapError: If it is no permutation, a scale is not 1 or -1, or two features that swap differ
-            in unit, shape or range.
+        MapError: If it is not a permutation, a scale is not 1 or -1, or two features that swap
+            differ in unit, shape or range.
         UnknownName: If a feature does not exist.
     """
 
@@ -74,7 +74,7 @@ class Symmetry(msgspec.Struct, frozen=True):
             action: The same for action features.
 
         Raises:
-            MapError: If that is no symmetry.
+            MapError: If that is not a symmetry.
             UnknownName: If a feature does not exist.
         """
         return cls(

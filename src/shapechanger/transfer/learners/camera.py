@@ -132,7 +132,7 @@ class CameraLearner:
         """Read where a clone comes from.
 
         Raises:
-            StudyError: If the policy is no clone, or sees other pictures.
+            StudyError: If the policy is not a clone, or sees other pictures.
         """
         if not is_clone(path):
             card = load_policy(path).card

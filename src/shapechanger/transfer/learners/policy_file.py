@@ -183,7 +183,7 @@ def load_policy(path: Path, function: str = "") -> TrainedPolicy:
             alone may only name classes of models.
 
     Raises:
-        CorruptStudy: If the file is missing, is no such policy, or has been changed.
+        CorruptStudy: If the file is missing, is not such a policy, or has been changed.
     """
     try:
         content = path.read_bytes()
@@ -213,7 +213,7 @@ def _metadata(content: bytes) -> dict[str, str]:
     """Return the metadata of safetensors."""
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
     if length > len(content):
-        raise ValueError("it is no file of safetensors")
+        raise ValueError("it is not a safetensors file")
     header = json.loads(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
     return msgspec.convert(header["__metadata__"], dict[str, str])
 

@@ -200,7 +200,7 @@ class Reference(msgspec.Struct, frozen=True):
 
     The formula is that of D4RL (arXiv 2004.07219). Zero is what takes no skill: an ant that stands
     still earns 1,000, so the random policy alone would be too low a floor. Both ends belong to the
-    target, because an expert on the source is no reference for another body. The reference is taken
+    target, because an expert on the source says nothing about another body. The reference is taken
     as given: intervals of scores do not include its uncertainty.
 
     Attributes:
