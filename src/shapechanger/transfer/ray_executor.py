@@ -24,6 +24,7 @@ os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 try:
     import ray
     from ray.exceptions import RayError
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 except ImportError as error:
     raise MissingExtra("ray", "ray") from error
 
@@ -110,7 +111,7 @@ class _Schedule:
         self._attempts = dict.fromkeys(names, 0)
         self._running: dict[Any, Job] = {}
         self._steps: dict[str, int] = {}
-        self._board: Any = _ray.remote(num_cpus=0)(_Board).remote()
+        self._board: Any = _new_board()
         self._perform: Any = _ray.remote(num_cpus=1, max_retries=0)(_perform)
 
     def run(self) -> None:
@@ -163,13 +164,19 @@ class _Schedule:
         try:
             found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
         except RayError:  # Its node is gone; progress is not worth a study.
-            self._board = _ray.remote(num_cpus=0)(_Board).remote()
+            self._board = _new_board()
             return
         running = {job.name for job in self._running.values()}
         for name, steps in found.items():
             if name in running and steps != self._steps[name]:
                 self._steps[name] = steps
                 self._on_progress(name, steps, False)
+
+
+def _new_board() -> Any:
+    """Start the board on the node of this program: others may be lost, and progress with them."""
+    here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=True)
+    return _ray.remote(num_cpus=0, scheduling_strategy=here)(_Board).remote()
 
 
 class _Board:
