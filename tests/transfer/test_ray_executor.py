@@ -35,7 +35,18 @@ def cluster() -> Iterator[Any]:
     before = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (root, before)))
     nodes: Any = Cluster(
-        initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": _MEMORY}
+        initialize_head=True,
+        head_node_args={
+            "num_cpus": 0,
+            "object_store_memory": _MEMORY,
+            # Notice a lost node within two seconds; by default it takes half a minute.
+            "_system_config": {
+                "health_check_initial_delay_ms": 500,
+                "health_check_period_ms": 500,
+                "health_check_timeout_ms": 500,
+                "health_check_failure_threshold": 3,
+            },
+        },
     )
     nodes.add_node(num_cpus=1, object_store_memory=_MEMORY)
     yield nodes

@@ -157,7 +157,7 @@ class Reshapable(MujocoEnv):
         self._record_body()
 
     def _record_body(self) -> None:
-        """Record the present body for pickling and in the spec; a drawn one passes."""
+        """Record the present body for pickling and in the spec, unless a reset drew it."""
         if self._ends is not None:
             return
         if self._spec is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from importlib import import_module
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import gymnasium as gym
 import msgspec
@@ -23,7 +23,7 @@ except ImportError as error:
 __all__ = ["SpacesOnly", "build_model", "checked_settings", "is_class", "require_class"]
 
 _SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
-# Arguments that are no settings.
+# Arguments that are not settings.
 _GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
 
 
@@ -131,50 +131,14 @@ def _load(algorithm: str) -> Any:
         raise UnknownName("algorithm", algorithm, _SHIPPED) from error
 
 
-class SpacesOnly(VecEnv):
-    """Envs that have spaces and cannot be stepped, for models that only act.
+class SpacesOnly(gym.Env[Any, Any]):
+    """An env that has spaces and cannot be stepped, for models that only act.
 
     Args:
-        num_envs: Number of envs.
         observation_space: Space of an observation.
         action_space: Space of an action.
     """
 
-    def __init__(
-        self,
-        num_envs: int,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-    ) -> None:
-        cast("Any", super()).__init__(num_envs, observation_space, action_space)
-
-    def reset(self) -> Any:
-        """Refuse."""
-        raise NotImplementedError
-
-    def step_async(self, actions: Any) -> None:
-        """Refuse."""
-        raise NotImplementedError
-
-    def step_wait(self) -> Any:
-        """Refuse."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return None for each env."""
-        return [None] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refuse."""
-        raise NotImplementedError
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **more: Any) -> Any:
-        """Refuse."""
-        raise NotImplementedError
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return False for each env."""
-        return [False] * len(list(self._get_indices(indices)))
+    def __init__(self, observation_space: gym.Space[Any], action_space: gym.Space[Any]) -> None:
+        self.observation_space = observation_space
+        self.action_space = action_space

@@ -34,6 +34,7 @@ try:
     from safetensors import numpy as safetensors
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.running_mean_std import RunningMeanStd
+    from stable_baselines3.common.vec_env import DummyVecEnv
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
@@ -239,10 +240,11 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str)
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
+    envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
     # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
     states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
     try:
-        model: Any = build_model(settings, SpacesOnly(settings.n_envs, *spaces), card.seed)
+        model: Any = build_model(settings, envs, card.seed)
     finally:
         random.setstate(states[0])
         np.random.set_state(states[1])  # noqa: NPY002

@@ -396,8 +396,8 @@ _FINGER: Final = PpoSettings(
 # harder: both of two seeds reach 1,000, and one has dropped to 744 at the end.
 # `ppo-run` was tuned on the ant, seed 0: three seeds walk at 2.1, 2.0 and 1.5 m/s after 1,048,576
 # steps (the sources in benchmarks/results/atlas-ants-runs.json). `ppo-planar` has four times as
-# many updates and more noise at the start: a hopper hops after 0.5 million steps with it. Where
-# each was tuned, and what it reaches over seeds, stands in `transfer/references`.
+# many updates and more noise at the start, which half cheetahs do not like. What each reaches
+# stands in `transfer/references`, and why it was chosen in docs/decisions.md.
 LEARNERS: Final[dict[str, Settings]] = {
     "ppo-balance": PpoSettings(
         n_envs=16,
@@ -547,7 +547,7 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Sett
 
 
 def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings]:
-    """Read a TOML with a learner, or with `preset`, and with settings of it."""
+    """Read a TOML file that names a preset or an algorithm, and changes some of its settings."""
     try:
         given = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -557,7 +557,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings
     start = given.pop("preset", None) or given.pop("algorithm", None)
     if not isinstance(start, str) or start.endswith(".toml"):
         raise StudyError(
-            f"{path} names what it starts from: `preset` is one of {', '.join(LEARNERS)}, or "
+            f"{path} must name what it starts from: `preset` is one of {', '.join(LEARNERS)}, or "
             "`algorithm` is a class or function as module:name."
         )
     try:

@@ -58,7 +58,7 @@ class Randomised(AdaptedSource):
     paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse envs that are not of one family with the same spaces, or a target with a range."""
+        """Require two bodies of one family and space, or a target that knows its own range."""
         del settings
         alike = source.family and source.family == target.family
         if target.adapts_source or (alike and _same_layouts(source, target)):

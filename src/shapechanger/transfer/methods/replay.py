@@ -24,15 +24,16 @@ from shapechanger.transfer.methods import Method, MethodRun
 
 __all__ = ["DomainClassifiers", "OffDynamics", "PrefilledReplay", "Transitions", "collect"]
 
-# Share of the target steps as which so many source transitions are prefilled.
+# Number of prefilled source transitions, as a share of the target steps.
 _PREFILLED: Final = 0.5
-# Classifiers of the paper: widths, standard deviation of the noise on their inputs, batch.
+# The classifiers have one hidden layer and noisy inputs, as in the paper; these numbers (width,
+# standard deviation of the noise, batch) are ours and were not tuned.
 _WIDTH: Final = 256
 _NOISE: Final = 0.1
 _BATCH: Final = 256
 # Source steps between two gradient steps of the classifiers.
 _CLASSIFY_EVERY: Final = 4
-# Corrections beyond this are the classifiers' errors: a transition that they are sure of.
+# Limits what one transition that the classifiers are sure of can cost or earn.
 _LARGEST_CORRECTION: Final = 10.0
 
 
