@@ -75,7 +75,6 @@ def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -
     assert seen == {run.name for run in plan.runs()}
 
 
-@pytest.mark.slow  # Ray notices a lost node after 4 s, or after minutes.
 def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path) -> None:
     """Half-way through its first attempt."""
     doomed = cluster.add_node(num_cpus=1, object_store_memory=_MEMORY)

@@ -163,8 +163,7 @@ class _Schedule:
     def _report(self) -> None:
         try:
             found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
-        except RayError:  # Its node is gone; progress is not worth a study.
-            self._board = _new_board()
+        except RayError:  # It is being restarted; progress is not worth a study.
             return
         running = {job.name for job in self._running.values()}
         for name, steps in found.items():
@@ -175,8 +174,8 @@ class _Schedule:
 
 def _new_board() -> Any:
     """Start the board on the node of this program: others may be lost, and progress with them."""
-    here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=True)
-    return _ray.remote(num_cpus=0, scheduling_strategy=here)(_Board).remote()
+    here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=False)
+    return _ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)(_Board).remote()
 
 
 class _Board:
