@@ -1,6 +1,10 @@
 # Every target installs what it needs first, and only when something changed. `make help` lists the
 # targets.
 
+# Some images of containers forbid Python to cache what it compiles. Then every process of a test or
+# a study compiles the package again, and every run of pytest all tests.
+export PYTHONDONTWRITEBYTECODE :=
+
 PYTHON ?= python3
 JOBS ?= 2
 
@@ -36,7 +40,8 @@ setup: $(INSTALLED_DEV)  ## create .venv with all dependencies
 
 demo: $(INSTALLED_ALL)  ## transfer a policy to a pole twice as long; see results/demo
 	$(BIN)/shapechanger transfer shapechanger/InvertedPendulum-v1 \
-		shapechanger/BigInvertedPendulum-v1 --seeds 5 --source-steps 16384 --out results/demo
+		shapechanger/BigInvertedPendulum-v1 --seeds 5 --source-steps 16384 --steps 16384 \
+		--out results/demo
 
 test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
 	$(PYTEST) -m "not slow and not system" $(COVERING) --cov

@@ -46,6 +46,14 @@ def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
     assert again.card.steps == 64
 
 
+def test_actions_are_those_of_the_model() -> None:
+    """The short way to PPO's mean actions gives `predict`'s, clipped like them."""
+    policy, _ = trained(TINY)
+    observations = np.random.default_rng(0).normal(scale=100.0, size=(50, 4))
+    expected, _ = policy.model.predict(observations, deterministic=True)
+    np.testing.assert_array_equal(policy.act(observations), expected)
+
+
 def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
     """The statistics are part of the policy: numbers far away act otherwise."""
     policy, _ = trained(TINY_NORMALISED)
