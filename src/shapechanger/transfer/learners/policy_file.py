@@ -128,14 +128,15 @@ def actor(
         normalisation: Its statistics; None if it is not normalised.
         deterministic: Whether actions are the mean ones, without exploration noise.
     """
-
     mean = _mean_action(model) if deterministic else None
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
         if normalisation is not None:
             inputs = _normalised(observations, normalisation.observation)
-        return model.predict(inputs, deterministic=deterministic)[0] if mean is None else mean(inputs)
+        if mean is not None:
+            return mean(inputs)
+        return model.predict(inputs, deterministic=deterministic)[0]
 
     return act
 
