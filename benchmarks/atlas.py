@@ -23,6 +23,7 @@ from benchmarks.row import Row
 from shapechanger.cli.films import film_study
 from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
+from shapechanger.reports.charts import sweep_chart
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
 from shapechanger.reports.verdict import direction, finals
@@ -86,7 +87,16 @@ def methods() -> list[Row]:
 
 def shank() -> list[Row]:
     """One ant's policy in ants with shanks of half to two and a half times the length."""
-    return _rows(_suite("shank"))
+    studies = _suite("shank")
+    suite = load_suite("shank")
+    if suite.sweep is not None:
+        names = (name for name, _ in suite_tasks(suite))
+        values = dict(zip(names, suite.sweep.values, strict=True))
+        picture = sweep_chart(
+            {values[one]: s for one, s in studies.items()}, "factor of the length of the shanks"
+        )
+        (PICTURES / "shank-sweep.svg").write_text(picture)
+    return _rows(studies)
 
 
 def controls() -> list[Row]:

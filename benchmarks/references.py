@@ -75,7 +75,7 @@ TARGETS: Final = {
     "Ant": Target(2_097_152, "forward speed", 3.0, 3),
     "AmputatedAnt": Target(1_048_576, "forward speed", 2.0, 3),
     "BigAnt": Target(1_048_576, "forward speed", 2.0, 3),
-    "ExtendedAnt": Target(2_097_152, "forward speed", 2.0, 3),
+    "ExtendedAnt": Target(3_145_728, "forward speed", 2.0, 3),
 }
 
 

@@ -26,7 +26,7 @@ from shapechanger.demos.jpeg import encode_picture, picture_size
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
 
-__all__ = ["QUALITY", "SPARE_BYTES", "RecordEpisodes", "Seen", "Sight"]
+__all__ = ["QUALITY", "RecordEpisodes", "Seen", "Sight"]
 
 _PICTURE_DIMENSIONS: Final = 3
 _CHANNELS: Final = 3
@@ -158,7 +158,7 @@ def _layout(env: gym.Env[Any, Any], name: str, side: str) -> Layout:
 QUALITY: Final = 95
 """JPEG quality in percent for pictures that an env returns as arrays."""
 
-SPARE_BYTES: Final = 64 << 20
+_SPARE_BYTES: Final = 64 << 20
 """Disk space to leave free."""
 
 _COLLISION: Final = "reward_collision"
@@ -211,7 +211,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         driver: Driver = "program",
         about: Mapping[str, Any] | None = None,
         quality: int = QUALITY,
-        spare_bytes: int = SPARE_BYTES,
+        spare_bytes: int = _SPARE_BYTES,
     ) -> None:
         super().__init__(env)
         self._sight = Sight(env, quality)

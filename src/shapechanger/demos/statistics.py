@@ -12,7 +12,7 @@ import numpy as np
 
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
 
-__all__ = ["BINS", "Distribution", "EpisodeStatistics", "gaps_s", "spread", "summary"]
+__all__ = ["Distribution", "EpisodeStatistics", "gaps_s", "spread", "summary"]
 
 _NS_PER_S: Final = 1e9
 _COLLISION: Final = "reward_collision"
@@ -99,7 +99,7 @@ def _time_ns(step: Step) -> int | None:
     return step.captured_ns if step.captured_ns is not None else step.decided_ns
 
 
-BINS: Final = 21
+_BINS: Final = 21
 """Number of bins. It is odd, so that 0 has a bin of its own in a symmetric range."""
 
 
@@ -132,7 +132,7 @@ class Distribution:
 
 
 def spread(
-    values: Iterable[float], low: float = -math.inf, high: float = math.inf, bins: int = BINS
+    values: Iterable[float], low: float = -math.inf, high: float = math.inf, bins: int = _BINS
 ) -> Distribution | None:
     """Return the distribution of values.
 

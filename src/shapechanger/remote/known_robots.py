@@ -38,7 +38,6 @@ __all__ = [
     "parse_trust",
     "recall",
     "remember",
-    "shown_fingerprint",
     "untrusted",
 ]
 
@@ -172,7 +171,7 @@ def parse_trust(fingerprint: str) -> bytes | None:
     return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
 
 
-def shown_fingerprint(address: Address, timeout_s: float) -> bytes:
+def _shown_fingerprint(address: Address, timeout_s: float) -> bytes:
     """Return the SHA-256 of the certificate that a server shows, without trusting it.
 
     Args:
@@ -199,7 +198,7 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
     Raises:
         LinkError: If no server shows a certificate.
     """
-    shown = shown_fingerprint(address, timeout_s)
+    shown = _shown_fingerprint(address, timeout_s)
     digits = fingerprint_hex(shown)
     return LinkError(
         f"The robot at {address} is not trusted yet. Its fingerprint is\n"

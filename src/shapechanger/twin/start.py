@@ -20,9 +20,9 @@ from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.twin.world.place import Place
 
-__all__ = ["HARDWARE", "BoardAt", "BoardSettings", "RunningBoard", "find_board", "start_board"]
+__all__ = ["BoardAt", "BoardSettings", "RunningBoard", "find_board", "start_board"]
 
-HARDWARE: Final = "shapechanger.twin.hardware:connect"
+_HARDWARE: Final = "shapechanger.twin.hardware:connect"
 """Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 
 _SOCKET: Final = "board.socket"
@@ -64,7 +64,7 @@ class BoardAt:
     """Paths of a board.
 
     Attributes:
-        socket_path: Socket on which it listens; the argument of `HARDWARE`.
+        socket_path: Socket on which it listens; the argument of `_HARDWARE`.
         ledger_path: Its ledger.
         fifo_path: Pipe of its pictures; None without a camera.
     """
@@ -76,7 +76,7 @@ class BoardAt:
     @property
     def hardware(self) -> tuple[str, str]:
         """Source of a robot's hardware, with its argument."""
-        return HARDWARE, self.socket_path
+        return _HARDWARE, self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
         """Return the camera of a profile, reading the pictures of this board.

@@ -17,12 +17,12 @@ from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 
-__all__ = ["ESC_DEAD_BAND_US", "ONE_SHOT_MS", "TwinWiring", "WiredOutput"]
+__all__ = ["ONE_SHOT_MS", "TwinWiring", "WiredOutput"]
 
 ONE_SHOT_MS: Final = 100.0
 """Time for which the one-shot of the enable line keeps the motors' power on after an edge."""
 
-ESC_DEAD_BAND_US: Final = 20.0
+_ESC_DEAD_BAND_US: Final = 20.0
 """Dead band of a speed controller on each side of neutral; makers state 10 to 50."""
 
 # Outputs whose power goes through the one-shot: motors, not steering servos or joints.
@@ -220,7 +220,7 @@ def _servo(
         if not (us := pulse_us(levels)):
             return WiredOutput(None, True)
         value = _between(us, low, middle, high)
-        return WiredOutput(value, _near(value, rest, ESC_DEAD_BAND_US / abs(high - middle)))
+        return WiredOutput(value, _near(value, rest, _ESC_DEAD_BAND_US / abs(high - middle)))
 
     return state
 
@@ -230,7 +230,7 @@ def _esc(plan: OutputPlan, pulse_us: Callable[[Levels], float]) -> Callable[[Lev
 
     def state(levels: Levels) -> WiredOutput:
         us = pulse_us(levels)
-        if not us or abs(us - middle) <= ESC_DEAD_BAND_US:
+        if not us or abs(us - middle) <= _ESC_DEAD_BAND_US:
             return WiredOutput(0.0, True)
         return WiredOutput(_between(us, low, middle, high), False)
 

@@ -15,10 +15,8 @@ import mujoco
 from shapechanger.bodies.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
 
 __all__ = [
-    "HAND",
     "METACARPAL",
     "TENDON_COLOURS",
-    "TENDON_ROUTES",
     "THICKEST_M",
     "THINNEST_M",
     "Over",
@@ -28,7 +26,7 @@ __all__ = [
     "route_names",
 ]
 
-HAND: Final = "hand"
+_HAND: Final = "hand"
 """Name of the hand's body; its axes are those of the finger, at the knuckle."""
 
 
@@ -71,7 +69,7 @@ _P, _M, _D = "proximal", "middle", "distal"
 def _extensor(y: float) -> TendonRoute:
     """Route over the knuckle and the middle of the hood to the base of the distal phalanx."""
     return (
-        *_on(HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
+        *_on(_HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
         Over("MCP"),
         *_on(_P, (12.0, y, 6.2), (36.0, 0.7 * y, 5.8)),
         Over("PIP"),
@@ -93,12 +91,12 @@ def _to_the_hood(side: float) -> TendonRoute:
 
 
 # Sides and order follow anatomical atlases; the positions are chosen for visibility.
-TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
+_TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
     {
         # Below FDS up to the knuckle, then through its slips, to the base of the distal phalanx.
         "FDP": (
             (
-                *_on(HAND, (-58.0, 0.6, -6.6), (-11.0, 0.0, -7.0)),
+                *_on(_HAND, (-58.0, 0.6, -6.6), (-11.0, 0.0, -7.0)),
                 *_on(_P, (11.0, 0.0, -6.6), (24.0, 0.0, -7.0), (36.0, 0.0, -6.6)),
                 *_on(_M, (9.0, 0.0, -5.8), (19.0, 0.0, -5.4)),
                 *_on(_D, (6.0, 0.0, -3.4)),
@@ -108,7 +106,7 @@ TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
         # phalanx.
         "FDS": tuple(
             (
-                *_on(HAND, (-58.0, -0.6, -8.8), (-11.0, 0.0, -9.2)),
+                *_on(_HAND, (-58.0, -0.6, -8.8), (-11.0, 0.0, -9.2)),
                 *_on(_P, (11.0, 0.0, -8.6), (24.0, 2.2 * side, -7.0), (36.0, 2.8 * side, -6.0)),
                 *_on(_M, (10.0, 2.8 * side, -3.6)),
             )
@@ -118,15 +116,15 @@ TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
         "EIP": (_extensor(-1.5),),
         "EDC": (_extensor(1.5),),
         # From the tendon of FDP in the palm, radially and palmar of the knuckle's axis.
-        "LUM": ((*_on(HAND, (-40.0, 1.6, -6.6), (-10.0, 6.2, -6.0)), *_to_the_hood(1.0)),),
+        "LUM": ((*_on(_HAND, (-40.0, 1.6, -6.6), (-10.0, 6.2, -6.0)), *_to_the_hood(1.0)),),
         # From the back of the web between thumb and finger to the base of the proximal phalanx.
         "DI": (
             (
-                *_on(HAND, (-42.0, 5.0, 1.5), (-9.0, 7.6, -1.0)),
+                *_on(_HAND, (-42.0, 5.0, 1.5), (-9.0, 7.6, -1.0)),
                 *_on(_P, (4.0, 7.6, -1.2), (10.0, 4.6, -0.8)),
             ),
         ),
-        "PI": ((*_on(HAND, (-42.0, -5.0, -1.5), (-9.0, -7.2, -3.6)), *_to_the_hood(-1.0)),),
+        "PI": ((*_on(_HAND, (-42.0, -5.0, -1.5), (-9.0, -7.2, -3.6)), *_to_the_hood(-1.0)),),
     }
 )
 """Routes of each tendon from the wrist on: one, or one for each slip that it splits into."""
@@ -169,7 +167,7 @@ _JOINTS: Final = ("MCP", "PIP", "DIP")
 
 def route_names(tendon: str) -> list[str]:
     """Names of the spatial tendons that show a tendon, such as `FDS/course` and `FDS/course_2`."""
-    more = [f"{tendon}/course_{i}" for i in range(2, len(TENDON_ROUTES[tendon]) + 1)]
+    more = [f"{tendon}/course_{i}" for i in range(2, len(_TENDON_ROUTES[tendon]) + 1)]
     return [f"{tendon}/course", *more]
 
 
@@ -181,7 +179,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
     """
     _add_scene(spec)
     hand = _add_hand(spec)
-    bodies = {HAND: hand} | {name: spec.body(name) for name in PHALANGES}
+    bodies = {_HAND: hand} | {name: spec.body(name) for name in PHALANGES}
     for name in PHALANGES:
         spec.geom(name).rgba = _SKIN
     # Each bone spans from its joint to the next; the last one ends below the flesh of the
@@ -198,7 +196,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
         _add_back(bodies[list(bodies)[i]], joint, spans[i][1], _HEADS[i])
     _add_nail(bodies[PHALANGES[-1]])
     for tendon in TENDONS:
-        for name, course in zip(route_names(tendon), TENDON_ROUTES[tendon], strict=True):
+        for name, course in zip(route_names(tendon), _TENDON_ROUTES[tendon], strict=True):
             _add_course(spec, bodies, name, course, TENDON_COLOURS[tendon])
 
 
@@ -233,7 +231,7 @@ def _add_hand(spec: mujoco.MjSpec) -> mujoco.MjsBody:
     plain = spec.geom(METACARPAL)
     fromto, size = plain.fromto.copy(), plain.size.copy()
     spec.delete(plain)
-    hand = spec.worldbody.add_body(name=HAND)
+    hand = spec.worldbody.add_body(name=_HAND)
     hand.add_geom(
         name=METACARPAL,
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,

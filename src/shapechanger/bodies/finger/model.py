@@ -29,11 +29,11 @@ from shapechanger.bodies.finger.looks import (
 from shapechanger.bodies.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.bodies.finger.tensions import TendonDrive, drive_of
 
-__all__ = ["FINGERTIP", "SIM_DT", "SIM_DT_STRETCHED", "TARGET", "FingerFigure", "build_finger"]
+__all__ = ["FINGERTIP", "SIM_DT", "TARGET", "FingerFigure", "build_finger"]
 
 SIM_DT: Final = 0.002
 """Simulation step, s, that is stable under any command."""
-SIM_DT_STRETCHED: Final = 0.0005
+_SIM_DT_STRETCHED: Final = 0.0005
 """Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
 Hz and more."""
 
@@ -77,7 +77,7 @@ def build_finger(
     """
     spec = mujoco.MjSpec()
     spec.modelname = "finger"
-    spec.option.timestep = SIM_DT_STRETCHED if parameters.gives else SIM_DT
+    spec.option.timestep = _SIM_DT_STRETCHED if parameters.gives else SIM_DT
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     spec.visual.headlight.ambient[:] = (0.4, 0.4, 0.4)

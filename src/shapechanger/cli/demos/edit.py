@@ -23,12 +23,10 @@ __all__ = [
     "Merge",
     "RepairEpisodes",
     "episode_at",
-    "episode_path",
-    "range_of",
 ]
 
 
-def episode_path(path: Path) -> Path:
+def _episode_path(path: Path) -> Path:
     """Resolve a path to the folder of one episode, or of a recording with a single episode.
 
     Raises:
@@ -45,19 +43,19 @@ def episode_path(path: Path) -> Path:
 
 
 def episode_at(path: Path) -> Episode:
-    """Load one episode, see `episode_path`.
+    """Load one episode, see `_episode_path`.
 
     Raises:
         BrokenEpisode: If it is incomplete.
         DemosError: If there is none, or more than one, or it has no steps.
     """
-    episode = read_episode(episode_path(path))
+    episode = read_episode(_episode_path(path))
     if not episode.steps:
         raise DemosError(f"{episode.path} has no steps.")
     return episode
 
 
-def range_of(episode: Episode, first: int | None, last: int | None) -> tuple[int, int]:
+def _range_of(episode: Episode, first: int | None, last: int | None) -> tuple[int, int]:
     """Return the range from `first` to `last`; None stands for the episode's own end.
 
     Raises:
@@ -89,7 +87,7 @@ class CutEpisode:
     def run(self) -> None:
         """Cut and print what is kept."""
         episode = episode_at(self.episode)
-        first, last = range_of(episode, self.first, self.last)
+        first, last = _range_of(episode, self.first, self.last)
         least, most = episode.steps[0].index, episode.steps[-1].index
         if first > least:
             drop(episode.path, least, first - 1, "cut")
@@ -112,7 +110,7 @@ class Bad:
     def run(self) -> None:
         """Drop the steps and print what is kept."""
         episode = episode_at(self.episode)
-        drop(episode.path, *range_of(episode, self.first, self.last), "bad")
+        drop(episode.path, *_range_of(episode, self.first, self.last), "bad")
         _tell(episode.path)
 
 
@@ -130,7 +128,7 @@ class Good:
     def run(self) -> None:
         """Restore the steps and print what is kept."""
         episode = episode_at(self.episode)
-        keep(episode.path, *range_of(episode, self.first, self.last))
+        keep(episode.path, *_range_of(episode, self.first, self.last))
         _tell(episode.path)
 
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["EXPERT", "RecordDemonstrations", "pilot_of"]
+__all__ = ["RecordDemonstrations", "pilot_of"]
 
-EXPERT: Final = "expert"
+_EXPERT: Final = "expert"
 
 # Below this throttle a vehicle does not collide.
 _CRAWLS_MPS: Final = 0.05
@@ -49,14 +49,16 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     """
     from shapechanger.demos.drivers import CorrectedPilot, ExpertPilot, Gate, GateRule, PolicyPilot
 
-    if corrected_by not in ("", EXPERT):
-        raise DemosError(f"A policy is corrected by {EXPERT}, and not by {corrected_by!r}.")
-    if driver == EXPERT:
+    if corrected_by not in ("", _EXPERT):
+        raise DemosError(f"A policy is corrected by {_EXPERT}, and not by {corrected_by!r}.")
+    if driver == _EXPERT:
         if corrected_by:
             raise DemosError("The expert needs no correction: give a policy as the driver.")
         return ExpertPilot(_expert(env, seed))
     if not Path(driver).is_file():
-        raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
+        raise DemosError(
+            f"There is no driver {driver!r}: it is {_EXPERT}, or the file of a policy."
+        )
     from shapechanger.transfer.learners.sb3 import use_one_thread
 
     use_one_thread()  # Inference on single frames is slower with more threads.
@@ -166,7 +168,7 @@ class RecordDemonstrations:
     """Folder of the recording; what is there already stays, and more comes to it."""
     minutes: float = 10.0
     """Duration, minutes of the env's time."""
-    driver: str = EXPERT
+    driver: str = _EXPERT
     """"expert", or the file of a policy."""
     corrected_by: str = ""
     """"expert" to let it take over where the policy would go wrong. Only what the expert does is
@@ -239,7 +241,7 @@ class RecordDemonstrations:
     def _about(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         """Return further fields of the header."""
         world = getattr(env.unwrapped, "world", None)
-        who = self.driver if self.driver == EXPERT else Path(self.driver).name
+        who = self.driver if self.driver == _EXPERT else Path(self.driver).name
         notes: dict[str, Any] = {"driver": self.driver}
         if self.corrected_by:
             who += f", corrected by {self.corrected_by}"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapechanger.teleop import Terminal
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["Replay", "film", "play_in_env", "play_on_robot"]
+__all__ = ["Replay", "film"]
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class Replay:
         if self.film is not None:
             film(episode, self.film)
         elif self.env:
-            play_in_env(episode, self.env)
+            _play_in_env(episode, self.env)
         else:
-            play_on_robot(episode, self.robot)
+            _play_on_robot(episode, self.robot)
 
 
-def play_in_env(episode: Episode, env_id: str) -> None:
+def _play_in_env(episode: Episode, env_id: str) -> None:
     """Replay an episode in an env from the recorded seed and report differences.
 
     The applied actions are replayed where they are known, because the frames follow from them; the
@@ -226,7 +226,7 @@ _SAME_RATE: Final = 0.01
 _LOOK_S: Final = 0.5
 
 
-def play_on_robot(episode: Episode, name: str) -> None:
+def _play_on_robot(episode: Episode, name: str) -> None:
     """Replay an episode on a robot after a person at this terminal has armed it.
 
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Evaluate", "Shrinking", "TrainClone", "print_judgement"]
+__all__ = ["Evaluate", "Shrinking", "TrainClone"]
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class TrainClone:
         write_numbers(numbers, policy, judgement, training)
         console.print(f"wrote {self.out}, {page} and {numbers}", soft_wrap=True)
         console.print(told, soft_wrap=True)
-        print_judgement(console, judgement)
+        _print_judgement(console, judgement)
 
     def _require_files(self) -> None:
         """Check before the work that the files can be written.
@@ -197,7 +197,7 @@ class _Progress(StudyProgress):
         return f"network {member + 1}"
 
 
-def print_judgement(console: Console, judgement: Judgement) -> None:
+def _print_judgement(console: Console, judgement: Judgement) -> None:
     """Print an evaluation; the last line is the accuracy."""
     always = f"always the same: {judgement.always:.3f}"
     console.print(f"{judgement.steps} steps; {always}", soft_wrap=True)
@@ -260,4 +260,4 @@ class Evaluate:
             numbers = self.report.with_suffix(".json")
             write_numbers(numbers, policy, judgement, None)
             console.print(f"wrote {self.report} and {numbers}", soft_wrap=True)
-        print_judgement(console, judgement)
+        _print_judgement(console, judgement)

@@ -44,8 +44,6 @@ __all__ = [
     "Jogger",
     "Keys",
     "ask_for_wheels_up",
-    "end_if_asked",
-    "live_line",
 ]
 
 
@@ -174,7 +172,7 @@ class Jogger:
         Raises:
             RobotError: If the robot stopped.
         """
-        with live_line(self._console) as live:
+        with _live_line(self._console) as live:
             return self._jogged(cap, ask_beyond, live)
 
     def _jogged(
@@ -203,7 +201,7 @@ class Jogger:
                     if key == "enter":
                         accepted, accepted_s = told + 1, time.monotonic()
                         break
-                    end_if_asked(key, self._robot)
+                    _end_if_asked(key, self._robot)
                     if key == "n":
                         return None
                     if key == "y" and asked:
@@ -228,12 +226,12 @@ class Jogger:
         return min(max(self._output.offset + mixed, -1.0), 1.0)
 
 
-def live_line(console: Console) -> Live:
+def _live_line(console: Console) -> Live:
     """Return a live line that disappears afterwards."""
     return Live(console=console, refresh_per_second=10, transient=True)
 
 
-def end_if_asked(key: str, robot: RobotClient | None = None) -> None:
+def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
     """Quit on Q; on Space, stop the robot and wait until the stop is visible."""
     if key == "space" and robot is not None:
         robot.emergency_stop("calibrate")
@@ -347,7 +345,7 @@ class Calibration:
 
     def _wheel(self, name: str, wheel_m: float) -> dict[str, Any]:
         self._console.print(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
-        with self._served({}) as robot, live_line(self._console) as live:
+        with self._served({}) as robot, _live_line(self._console) as live:
             state = Layout.from_json(robot.welcome.state_layout)
             place: int = state.slices["speed"].start
             travelled_m = 0.0
@@ -362,7 +360,7 @@ class Calibration:
                 for key in self._keys.keys(0.0):
                     if key == "enter":
                         return dict(wheel_changes(name, wheel_m, 1.0, travelled_m))
-                    end_if_asked(key, robot)
+                    _end_if_asked(key, robot)
                     if key == "n":
                         return {}
 
@@ -396,7 +394,7 @@ class Calibration:
     def _answer(self) -> Literal["forward", "backward"]:
         while True:
             for key in self._keys.keys(1.0):
-                end_if_asked(key)  # Nothing is served here, so everything is at rest.
+                _end_if_asked(key)  # Nothing is served here, so everything is at rest.
                 if key in {"y", "n"}:
                     return "forward" if key == "y" else "backward"
 

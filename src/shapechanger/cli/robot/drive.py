@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shapechanger.link.messages import Observation
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["Drive", "Driving", "PolicyDriver", "load_pilot"]
+__all__ = ["Drive", "Driving", "PolicyDriver"]
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -57,7 +57,7 @@ class Drive:
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
-        pilot = None if self.policy is None else load_pilot(self.policy, known)
+        pilot = None if self.policy is None else _load_pilot(self.policy, known)
         if self.terminal or not can_open():
             self._drive_here(known, pilot)
         else:
@@ -326,7 +326,7 @@ _PILOTING_LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
 
 
-def load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
+def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot.
 
     Raises:

@@ -32,7 +32,7 @@ from shapechanger.link.messages import EpisodeSummary, Piece
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["FetchEpisodes", "episodes_there", "fetch_episode", "recorded"]
+__all__ = ["FetchEpisodes", "fetch_episode", "recorded"]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class FetchEpisodes:
 
         console, failed = plain_console(), 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
-            there = episodes_there(robot, self.episodes)
+            there = _episodes_there(robot, self.episodes)
             if not there:
                 console.print(f"{self.robot} has recorded nothing yet.", soft_wrap=True)
             for episode in there:
@@ -85,7 +85,7 @@ _PART: Final = ".fetching"
 _LINES: Final = 1_000
 
 
-def episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSummary]:
+def _episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSummary]:
     """Return the episodes on a robot, oldest first.
 
     Args:
@@ -265,7 +265,7 @@ def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None
         yield
         return
 
-    before = {episode.id for episode in episodes_there(robot, ())}
+    before = {episode.id for episode in _episodes_there(robot, ())}
     robot.record(on=True)
     try:
         yield
@@ -289,7 +289,7 @@ def _closed(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
     """Wait until the robot has written the last steps, and return the new episodes."""
     until_s = time.monotonic() + _CLOSED_WITHIN_S
     while True:
-        new = [episode for episode in episodes_there(robot, ()) if episode.id not in before]
+        new = [episode for episode in _episodes_there(robot, ()) if episode.id not in before]
         if all(episode.closed for episode in new) or time.monotonic() > until_s:
             return new
         time.sleep(_LOOK_EVERY_S)

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Key",
     "can_open",
-    "console_address",
     "how_to_remember",
     "open_console",
     "shown_credentials",
@@ -78,7 +77,7 @@ class Key:
         key = credentials.key_file.read_text().strip()
         address = self.address or f"{socket.gethostname()}.local"
         robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
-        console = console_address(robot)
+        console = _console_address(robot)
         plain_console().print(f"\nThe console is at {console}; this brings a phone there:\n")
         # Printed verbatim: wrapping would break the code.
         segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
@@ -124,7 +123,7 @@ def can_open() -> bool:
     return True
 
 
-def console_address(robot: KnownRobot) -> str:
+def _console_address(robot: KnownRobot) -> str:
     """Return the address of a robot's console, without the key."""
     scheme = "http" if robot.fingerprint == INSECURE else "https"
     return f"{scheme}://{parse_address(robot.address)}/"
@@ -143,7 +142,7 @@ def open_console(robot: KnownRobot) -> str:
     Raises:
         LinkError: If no browser opens.
     """
-    address = console_address(robot)
+    address = _console_address(robot)
     there = html.escape(f"{address}#key={robot.key}", quote=True)
     fd, name = tempfile.mkstemp(prefix="shapechanger-console-", suffix=".html")
     with os.fdopen(fd, "w", encoding="utf-8") as file:

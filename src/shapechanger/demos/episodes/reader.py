@@ -32,7 +32,6 @@ from shapechanger.demos.episodes.records import (
 from shapechanger.errors import BrokenEpisode, DemosError
 
 __all__ = [
-    "CUT_OFF",
     "Drop",
     "Episode",
     "EpisodeMark",
@@ -45,7 +44,6 @@ __all__ = [
     "read_episode",
     "read_header",
     "repair",
-    "scan",
 ]
 
 # Such a name cannot lead out of the folder.
@@ -69,7 +67,7 @@ class StepLine:
     wrong: str
 
 
-def scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
+def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
     """Check every line of an episode, and the picture that it names.
 
     Args:
@@ -219,7 +217,7 @@ def read_episode(path: Path) -> Episode:
         BrokenEpisode: If a line or a picture is damaged or missing.
     """
     header, closed = read_header(path)
-    lines = scan(path, header, thorough=False)
+    lines = _scan(path, header, thorough=False)
     for number, line in enumerate(lines, 1):
         if line.wrong:
             raise _broken(path, f"line {number} is invalid, because {line.wrong}")
@@ -308,7 +306,7 @@ def _broken(path: Path, why: str) -> BrokenEpisode:
     )
 
 
-CUT_OFF: Final = "cut off"
+_CUT_OFF: Final = "cut off"
 """Outcome of an episode that was not closed before `repair`."""
 
 
@@ -349,7 +347,7 @@ def repair(path: Path) -> Repair:
     header, closed = read_header(path)
     fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
     try:
-        lines = scan(path, header, thorough=True)
+        lines = _scan(path, header, thorough=True)
         good = [line for line in lines if not line.wrong]
         bad = [line for line in lines if line.wrong]
         strays = _strays(path, good)
@@ -364,7 +362,7 @@ def repair(path: Path) -> Repair:
             raise cannot_write(path, error) from error
         kept = sum(line.step is not None for line in good)
         if closed is None:
-            ending = {"steps": kept, "outcome": CUT_OFF}
+            ending = {"steps": kept, "outcome": _CUT_OFF}
             write_header(path, header.to_json() | {"closed": ending})
     finally:
         os.close(fd)

@@ -12,8 +12,6 @@ from shapechanger.errors import DemosError
 
 __all__ = [
     "DRIVERS",
-    "FORMAT",
-    "MAX_LINE",
     "Clock",
     "Driver",
     "EpisodeHeader",
@@ -23,7 +21,7 @@ __all__ = [
     "split_lines",
 ]
 
-FORMAT: Final = 1
+_FORMAT: Final = 1
 """Version of the format. Readers refuse any other version."""
 
 Clock = Literal["real", "twin", "none"]
@@ -74,7 +72,7 @@ class EpisodeHeader:
     notes: dict[str, Any] = field(default_factory=dict[str, Any])
     created: str = ""
     version: str = ""
-    format: int = FORMAT
+    format: int = _FORMAT
 
     def __post_init__(self) -> None:
         if not (self.control_hz > 0.0 and math.isfinite(self.control_hz)):
@@ -116,10 +114,10 @@ class EpisodeHeader:
         Raises:
             DemosError: If a field is missing or invalid, or the format has another version.
         """
-        if plain.get("format") != FORMAT:
+        if plain.get("format") != _FORMAT:
             raise DemosError(
                 f"the episode has format {plain.get('format')}, but this version of Shapechanger "
-                f"reads format {FORMAT} only."
+                f"reads format {_FORMAT} only."
             )
         known = {name: plain[name] for name in (f.name for f in fields(cls)) if name in plain}
         try:
@@ -286,7 +284,7 @@ def _read(values: Any) -> tuple[float, ...]:
     return tuple(math.nan if value is None else float(value) for value in values)
 
 
-MAX_LINE: Final = 1 << 20
+_MAX_LINE: Final = 1 << 20
 """Length limit of a line in bytes; longer lines are treated as damaged."""
 
 _CHECK: Final = b',"crc":"%08x"}\n'
@@ -314,7 +312,7 @@ def decode_line(line: bytes) -> dict[str, Any]:
     Raises:
         ValueError: If the line is damaged; the message is part of a sentence.
     """
-    if len(line) > MAX_LINE:
+    if len(line) > _MAX_LINE:
         raise ValueError(f"it has {len(line)} bytes")
     body, check = line[:-_CHECK_SIZE], line[-_CHECK_SIZE:]
     if not body or check != _CHECK % binascii.crc32(body):

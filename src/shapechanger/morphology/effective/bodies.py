@@ -25,7 +25,6 @@ __all__ = [
     "Frames",
     "bodies",
     "bodies_that_matter",
-    "canonical",
     "digest",
     "geom_frames",
     "geoms",
@@ -60,7 +59,7 @@ def inertial_frames(model: mujoco.MjModel) -> Frames:
     turned_as_body = is_any(same, _SAME.mjSAMEFRAME_BODY, _SAME.mjSAMEFRAME_BODYROT)[:, None]
     return Frames(
         np.where(at_body, 0.0, model.body_ipos),
-        canonical(np.where(turned_as_body, _IDENTITY, model.body_iquat)),
+        _canonical(np.where(turned_as_body, _IDENTITY, model.body_iquat)),
     )
 
 
@@ -78,7 +77,7 @@ def site_frames(model: mujoco.MjModel) -> Frames:
     )
 
 
-def canonical(quaternions: _Floats) -> _Floats:
+def _canonical(quaternions: _Floats) -> _Floats:
     """Of the two quaternions of each rotation the one whose first number is above 0; (n, 4)."""
     leading = np.argmax(quaternions != 0.0, axis=1)[:, None]
     sign = np.sign(np.take_along_axis(quaternions, leading, axis=1))
@@ -106,7 +105,7 @@ def _attached(
 
     return Frames(
         choose(position, inertial.position, rotation=False),
-        canonical(choose(orientation, inertial.orientation, rotation=True)),
+        _canonical(choose(orientation, inertial.orientation, rotation=True)),
     )
 
 
@@ -128,7 +127,7 @@ def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
     free[model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]] = True
     rows.words("parent", named(names.bodies, model.body_parentid))
     rows.numbers("position", model.body_pos, ~free)  # A free body starts from its joint's qpos0.
-    rows.numbers("orientation", canonical(model.body_quat), ~free)
+    rows.numbers("orientation", _canonical(model.body_quat), ~free)
     rows.numbers("mass", model.body_mass, moving)
     rows.numbers("inertia", model.body_inertia, moving)
     inertial = inertial_frames(model)

@@ -21,7 +21,6 @@ __all__ = [
     "held_at",
     "inertia_is_written_out",
     "move_by",
-    "move_outwards",
     "orientation",
     "place_of",
     "require_geometry",
@@ -33,7 +32,6 @@ __all__ = [
     "stretch_geom",
     "stretch_segment",
     "stretched",
-    "thicken_geom",
     "thicken_segment",
     "volume",
 ]
@@ -125,7 +123,7 @@ def stretched(point: Array, held: Array, factor: float, axis: str | None = None)
     return held + scale * (point - held)
 
 
-def move_outwards(
+def _move_outwards(
     element: mujoco.MjsGeom | mujoco.MjsSite, held: Array, factor: float, axis: str | None = None
 ) -> None:
     """Move an element, or the ends that it has, to where stretching carries it."""
@@ -154,7 +152,7 @@ def stretch_geom(
     before = volume(spec, geom)
     if not has_ends(geom):
         _lengthen(spec, geom, factor, axis)
-    move_outwards(geom, held, factor, axis)
+    _move_outwards(geom, held, factor, axis)
     _keep_density(spec, geom, before)
 
 
@@ -162,11 +160,11 @@ def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: 
     """Make a geom `factor` times as large in every direction, as seen from `held`."""
     before = volume(spec, geom)
     geom.size = geom.size * factor
-    move_outwards(geom, held, factor)
+    _move_outwards(geom, held, factor)
     _keep_density(spec, geom, before)
 
 
-def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
+def _thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
     """Scale what stretching leaves alone: a radius, or the two smaller half-sizes."""
     before = volume(spec, geom)
     size = np.array(geom.size)
@@ -294,7 +292,7 @@ def _carry_outwards(
     for joint in body.joints:
         joint.pos = stretched(joint.pos, held, factor, axis)
     for site in body.sites:
-        move_outwards(site, held, factor, axis)
+        _move_outwards(site, held, factor, axis)
     for child in body.bodies:
         held_there = held_at(spec, child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
@@ -303,7 +301,7 @@ def _carry_outwards(
 def thicken_segment(spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float) -> None:
     """Make every geom of the body `factor` times as thick, at the same length."""
     for geom in body.geoms:
-        thicken_geom(spec, geom, factor)
+        _thicken_geom(spec, geom, factor)
 
 
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:

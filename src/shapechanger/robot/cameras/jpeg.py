@@ -12,7 +12,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
 __all__ = [
-    "MAX_JPEG",
     "FreezeDetector",
     "JpegSplitter",
     "captured_ns_of",
@@ -20,7 +19,7 @@ __all__ = [
     "checked_frame",
 ]
 
-MAX_JPEG: Final = 4 * 1024 * 1024
+_MAX_JPEG: Final = 4 * 1024 * 1024
 """Size of the largest frame, bytes."""
 
 
@@ -34,8 +33,8 @@ def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
     Raises:
         RobotError: If it is not.
     """
-    if len(jpeg) > MAX_JPEG:
-        raise RobotError(f"The camera gave {len(jpeg)} bytes; a picture has {MAX_JPEG} at most.")
+    if len(jpeg) > _MAX_JPEG:
+        raise RobotError(f"The camera gave {len(jpeg)} bytes; a picture has {_MAX_JPEG} at most.")
     if not simplejpeg.is_jpeg(jpeg):
         raise RobotError("The camera returned an incomplete JPEG.")
     try:
@@ -130,9 +129,9 @@ class JpegSplitter:
             self._drop(len(_START))
             raise RobotError(f"The stream has a broken JPEG: {error}.") from error
         if end is None:
-            if len(self._data) > MAX_JPEG:
+            if len(self._data) > _MAX_JPEG:
                 self._drop(len(self._data))
-                raise RobotError(f"The stream has a JPEG of more than {MAX_JPEG} bytes.")
+                raise RobotError(f"The stream has a JPEG of more than {_MAX_JPEG} bytes.")
             return None
         jpeg = bytes(self._data[:end])
         self._drop(end)

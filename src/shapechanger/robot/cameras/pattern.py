@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
 
-__all__ = ["BARCODE_BITS", "Pattern", "barcode_rows", "draw_barcode", "open_driver", "read_barcode"]
+__all__ = ["Pattern", "barcode_rows", "draw_barcode", "open_driver", "read_barcode"]
 
-BARCODE_BITS: Final = 48
+_BARCODE_BITS: Final = 48
 """Bits of the number. In nanoseconds they count 78 hours, and then start again."""
 
-_BYTES: Final = BARCODE_BITS // 8
+_BYTES: Final = _BARCODE_BITS // 8
 _COLUMNS: Final = 32
 _ROWS: Final = 2
 _LEAST_WIDTH: Final = 96  # Pixels: 3 by 4 is the smallest cell that survives JPEG.
@@ -49,7 +49,7 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
             f"A barcode needs a number of at least 0, not {number}, and a picture of at least "
             f"{_LEAST_WIDTH} by {rows} pixels, not {width} by {height}."
         )
-    data = (number % 2**BARCODE_BITS).to_bytes(_BYTES, "big")
+    data = (number % 2**_BARCODE_BITS).to_bytes(_BYTES, "big")
     data += binascii.crc_hqx(data, _CHECK_START).to_bytes(2, "big")
     cells = np.unpackbits(np.frombuffer(data, np.uint8)).reshape(_ROWS, _COLUMNS) * np.uint8(255)
     cell_height, cell_width = rows // _ROWS, width // _COLUMNS

@@ -25,12 +25,12 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
 
-__all__ = ["MAX_CLIENTS", "MAX_PROGRAMS", "ConnectedClient", "SessionHub"]
+__all__ = ["ConnectedClient", "SessionHub"]
 
-MAX_CLIENTS: Final = 8
+_MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
 
-MAX_PROGRAMS: Final = 6
+_MAX_PROGRAMS: Final = 6
 """Most programs among them, so that a person can always connect and stop the robot."""
 
 _ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
@@ -107,11 +107,11 @@ class SessionHub:
             RobotRefused: If too many clients are connected.
         """
         programs = sum(other.client.role == "program" for other in self._clients.values())
-        if len(self._clients) >= MAX_CLIENTS:
-            raise RobotRefused(f"{MAX_CLIENTS} clients are connected, which is the limit.")
-        if member.client.role == "program" and programs >= MAX_PROGRAMS:
+        if len(self._clients) >= _MAX_CLIENTS:
+            raise RobotRefused(f"{_MAX_CLIENTS} clients are connected, which is the limit.")
+        if member.client.role == "program" and programs >= _MAX_PROGRAMS:
             raise RobotRefused(
-                f"{MAX_PROGRAMS} programs are connected, which is the limit; only a person can "
+                f"{_MAX_PROGRAMS} programs are connected, which is the limit; only a person can "
                 "still connect."
             )
         self._clients[member.client.session] = member

@@ -12,9 +12,9 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity, PendingCommand
 from shapechanger.robot.guard.messages import GuardState
 
-__all__ = ["ABSENT", "NumberedFrame", "StateReader", "build_observation"]
+__all__ = ["NumberedFrame", "StateReader", "build_observation"]
 
-ABSENT: Final = "absent"
+_ABSENT: Final = "absent"
 """Source of a quantity that no sensor measures; its value is NaN, never an invented 0."""
 
 _APPLIED: Final = "/applied"
@@ -58,7 +58,7 @@ class StateReader:
     def sources(self, state: GuardState | None) -> dict[str, str]:
         """Return the source of each quantity by name."""
         known = {} if state is None else state.sources
-        return {name: ABSENT for name in self._measured if name not in known} | known
+        return {name: _ABSENT for name in self._measured if name not in known} | known
 
 
 def build_observation(

@@ -20,9 +20,9 @@ from typing import Final, Protocol
 
 from shapechanger.errors import RobotError
 
-__all__ = ["PRE_AUTH_TIMEOUT_S", "Listener", "PreAuthConnection", "PreAuthConnections"]
+__all__ = ["Listener", "PreAuthConnection", "PreAuthConnections"]
 
-PRE_AUTH_TIMEOUT_S: Final = 3.0
+_PRE_AUTH_TIMEOUT_S: Final = 3.0
 """Time that a connection has for its first request, and for each one after it, s."""
 
 _log = logging.getLogger(__name__)
@@ -68,7 +68,7 @@ class PreAuthConnections:
         self,
         max_total: int = _MAX_TOTAL,
         max_per_address: int = _MAX_PER_ADDRESS,
-        timeout_s: float = PRE_AUTH_TIMEOUT_S,
+        timeout_s: float = _PRE_AUTH_TIMEOUT_S,
     ) -> None:
         self._max_total = max_total
         self._max_per_address = max_per_address

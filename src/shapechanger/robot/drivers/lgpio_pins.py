@@ -19,7 +19,7 @@ from typing import Any, Final
 import lgpio
 from gpiozero.pins.lgpio import LGPIOFactory, LGPIOPin
 
-__all__ = ["LgpioServoPins", "LowAtOnceFactory", "LowAtOncePin", "open_gpio_chip"]
+__all__ = ["LgpioServoPins", "LowAtOnceFactory", "LowAtOncePin"]
 
 _MOST_CHIPS: Final = 32
 
@@ -66,7 +66,7 @@ class LowAtOnceFactory(LGPIOFactory):
         self.pin_class: Any = LowAtOncePin
 
 
-def open_gpio_chip() -> int:
+def _open_gpio_chip() -> int:
     """Open the GPIO chip of the header's pins.
 
     Its number differs between models and kernels; its label does not: pinctrl-bcm2835,
@@ -97,7 +97,7 @@ class LgpioServoPins:
     """
 
     def __init__(self) -> None:
-        self._handle: int | None = open_gpio_chip()
+        self._handle: int | None = _open_gpio_chip()
         self._pins: set[int] = set()
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:

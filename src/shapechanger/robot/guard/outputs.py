@@ -24,7 +24,6 @@ __all__ = [
     "OutputBank",
     "Switches",
     "Truth",
-    "drives_first",
     "enable_device",
     "make_safe",
     "noted",
@@ -156,7 +155,7 @@ class Truth:
         return max(found, key=lambda v: abs(v - action.rest), default=value)
 
 
-def drives_first(plan: GuardPlan) -> GuardPlan:
+def _drives_first(plan: GuardPlan) -> GuardPlan:
     """Return the plan with propelling outputs first: a slow servo must not delay them."""
     propelling = {action.name for action in plan.actions if action.propels}
     outputs = sorted(plan.outputs, key=lambda output: propelling.isdisjoint(output.mix))
@@ -179,7 +178,7 @@ class OutputBank:
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
-        self._plan = plan = drives_first(plan)
+        self._plan = plan = _drives_first(plan)
         self._rest = tuple(action.rest for action in plan.actions)
         self._truth = Truth(plan)
         self._drivers: list[tuple[OutputPlan, OutputDriver]] = []
@@ -303,7 +302,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     """
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []
-    for output in drives_first(plan).outputs:
+    for output in _drives_first(plan).outputs:
         if output.driver in _STOPS_ITSELF:
             continue
         with noted(failures, f"Output {output.name}"):

@@ -29,9 +29,9 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, descriptors, read_plan_fd
 from shapechanger.robot.hardware import Hardware, connect
 
-__all__ = ["BEAT_S", "Guard", "main"]
+__all__ = ["Guard", "main"]
 
-BEAT_S: Final = 0.01
+_BEAT_S: Final = 0.01
 """Interval between heartbeats, s of real time; the supervisor allows `guard_silence_ms`."""
 
 _WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
@@ -278,7 +278,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
     with contextlib.ExitStack() as opened:
         daemon = DaemonChannel(fds["--daemon-fd"])
         opened.callback(daemon.close)
-        heartbeat = Heartbeat(fds["--heartbeat-fd"], BEAT_S)
+        heartbeat = Heartbeat(fds["--heartbeat-fd"], _BEAT_S)
         opened.callback(heartbeat.leave)
         plan = read_plan_fd(fds["--plan-fd"])
         hardware = connect(*plan.hardware)

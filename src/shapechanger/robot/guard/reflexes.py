@@ -8,7 +8,6 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.sensors import Sensing
 
 __all__ = [
-    "STANDS_M_PER_S",
     "STEERING",
     "Bump",
     "Persistence",
@@ -39,7 +38,7 @@ class Persistence:
         return now_ns - self._since_ns >= self._for_ns
 
 
-STANDS_M_PER_S = 0.01
+_STANDS_M_PER_S = 0.01
 """Speed below which a robot stands still, m/s: one count per second of a coarse encoder."""
 
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
@@ -102,7 +101,7 @@ class Stall:
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
         """Update with a new sensing and the push, -1 to 1."""
         self.watches = self._after_s > 0.0 and "speed" in quantities
-        stands = self.watches and abs(quantities["speed"]) < STANDS_M_PER_S
+        stands = self.watches and abs(quantities["speed"]) < _STANDS_M_PER_S
         if self._forward.holds(stands and push > self._threshold, now_ns):
             self.way = 1
         if self._backward.holds(stands and push < -self._threshold, now_ns):

@@ -18,7 +18,7 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Stall
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
-__all__ = ["ARM_WITHIN_NS", "Arming", "OutputDecision", "Rules", "Stopping"]
+__all__ = ["Arming", "OutputDecision", "Rules", "Stopping"]
 
 _NS_PER_MS = 1_000_000
 _SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
@@ -27,7 +27,7 @@ _CLIPPED = "Clipped by the robot's caps."
 # Quantities of the sensors whose failure disarms the robot.
 _DISARMING = ("tendons", "joints")
 
-ARM_WITHIN_NS = 1_000_000_000
+_ARM_WITHIN_NS = 1_000_000_000
 """Age from which an order to arm is refused, ns: the operator may no longer be watching."""
 
 FUTURE_NS = 50_000_000
@@ -414,7 +414,7 @@ class Rules:
         if self._is_pressed:
             return "Not armed: the emergency button is pressed."
         age_ns = now_ns - order.issued_ns
-        if age_ns >= ARM_WITHIN_NS:
+        if age_ns >= _ARM_WITHIN_NS:
             return f"Not armed: the order to arm is {age_ns / 1e9:.1f} s old."
         if refusal := self.arming.arm(order.emergency, person=order.person):
             return refusal

@@ -12,7 +12,7 @@ from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["ESTIMATED", "MOST_READ_NS", "SensedState", "Sensing", "Sensors", "merge"]
+__all__ = ["SensedState", "Sensing", "Sensors", "merge"]
 
 
 def _larger(new: float, old: float) -> bool:
@@ -61,7 +61,7 @@ def merge(
             quantities[name], sources[name] = value, sensor
 
 
-ESTIMATED = "estimated"
+_ESTIMATED = "estimated"
 """Source of a quantity that is estimated from the command."""
 
 
@@ -112,7 +112,7 @@ class SensedState:
         if watches_stall:
             self._add("stall", float(stalled), self.sources["speed"])
         if "speed" not in self.quantities and speed is not None:
-            self._add("speed", speed, ESTIMATED)
+            self._add("speed", speed, _ESTIMATED)
         self._conclude_collision()
 
     def _conclude_collision(self) -> None:
@@ -121,14 +121,14 @@ class SensedState:
         if not signs:
             return
         sign = next((name for name in signs if self.quantities[name] > 0.0), signs[0])
-        source = ESTIMATED if sign == "stall" else self.sources[sign]
+        source = _ESTIMATED if sign == "stall" else self.sources[sign]
         self._add("collision", float(self.quantities[sign] > 0.0), source)
 
     def _add(self, name: str, value: float, source: str) -> None:
         self.quantities[name], self.sources[name] = value, source
 
 
-MOST_READ_NS: Final = 20_000_000
+_MOST_READ_NS: Final = 20_000_000
 """Longest response time of a sensor, ns; no stop can happen meanwhile."""
 
 
@@ -176,9 +176,9 @@ class Sensors:
             except (RobotError, OSError) as error:
                 failures[name] = str(error)
             ended_ns = self._clock.now_ns()
-            if ended_ns - began_ns > MOST_READ_NS:
+            if ended_ns - began_ns > _MOST_READ_NS:
                 slow.add(name)
-                words = f"It took more than {MOST_READ_NS // 1_000_000} ms to answer."
+                words = f"It took more than {_MOST_READ_NS // 1_000_000} ms to answer."
                 failures[name] = f"{failures.get(name, '')} {words}".lstrip()
             if not all(map(math.isfinite, measured.values())):
                 failures.setdefault(name, "It returned a value that is not finite.")

@@ -13,9 +13,9 @@ import types
 from pathlib import Path
 from typing import Final
 
-__all__ = ["PROGRAMS", "run"]
+__all__ = ["run"]
 
-PROGRAMS: Final = {
+_PROGRAMS: Final = {
     "guard": "shapechanger.robot.guard.process",
     "supervise": "shapechanger.robot.guard.supervisor",
 }
@@ -32,7 +32,7 @@ def run(program: str, arguments: list[str]) -> None:
     """Run a program of the robot without loading the rest of the package."""
     if "shapechanger" not in sys.modules:
         _put_package_in_place()
-    importlib.import_module(PROGRAMS[program]).main(arguments)
+    importlib.import_module(_PROGRAMS[program]).main(arguments)
 
 
 if __name__ == "__main__":

@@ -30,26 +30,20 @@ from shapechanger.robot.guard.plan import (
 from shapechanger.robot.profile.mistakes import Source, called
 
 __all__ = [
-    "APPLIED",
-    "COLLISION",
     "JOINTS",
-    "QUANTITIES",
-    "STALL",
     "TENDONS",
     "EnablePlan",
     "Profile",
     "Quantity",
     "ResetStep",
     "RewardPlan",
-    "state_features",
-    "tension_spans",
     "with_servo_bus",
 ]
 
-APPLIED: Final = "applied"
+_APPLIED: Final = "applied"
 """Suffix of the features with the applied value of an action: `steering/applied`."""
 
-STALL: Final = "stall"
+_STALL: Final = "stall"
 """Stall, concluded by the guard from a measured speed: pushing without moving."""
 
 TENDONS: Final = "tendons"
@@ -58,7 +52,7 @@ TENDONS: Final = "tendons"
 JOINTS: Final = "joints"
 """Measurement of joint encoders: `MCP_flexion/angle`."""
 
-COLLISION: Final = "collision"
+_COLLISION: Final = "collision"
 """Collision, concluded by the guard from a bumper or a stall."""
 
 
@@ -78,12 +72,12 @@ class Quantity(NamedTuple):
     high: float = math.inf
 
 
-QUANTITIES: Final = {
+_QUANTITIES: Final = {
     "speed": Quantity("speed", "m/s"),
     "distance": Quantity("distance", "m", low=0.0),
     "bump": Quantity("bump", "1", 0.0, 1.0),
-    "stall": Quantity(STALL, "1", 0.0, 1.0),
-    "collision": Quantity(COLLISION, "1", 0.0, 1.0),
+    "stall": Quantity(_STALL, "1", 0.0, 1.0),
+    "collision": Quantity(_COLLISION, "1", 0.0, 1.0),
     "yaw_rate": Quantity("imu", "rad/s"),
     "acceleration_x": Quantity("imu", "m/s²"),
     "acceleration_y": Quantity("imu", "m/s²"),
@@ -93,7 +87,7 @@ QUANTITIES: Final = {
 """Quantities by their names in `GuardState.quantities`, in the order of the state."""
 
 
-def state_features(
+def _state_features(
     sensors: Iterable[SensorPlan], actions: Iterable[ActionPlan], limits: LimitPlan
 ) -> list[Feature]:
     """Return a feature for each quantity that a robot senses.
@@ -106,15 +100,15 @@ def state_features(
     for sensor in sensors:
         sources.setdefault(sensor.measures, Element("sensor", sensor.name))
     if "speed" in sources and limits.stall_s > 0.0:
-        sources[STALL] = sources["speed"]
-    if bumped := sources.get("bump", sources.get(STALL)):
-        sources[COLLISION] = bumped
+        sources[_STALL] = sources["speed"]
+    if bumped := sources.get("bump", sources.get(_STALL)):
+        sources[_COLLISION] = bumped
     for action in actions:
-        if action.propels and action.unit == QUANTITIES["speed"].unit:
+        if action.propels and action.unit == _QUANTITIES["speed"].unit:
             sources.setdefault("speed", Element("actuator", action.name))
     known = [
         Feature(name, q.unit, q.low, q.high, sources[q.measures])
-        for name, q in QUANTITIES.items()
+        for name, q in _QUANTITIES.items()
         if q.measures in sources
     ]
     known += [f for s in sensors if s.measures == TENDONS for f in _tendon_features(s)]
@@ -205,7 +199,7 @@ def with_servo_bus(
     )
 
 
-def tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
+def _tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
     """Return the tension span, N, of each action that alone pulls one tendon."""
     outputs = tuple(outputs)
     moved = [name for output in outputs for name in output.mix]
@@ -353,7 +347,7 @@ class Profile:
         `action_applied` shows the result. The action of a tendon has a gain in newtons, from its
         pretension at 0 to its largest tension at 1.
         """
-        spans = tension_spans(self.outputs)
+        spans = _tension_spans(self.outputs)
         return Layout(
             tuple(_action_feature(action, spans.get(action.name)) for action in self.actions)
         )
@@ -362,7 +356,7 @@ class Profile:
         """Return the layout of states: sensed quantities, then applied actions."""
         applied = tuple(
             Feature(
-                f"{action.name}/{APPLIED}",
+                f"{action.name}/{_APPLIED}",
                 "1",
                 0.0 if action.one_sided else -1.0,
                 1.0,
@@ -370,7 +364,7 @@ class Profile:
             )
             for action in self.actions
         )
-        return Layout((*state_features(self.sensors, self.actions, self.limits), *applied))
+        return Layout((*_state_features(self.sensors, self.actions, self.limits), *applied))
 
     def reward_weights(self) -> dict[str, float]:
         """Return the reward weights by name, as in `Welcome.reward`; booleans are 1 or 0."""

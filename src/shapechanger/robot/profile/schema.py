@@ -23,7 +23,6 @@ __all__ = [
     "DRIVING_PARTS",
     "EMERGENCY_BUTTON_KEYS",
     "ENABLE_KEYS",
-    "HIGHEST_BCM",
     "I2C_PINS",
     "JOINT_KEYS",
     "LIMIT_KEYS",
@@ -43,16 +42,14 @@ __all__ = [
     "SERVO_BUS_KEYS",
     "STOP_KEYS",
     "TABLES",
-    "UNITS",
     "Kind",
     "ProfileKey",
     "bcm",
-    "stem_of",
     "unit_of",
     "with_unit",
 ]
 
-HIGHEST_BCM: Final = 27
+_HIGHEST_BCM: Final = 27
 """Largest BCM number on the header; the smallest is 0."""
 
 BCM_OF_BOARD: Final = {
@@ -91,12 +88,12 @@ def bcm(written: object) -> int:
             number = BCM_OF_BOARD[number]
     else:
         raise ValueError
-    if not 0 <= number <= HIGHEST_BCM:
+    if not 0 <= number <= _HIGHEST_BCM:
         raise ValueError
     return number
 
 
-UNITS: Final = {
+_UNITS: Final = {
     "_deg_per_s": "degrees a second",
     "_per_s": "per second",
     "_hz": "hertz",
@@ -115,17 +112,17 @@ _OTHER_ENDS: Final = ("_deg", "_rad", "_cm", "_mm", "_km", "_mv", "_f", "_sec", 
 
 def unit_of(key: str) -> str:
     """Return the unit in the suffix of a key, in words; empty for none."""
-    return next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
+    return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
 
 
-def stem_of(key: str) -> str:
+def _stem_of(key: str) -> str:
     """Return the name of a key without its unit."""
-    return next((key.removesuffix(e) for e in (*UNITS, *_OTHER_ENDS) if key.endswith(e)), key)
+    return next((key.removesuffix(e) for e in (*_UNITS, *_OTHER_ENDS) if key.endswith(e)), key)
 
 
 def with_unit(key: str, known: Iterable[str]) -> str | None:
     """Return the known key with the same stem and another unit; None if there is none."""
-    return next((k for k in known if unit_of(k) and stem_of(k) == stem_of(key)), None)
+    return next((k for k in known if unit_of(k) and _stem_of(k) == _stem_of(key)), None)
 
 
 Kind = Literal[
@@ -141,7 +138,7 @@ NO_PIN: Final = -1
 
 _LONGEST_TEXT: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _NOT_PRINTABLE: Final = re.compile(r"[^\x20-\x7e\xa0-\U0010ffff]")
-_A_PIN: Final = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
+_A_PIN: Final = f'a BCM pin from 0 to {_HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
 
 
 @dataclass(frozen=True, slots=True)

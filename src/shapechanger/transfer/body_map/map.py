@@ -38,10 +38,10 @@ from shapechanger.transfer.body_map.rules import (
 )
 from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
-__all__ = ["BodyMap", "MapRow", "compose_entries", "invert_entries"]
+__all__ = ["BodyMap", "MapRow"]
 
 
-def compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
+def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
     """Replace each feature that `outer` copies by its rule in `inner`.
 
     Args:
@@ -61,7 +61,7 @@ def compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tup
     return tuple(result)
 
 
-def invert_entries(
+def _invert_entries(
     side: Side, entries: Sequence[MapEntry], otherwise: RuleLike
 ) -> tuple[MapEntry, ...]:
     """Return for each feature of `side.over` a rule over `side.into`.
@@ -294,8 +294,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation=following.target_observation,
             source_action=self.source_action,
             target_action=following.target_action,
-            observation=compose_entries(self.observation, following.observation),
-            action=compose_entries(following.action, self.action),
+            observation=_compose_entries(self.observation, following.observation),
+            action=_compose_entries(following.action, self.action),
         )
 
     def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
@@ -314,8 +314,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation=self.source_observation,
             source_action=self.target_action,
             target_action=self.source_action,
-            observation=invert_entries(self._observation_side, self.observation, otherwise),
-            action=invert_entries(self._action_side, self.action, otherwise),
+            observation=_invert_entries(self._observation_side, self.observation, otherwise),
+            action=_invert_entries(self._action_side, self.action, otherwise),
         )
 
     def with_symmetry(self, symmetry: Symmetry) -> BodyMap:

@@ -20,7 +20,7 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3 and sb3-contrib", "learn") from error
 
-__all__ = ["SpacesOnly", "build_model", "checked_settings", "is_class", "require_class"]
+__all__ = ["SpacesOnly", "build_model", "checked_settings", "require_class"]
 
 _SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
 # Arguments that are not settings.
@@ -45,7 +45,7 @@ def build_model(
     made = _load(settings.algorithm)
     arguments = dict(settings.model_arguments)
     try:
-        if is_class(made):
+        if _is_class(made):
             arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
             arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
             return made("MlpPolicy", envs, **arguments)
@@ -62,7 +62,7 @@ def build_model(
     return model
 
 
-def is_class(algorithm: object) -> bool:
+def _is_class(algorithm: object) -> bool:
     """Return whether this is a class of models, not a function that builds one.
 
     Args:
@@ -81,7 +81,7 @@ def require_class(algorithm: str) -> None:
         ValueError: If it is a function, or cannot be imported.
     """
     try:
-        known = is_class(_load(algorithm))
+        known = _is_class(_load(algorithm))
     except UnknownName as error:
         raise ValueError(f"its algorithm {algorithm} cannot be imported") from error
     if not known:
@@ -99,7 +99,7 @@ def checked_settings(settings: ImportedSettings) -> ImportedSettings:
         StudyError: If it can neither be called nor is a class of models.
     """
     made = _load(settings.algorithm)
-    if not callable(made) or (isinstance(made, type) and not is_class(made)):
+    if not callable(made) or (isinstance(made, type) and not _is_class(made)):
         raise StudyError(
             f"{settings.algorithm} is neither a class of models nor a function that builds one."
         )

@@ -22,7 +22,6 @@ from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, eval
 from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
 
 __all__ = [
-    "CLONE_EVALUATION_SEED",
     "DemonstrationFile",
     "Demonstrations",
     "evaluate_clone",
@@ -34,7 +33,7 @@ __all__ = [
     "train_clones",
 ]
 
-CLONE_EVALUATION_SEED = 10_000_000
+_CLONE_EVALUATION_SEED = 10_000_000
 """Seed of the first evaluation episode, the same for every run and arm."""
 
 
@@ -223,7 +222,7 @@ def evaluate_clone(
     """
     envs = evaluation_envs(env, settings)
     try:
-        return evaluate(policy.predict_many, envs, CLONE_EVALUATION_SEED, steps)
+        return evaluate(policy.predict_many, envs, _CLONE_EVALUATION_SEED, steps)
     finally:
         for one in envs:
             one.close()

@@ -148,13 +148,10 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     long as the network itself.
     """
     policy: Any = model.policy
-    space = model.action_space
-    if (
-        type(policy) is not ActorCriticPolicy
-        or type(policy.features_extractor) is not FlattenExtractor
-        or not isinstance(space, gym.spaces.Box)
-    ):
+    kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
+    if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
         return None
+    space = policy.action_space
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         with torch.no_grad():

@@ -34,7 +34,6 @@ from shapechanger.transfer.metrics.intervals import (
 __all__ = [
     "DEFAULT_THRESHOLDS",
     "MIN_HEADROOM",
-    "NO_CURVE",
     "Measures",
     "ReachTimes",
     "Summary",
@@ -49,7 +48,7 @@ __all__ = [
     "total_reward_gain",
 ]
 
-NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
+_NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
 
 _NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."
 
@@ -129,7 +128,7 @@ def total_reward_gain(
     """
     check_comparable(arm, scratch)
     if arm.n_evals == 1:
-        return undefined(NO_CURVE)
+        return undefined(_NO_CURVE)
     return estimate_difference(arm.auc(), scratch.auc(), confidence=confidence)
 
 
@@ -159,7 +158,7 @@ def auc_ratio(
     """
     check_comparable(arm, scratch)
     if arm.n_evals == 1:
-        return undefined(NO_CURVE)
+        return undefined(_NO_CURVE)
     return estimate_ratio(
         arm.auc(),
         scratch.auc(),
@@ -209,7 +208,7 @@ def forward_transfer(
                 "Forward transfer needs scores in [0, 1]: use Reference.scores(curves, clip=True)."
             )
     if arm.n_evals == 1:
-        return undefined(NO_CURVE)
+        return undefined(_NO_CURVE)
     # Gain over headroom is one minus the ratio of the two headrooms.
     left = estimate_ratio(
         1.0 - arm.auc(),
@@ -309,7 +308,7 @@ def time_to_threshold(
     if not math.isfinite(threshold):
         raise StudyError(f"A threshold must be finite, got {threshold}.")
     if arm.n_evals == 1:
-        return TimeToThreshold(threshold, None, None, undefined(NO_CURVE))
+        return TimeToThreshold(threshold, None, None, undefined(_NO_CURVE))
     arm_steps = steps_to_reach(arm, threshold)
     scratch_steps = steps_to_reach(scratch, threshold)
     saved = estimate_difference(

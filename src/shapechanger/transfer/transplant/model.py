@@ -40,7 +40,7 @@ from shapechanger.transfer.transplant.layers import (
     transplant_normalisation,
 )
 
-__all__ = ["check_supported", "new_model", "transplant"]
+__all__ = ["check_supported", "transplant"]
 
 Model = TypeVar("Model", bound=BaseAlgorithm)
 
@@ -50,7 +50,7 @@ _GIVEN_ANEW: Final = frozenset({"self", "policy", "env", "seed", "device", "_ini
 _KEPT_AS: Final = {"stats_window_size": "_stats_window_size"}
 
 
-def new_model(
+def _new_model(
     source: Model,
     env: gym.Env[Any, Any] | VecEnv,
     seed: int,
@@ -208,7 +208,7 @@ def transplant(
         outputs = squashed_outputs(body_map, source_space, target_space)
     else:
         outputs = gaussian_outputs(body_map)
-    model = new_model(source_model, target_env, seed, device or source_model.device, settings)
+    model = _new_model(source_model, target_env, seed, device or source_model.device, settings)
     sensed = _sensed(
         body_map,
         normalisation or source_model.get_vec_normalize_env(),

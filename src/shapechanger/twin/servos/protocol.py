@@ -13,9 +13,7 @@ from typing import Final, NamedTuple
 from shapechanger.twin.servos.motor import TwinModel
 
 __all__ = [
-    "ACCESS",
     "BROADCAST",
-    "LENGTH",
     "LIMIT",
     "RANGE",
     "Packet",
@@ -145,9 +143,9 @@ class Parser:
 
 
 RANGE: Final = 4
-LENGTH: Final = 5
+_LENGTH: Final = 5
 LIMIT: Final = 6
-ACCESS: Final = 7
+_ACCESS: Final = 7
 
 _EEPROM_END: Final = 64
 _MODES: Final = (0, 1, 3, 4, 5, 16)
@@ -297,7 +295,7 @@ class Table:
                 gaps between registers, so a driver must not rely on an error.)
         """
         if length == 0 or not all(at + i in self._known for i in range(length)):
-            raise TableError(ACCESS)
+            raise TableError(_ACCESS)
         return bytes(self._bytes[at : at + length])
 
     def write(self, at: int, data: bytes) -> list[int]:
@@ -314,23 +312,23 @@ class Table:
         while at < end:
             field = self._fields.get(at)
             if field is None or not field.is_writable:
-                raise TableError(ACCESS)
+                raise TableError(_ACCESS)
             if end - at < field.size:
-                raise TableError(LENGTH)
+                raise TableError(_LENGTH)
             part, data = data[: field.size], data[field.size :]
             value = int.from_bytes(part, "little", signed=field.is_signed)
             self._refuse(at, field, value)
             wanted[at] = value
             at += field.size
         if not wanted:
-            raise TableError(LENGTH)
+            raise TableError(_LENGTH)
         for address, value in wanted.items():
             self.set(address, value)
         return list(wanted)
 
     def _refuse(self, at: int, field: _Field, value: int) -> None:
         if at < _EEPROM_END and self.get(64):
-            raise TableError(ACCESS)  # Locked while torque is on.
+            raise TableError(_ACCESS)  # Locked while torque is on.
         if not field.low <= value <= field.high or (at == 11 and value not in _MODES):
             raise TableError(RANGE)
         self._check(at, value)

@@ -9,9 +9,9 @@ from shapechanger.errors import MissingExtra
 from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.world import World
 
-__all__ = ["ROOM", "Place", "open_world"]
+__all__ = ["Place", "open_world"]
 
-ROOM = (160, 120)
+_ROOM = (160, 120)
 """Width and height of the pictures of a room without a camera, in pixels."""
 
 
@@ -59,7 +59,7 @@ def open_world(
             raise MissingExtra(error.name or "mujoco", "sim") from error
         return FingerWorld(FingerParameters.from_json(place.finger), seed)
     if not place.world:
-        return DrivingWorld(frozenset(parts), size or ROOM, seed)
+        return DrivingWorld(frozenset(parts), size or _ROOM, seed)
     try:
         from shapechanger.bodies.vehicles import require_fit
         from shapechanger.worlds.simulation import MujocoWorld

@@ -17,7 +17,7 @@ from shapechanger.errors import RobotError
 from shapechanger.twin.world.room import FrontCamera, find_start, lay_out
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
-__all__ = ["DrivingWorld", "RoomVehicle", "VehicleMotion", "vehicle_for"]
+__all__ = ["DrivingWorld", "RoomVehicle", "VehicleMotion"]
 
 Outputs = Mapping[str, float | None]
 
@@ -155,7 +155,7 @@ class _Still:
         pass
 
 
-def vehicle_for(parts: Collection[str]) -> RoomVehicle:
+def _vehicle_for(parts: Collection[str]) -> RoomVehicle:
     """Return a vehicle with these parts.
 
     Raises:
@@ -212,7 +212,7 @@ class DrivingWorld:
 
     def __init__(self, parts: Collection[str], size: tuple[int, int], seed: int) -> None:
         self._parts = frozenset(parts)
-        self._vehicle = vehicle_for(self._parts)
+        self._vehicle = _vehicle_for(self._parts)
         self._camera = FrontCamera(size)
         self.resting_v = RESTING_V
         self._travelled = 0.0
@@ -232,7 +232,7 @@ class DrivingWorld:
         self._start = seed
         pose = find_start(self.room, seed)
         self._x, self._y, self._heading = pose.x, pose.y, pose.heading
-        self._vehicle = vehicle_for(self._parts)
+        self._vehicle = _vehicle_for(self._parts)
         self._speed = self._left = self._yaw_rate = 0.0
         self._acceleration = 0.0
         self._impact = self._impact_left_s = 0.0

@@ -22,10 +22,10 @@ from shapechanger.worlds.expert.recovery import Recovery
 from shapechanger.worlds.expert.traits import Traits, traits_of
 from shapechanger.worlds.world import Pose
 
-__all__ = ["CourseExpert", "Pursuit", "ThreeWay", "wrap_angle"]
+__all__ = ["CourseExpert", "Pursuit", "ThreeWay"]
 
 
-def wrap_angle(angle: float) -> float:
+def _wrap_angle(angle: float) -> float:
     """Equivalent angle from -pi to pi, rad."""
     return math.remainder(angle, 2 * math.pi)
 
@@ -69,7 +69,7 @@ class Pursuit:
             return
         dx, dy = pose.x - before.x, pose.y - before.y
         going = math.hypot(dx, dy) / self._period_s > 0.2 * self._traits.top_speed
-        now = wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
+        now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
         if abs(now) > math.pi / 3:  # Astern, or moved by hand.
             now = 0.0
         self._drift += (now - self._drift) * self._period_s / DRIFT_S
@@ -91,7 +91,7 @@ class Pursuit:
         """
         dx, dy = target[0] - pose.x, target[1] - pose.y
         distance = max(math.hypot(dx, dy), 0.1)
-        angle = wrap_angle(math.atan2(dy, dx) - pose.heading)
+        angle = _wrap_angle(math.atan2(dy, dx) - pose.heading)
         match self._traits.drive:
             case "wheels":
                 return self._clipped(-self._curvature(angle, distance) / self._traits.turn)
@@ -104,7 +104,7 @@ class Pursuit:
                 value += self._traits.dead * max(-1.0, min(1.0, rate / STICKING))
                 return self._clipped(-value)
             case "rudder":
-                angle = wrap_angle(angle - self._drift)
+                angle = _wrap_angle(angle - self._drift)
                 rate = 1.6 * angle
                 water = max(speed, 0.3 * self._traits.top_speed)
                 return self._clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
@@ -226,7 +226,7 @@ class CourseExpert:
         self._station = spot.station
         look = self._pursuit.look(speed)
         target = self.path.ahead(spot.station, look)
-        angle = wrap_angle(math.atan2(target[1] - soon.y, target[0] - soon.x) - soon.heading)
+        angle = _wrap_angle(math.atan2(target[1] - soon.y, target[0] - soon.x) - soon.heading)
         back = self._recovery.action(angle)
         if back is None:
             steering = self._pursuit.steering(soon, speed, yaw_rate, target)

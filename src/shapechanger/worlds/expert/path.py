@@ -22,7 +22,7 @@ from shapechanger.worlds.expert.lattice import ClearanceField, Lattice, cheapest
 from shapechanger.worlds.expert.line import ClosedLine, Spot
 from shapechanger.worlds.expert.traits import Traits
 
-__all__ = ["SPACING_M", "CoursePath", "least_bent", "plan_path", "plan_path_for", "speed_profile"]
+__all__ = ["CoursePath", "plan_path", "plan_path_for", "speed_profile"]
 
 ROUNDS: Final = 150
 RELAXATION: Final = 1.6
@@ -30,7 +30,7 @@ RELAXATION: Final = 1.6
 Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3)."""
 
 
-def least_bent(
+def _least_bent(
     middle: NDArray[np.float64],
     left: NDArray[np.float64],
     low: NDArray[np.float64],
@@ -82,11 +82,11 @@ def least_bent(
     return np.clip(bounded, low, high)
 
 
-SPACING_M: Final = 0.1
+_SPACING_M: Final = 0.1
 """Approximate distance between the points of a path, m."""
 
 PULL: Final = 0.02
-"""Weight of the preferred offsets, 1/m^4; see `least_bent`."""
+"""Weight of the preferred offsets, 1/m^4; see `_least_bent`."""
 
 ATTEMPTS: Final = 8
 """Number of attempts to push a line away from obstacles."""
@@ -214,7 +214,7 @@ def _smoothed(
     extra = np.zeros(len(way))
     for _ in range(ATTEMPTS):
         low, high = _room(lattice, way, least, comfort, extra)
-        offsets = least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], PULL)
+        offsets = _least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], PULL)
         path = _splined(lattice.middle + offsets[:, None] * lattice.left, obstacles)
         short = least - path.clearance
         if short.max() <= 0:
@@ -278,7 +278,7 @@ def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePat
     spline = CubicSpline(chords, closed, bc_type="periodic")
     # Even steps of the parameter are only approximately even along the line.
     around = float(chords[-1])
-    count = max(round(around / SPACING_M), 8)
+    count = max(round(around / _SPACING_M), 8)
     fine = np.linspace(0.0, around, 4 * count + 1)
     arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
     even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)

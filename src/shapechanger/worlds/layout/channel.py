@@ -35,7 +35,7 @@ from shapechanger.worlds.layout.geometry import (
     wall_segments,
 )
 
-__all__ = ["QUAY_M", "BankKind", "ChannelShape", "build_banks", "dig_channel", "harbour", "yard"]
+__all__ = ["BankKind", "ChannelShape", "build_banks", "harbour", "yard"]
 
 _FINE: Final = 1024
 """Number of points of the route while it is shaped."""
@@ -91,7 +91,7 @@ class BankKind:
     rough: float = 0.0
 
 
-def dig_channel(
+def _dig_channel(
     rng: np.random.Generator, shape: ChannelShape, spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Try to lay out a route.
@@ -212,7 +212,7 @@ def _bank(
     )
 
 
-QUAY_M: Final = 0.6
+_QUAY_M: Final = 0.6
 """Height of a quay above the water, m."""
 
 _SPACING_M: Final = 0.1
@@ -285,7 +285,7 @@ _HARBOUR: Final = _OpenWorld(
     ),
     half_width=(2.0, 3.5),
     banks=(
-        BankKind("quay", 0.7, (5.0, 16.0), 2.0, (QUAY_M, QUAY_M)),
+        BankKind("quay", 0.7, (5.0, 16.0), 2.0, (_QUAY_M, _QUAY_M)),
         BankKind("rock", 0.3, (2.5, 8.0), 0.8, (0.35, 0.9), rough=0.35),
     ),
     obstacles=(
@@ -311,7 +311,7 @@ def harbour(rng: np.random.Generator, seed: int) -> Course | None:
 
 
 def _lay_out(world: _OpenWorld, rng: np.random.Generator, seed: int) -> Course | None:
-    channel = dig_channel(rng, world.shape, _SPACING_M)
+    channel = _dig_channel(rng, world.shape, _SPACING_M)
     if channel is None:
         return None
     lane = Lane(channel[0], *build_banks(rng, *channel, world.banks))

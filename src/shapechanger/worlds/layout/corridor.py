@@ -19,7 +19,7 @@ from shapechanger.worlds.layout.geometry import (
     trace_outline,
 )
 
-__all__ = ["CEILING_M", "DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panel_walls"]
+__all__ = ["DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panel_walls"]
 
 DOOR_M: Final = 0.9
 """Width of a door without its frame, m."""
@@ -110,7 +110,7 @@ def _wall(start: _Point, end: _Point, height: float, surface: Surface) -> Wall:
     return Wall((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), height, surface)
 
 
-CEILING_M: Final = 2.5
+_CEILING_M: Final = 2.5
 """Height of the ceiling, and of every wall."""
 
 _PITCH_M = (4.0, 6.0)
@@ -153,8 +153,8 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
     reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
     turns = _turns(corners)
     # Walls have the lane on their left: the right one runs forwards, the left one backwards.
-    right = panel_walls(rng, corners - reach, -turns, CEILING_M)
-    left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], CEILING_M)
+    right = panel_walls(rng, corners - reach, -turns, _CEILING_M)
+    left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], _CEILING_M)
     lane = Lane(route, left, right)
     half_width = lane.half_width()
     obstacles = LaneObstacles(lane, half_width, _GAP_M)
@@ -168,7 +168,7 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
         walls=(*left, *right),
         obstacles=tuple(obstacles.obstacles),
         lamps=_lamps(rng, corners, widths),
-        ceiling_m=CEILING_M,
+        ceiling_m=_CEILING_M,
         gap_m=obstacles.gap_m,
     )
 

@@ -22,22 +22,16 @@ from shapechanger.worlds.scene.surfaces import (
 )
 
 __all__ = [
-    "GROUND_AFFINITY",
-    "GROUND_TYPE",
-    "HIDDEN",
-    "SOLID_AFFINITY",
-    "SOLID_TYPE",
-    "add_collision",
     "add_course",
 ]
 
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
-SOLID_TYPE: Final = 1
-SOLID_AFFINITY: Final = 2
-GROUND_TYPE: Final = 4
-GROUND_AFFINITY: Final = 8
+_SOLID_TYPE: Final = 1
+_SOLID_AFFINITY: Final = 2
+_GROUND_TYPE: Final = 4
+_GROUND_AFFINITY: Final = 8
 
-HIDDEN: Final = 3
+_HIDDEN: Final = 3
 """Group of the collision geoms; MuJoCo renders groups 0 to 2."""
 
 # Thickness of a wall behind its visible side, m: thinner than a partition, and more than a vehicle
@@ -50,7 +44,7 @@ _DEFAULT_FRICTION: Final = 0.8
 _WALL_FRICTION: Final = 0.3
 
 
-def add_collision(spec: mujoco.MjSpec, course: Course) -> None:
+def _add_collision(spec: mujoco.MjSpec, course: Course) -> None:
     """Add the collision geoms "world/ground", "world/wall/0" ... and "world/thing/0" ...."""
     body = spec.worldbody
     body.add_geom(
@@ -58,9 +52,9 @@ def add_collision(spec: mujoco.MjSpec, course: Course) -> None:
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0.0, 0.0, 1.0],  # Infinite.
         friction=[_GROUND_FRICTION.get(course.world, _DEFAULT_FRICTION), 0.005, 0.0001],
-        contype=GROUND_TYPE,
-        conaffinity=GROUND_AFFINITY,
-        group=HIDDEN,
+        contype=_GROUND_TYPE,
+        conaffinity=_GROUND_AFFINITY,
+        group=_HIDDEN,
     )
     for number, wall in enumerate(course.walls):
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
@@ -107,9 +101,9 @@ def _add_solid(
         pos=place,
         quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
         friction=[_WALL_FRICTION, 0.005, 0.0001],
-        contype=SOLID_TYPE,
-        conaffinity=SOLID_AFFINITY,
-        group=HIDDEN,
+        contype=_SOLID_TYPE,
+        conaffinity=_SOLID_AFFINITY,
+        group=_HIDDEN,
     )
 
 
@@ -135,7 +129,7 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
         look: Light and colours.
     """
     _set_camera(spec)
-    add_collision(spec, course)
+    _add_collision(spec, course)
     light = Light(course, look)
     mirrored = look.gloss > 0.0
     walls, plain = look.tone(look.wall), look.tone()

@@ -40,7 +40,7 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = ["Ramp", "ServoBus", "check_servos", "enable_torque", "prepare_servo", "watchdog_steps"]
+__all__ = ["Ramp", "ServoBus"]
 
 
 class Ramp:
@@ -82,12 +82,12 @@ class Ramp:
         return min(1.0, 1.0 - gone_ns / self._ramp_ns)
 
 
-def watchdog_steps(bus: BusSettings) -> int:
+def _watchdog_steps(bus: BusSettings) -> int:
     """Return the time of the watchdog in steps of 20 ms."""
     return bus.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
 
 
-def check_servos(registers: RegisterBus, bus: BusSettings) -> None:
+def _check_servos(registers: RegisterBus, bus: BusSettings) -> None:
     """Check that every servo answers and has the right model.
 
     Raises:
@@ -116,7 +116,7 @@ def check_servos(registers: RegisterBus, bus: BusSettings) -> None:
             )
 
 
-def prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
+def _prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
     """Prepare a servo: current mode, its current limit, no goal, and no torque.
 
     Raises:
@@ -137,10 +137,10 @@ def prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings
     _ensure(registers, servo, CURRENT_LIMIT, servo.most_counts)
     # A change of mode sets the goal to the limit.
     registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
 
 
-def enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
+def _enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
     """Enable the torque of a servo, with a goal of 0 and a running watchdog.
 
     Raises:
@@ -148,7 +148,7 @@ def enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings
     """
     registers.write(servo.id, BUS_WATCHDOG, 0)
     registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, watchdog_steps(bus))
+    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
     registers.write(servo.id, TORQUE_ENABLE, 1)
 
 
@@ -220,9 +220,9 @@ class ServoBus:
         self._mode, self._ramp, self._gone, self._is_ready = "off", None, "", False
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
-        check_servos(self._registers, self._settings)
+        _check_servos(self._registers, self._settings)
         for servo in self._settings.servos:
-            prepare_servo(self._registers, self._settings, servo)
+            _prepare_servo(self._registers, self._settings, servo)
         self._poller.suspects.clear()
         for health in self._health.values():
             health.clear()
@@ -241,7 +241,7 @@ class ServoBus:
         self._goals = dict.fromkeys(self._ids, 0)
         try:
             for servo in self._settings.servos:
-                enable_torque(self._registers, self._settings, servo)
+                _enable_torque(self._registers, self._settings, servo)
         except RobotError:
             self.release()
             raise

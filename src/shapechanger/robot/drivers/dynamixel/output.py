@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # They need the SDK, which is loaded when a bus is opened.
     from shapechanger.robot.drivers.dynamixel.bus import ServoBus
     from shapechanger.robot.drivers.dynamixel.health import BusState
 
-__all__ = ["SharedBus", "TendonOutput", "bus_at", "join_bus", "open_driver"]
+__all__ = ["SharedBus", "TendonOutput", "bus_at", "open_driver"]
 
 
 class SharedBus:
@@ -140,7 +140,7 @@ class SharedBus:
 _OPEN: Final[dict[tuple[int, str], tuple[Hardware, SharedBus]]] = {}
 
 
-def join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSettings]:
+def _join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSettings]:
     """Add the servo of an output to its bus, and return both.
 
     Raises:
@@ -183,7 +183,7 @@ class TendonOutput:
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         self.device: SharedBus
-        self.device, servo = join_bus(plan, hardware)
+        self.device, servo = _join_bus(plan, hardware)
         self._name = plan.name
         self._least_n, self._most_n = servo.pretension_n, servo.most_tension_n
 

@@ -20,7 +20,6 @@ __all__ = [
     "ServoModel",
     "ServoSettings",
     "bus_settings",
-    "model_named",
     "servo_settings",
 ]
 
@@ -82,7 +81,7 @@ MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for on
 """Models that the driver supports, by name."""
 
 
-def model_named(name: str) -> ServoModel:
+def _model_named(name: str) -> ServoModel:
     """Return a model by its name.
 
     Raises:
@@ -131,7 +130,7 @@ class ServoSettings:
     shortest_m: float = -0.06  # Chosen: the longest excursion of a finger's tendon is 42 mm.
 
     def __post_init__(self) -> None:
-        known = model_named(self.model)
+        known = _model_named(self.model)
         if not 0 <= self.id <= _MOST_ID:
             self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
         if self.direction not in (1, -1):
@@ -162,7 +161,7 @@ class ServoSettings:
     @property
     def known(self) -> ServoModel:
         """Model of the servo."""
-        return model_named(self.model)
+        return _model_named(self.model)
 
     @property
     def newton_metre_per_ampere(self) -> float:
