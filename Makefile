@@ -17,7 +17,8 @@ RUN := $(BIN)/python
 # Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
-PYTEST := $(RUN) -m pytest -n $(JOBS)
+# Tests of one module stay together, so that its fixtures are made once.
+PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.
 COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector identify laws \

@@ -178,7 +178,7 @@ def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
     learner = learner_of(plan.learner, plan.settings)
     shares: list[NDArray[np.float64]] = []
     for index in range(plan.seeds):
-        act = learner.load(policy_path(plan, folder, Run(SOURCE, index))).act
+        act = learner.load(policy_path(folder, Run(SOURCE, index))).act
         env: Any = plan.task.source.make()
         data, model = env.unwrapped.data, env.unwrapped.model
         limbs = [int(model.actuator(i).name.rpartition("_")[2]) - 1 for i in range(model.nu)]

@@ -91,7 +91,7 @@ class _Round:
         return out
 
     def _trained(self, name: str, data: Path) -> Path:
-        out = self._folder / f"{name}.zip"
+        out = self._folder / f"{name}.safetensors"
         seed = ["--seed", str(self._seed)]
         _once(out, ["train", str(data), "--out", str(out), "--held-out", "0", *seed])
         return out

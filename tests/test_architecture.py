@@ -44,6 +44,7 @@ _RULES = {
     "errors": _Rule(_names("layout link"), _names("numpy msgspec")),
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
+    "tensor_file": _Rule(_names("errors"), _names("numpy msgspec safetensors")),
     # The OpenGL library to draw with.
     "rendering": _Rule(_names("errors")),
     # Models and edits: no environment, no reward, no robot.
@@ -62,7 +63,8 @@ _RULES = {
     ),
     # Transfer cannot tell a simulator from a robot. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors layout tasks demos shapechanger"), never=_HARDWARE | _SIMULATORS
+        _names("errors layout tasks demos shapechanger tensor_file"),
+        never=_HARDWARE | _SIMULATORS,
     ),
     "reports": _Rule(
         _names("errors layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
@@ -75,7 +77,7 @@ _RULES = {
     "twin": _Rule(_names("errors layout link robot remote morphology bodies tasks worlds")),
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
-    "demos": _Rule(_names("errors layout"), never=_HARDWARE | _SIMULATORS | {"socket"}),
+    "demos": _Rule(_names("errors layout tensor_file"), never=_HARDWARE | _SIMULATORS | {"socket"}),
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
         _names("errors layout link morphology bodies tasks envs transfer robot remote twin")

@@ -18,7 +18,7 @@ from shapechanger.demos.episodes import episodes_of, read_episode
 def test_the_loop_goes_round(tmp_path: Path) -> None:
     """What the expert corrected is learned from, and changes what the policy does."""
     shown, corrected, both = (str(tmp_path / name) for name in ("shown", "corrected", "both"))
-    first, second = (str(tmp_path / name) for name in ("first.zip", "second.zip"))
+    first, second = (str(tmp_path / name) for name in ("first.safetensors", "second.safetensors"))
     drive = ["demos", "record", "Car", "--minutes", "0.5", "--episode-s", "10", "--put-back"]
     main([*drive, "--out", shown])
     main(["demos", "train", shown, "--out", first, "--held-out", "0"])

@@ -234,7 +234,10 @@ def test_play_makes_a_film_where_there_is_no_screen(
             ["transfer", "Finger", "RemoteFinger", "--target-options", '{"twin": "rael"}'],
             "real-like",
         ),
-        (["play", "Ant", "--policy", "none.zip"], "There is no policy file none.zip"),
+        (
+            ["play", "Ant", "--policy", "none.safetensors"],
+            "There is no policy file none.safetensors",
+        ),
         (["play", "Ant", "--episodes", "0"], "at least one episode"),
         (["play", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
         (["train", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
@@ -275,7 +278,7 @@ def test_nonsense_gets_one_sentence(
     "arguments",
     [
         ["train", "Ant", "--tensorboard", "file"],
-        ["train", "Ant", "--out", "file/policy.zip"],
+        ["train", "Ant", "--out", "file/policy.safetensors"],
         ["play", "Ant", "--out", "file/film.mp4"],
     ],
 )

@@ -172,7 +172,7 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
         assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
     assert [e.steps for e in study.of("source")[0].curve] == [0, 60]
     assert set(study.summaries) == {"zero-shot", "fine-tune"}
-    policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.zip")
+    policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.safetensors")
     again = evaluate_clone(SLIPPERY, policy, TINY_CLONING).mean_return
     assert again == study.of("scratch")[0].curve[-1].mean_return
 

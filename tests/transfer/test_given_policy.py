@@ -44,8 +44,8 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         demonstrations=DemonstrationFile(folder / "shown.npz", 3),
         on_evaluation=lambda evaluation: None,
     )
-    policy.save(folder / "dry.zip")
-    return folder / "dry.zip"
+    policy.save(folder / "dry.safetensors")
+    return folder / "dry.safetensors"
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_a_study_goes_on_with_the_clone_it_was_planned_with(
     clone_file: Path, tmp_path: Path
 ) -> None:
     """Another file is another study."""
-    other = tmp_path / "other.zip"
+    other = tmp_path / "other.safetensors"
     CameraPolicy.load(clone_file).described(command="again").save(other)
     with pytest.raises(StudyError, match="not the one that this study was planned with"):
         run_study(_plan(clone_file), tmp_path / "study", source_policy=other, executor=Serial())
@@ -111,7 +111,9 @@ def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Pat
 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
     """One sentence says which learners take it."""
-    with pytest.raises(StudyError, match=r"dry\.zip is a clone, and tiny does not learn from pict"):
+    with pytest.raises(
+        StudyError, match=r"dry\.safetensors is a clone, and tiny does not learn from pict"
+    ):
         tiny_plan(source_policy=clone_file)
 
 
@@ -136,24 +138,24 @@ def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
 @pytest.mark.parametrize("data", [{}, {"env": DRY.id, "arguments": {}}, {"env": 5}])
 def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
     """Such as one that was made from recorded pictures alone."""
-    path = tmp_path / "found.zip"
+    path = tmp_path / "found.safetensors"
     CameraPolicy.fresh(QUICK_CLONING.clone, 0).described(**data).save(path)
-    with pytest.raises(StudyError, match=r"card of .*found\.zip lacks the demonstrations"):
+    with pytest.raises(StudyError, match=r"card of .*found\.safetensors lacks the demonstrations"):
         _plan(path)
 
 
 def test_what_is_no_policy_is_refused(clone_file: Path, tmp_path: Path) -> None:
     """A file that is not there, that is something else, and half of one."""
-    with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.zip"):
-        _plan(tmp_path / "none.zip")
-    (tmp_path / "text.zip").write_text("not at all")
-    with pytest.raises(CorruptStudy, match=r"text\.zip is not a policy"):
-        _plan(tmp_path / "text.zip")
-    (tmp_path / "half.zip").write_bytes(clone_file.read_bytes()[:5000])
-    with pytest.raises(CorruptStudy, match=r"half\.zip is not a policy"):
-        _plan(tmp_path / "half.zip")
+    with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.safetensors"):
+        _plan(tmp_path / "none.safetensors")
+    (tmp_path / "text.safetensors").write_text("not at all")
+    with pytest.raises(CorruptStudy, match=r"text\.safetensors is not a policy"):
+        _plan(tmp_path / "text.safetensors")
+    (tmp_path / "half.safetensors").write_bytes(clone_file.read_bytes()[:5000])
+    with pytest.raises(PolicyError, match=r"half\.safetensors is not a cloned policy"):
+        _plan(tmp_path / "half.safetensors")
     damaged = bytearray(clone_file.read_bytes())
-    damaged[2000] ^= 0xFF
-    (tmp_path / "damaged.zip").write_bytes(damaged)
-    with pytest.raises((PolicyError, CorruptStudy), match=r"damaged\.zip"):
-        _plan(tmp_path / "damaged.zip")
+    damaged[-2000] ^= 0xFF
+    (tmp_path / "damaged.safetensors").write_bytes(damaged)
+    with pytest.raises(PolicyError, match=r"damaged\.safetensors"):
+        _plan(tmp_path / "damaged.safetensors")

@@ -29,7 +29,7 @@ def files(
     folder = tmp_path_factory.mktemp("onnx")
     plan = tiny_plan(request.param, arms=("scratch", "fine-tune"), steps=32, source_steps=32)
     run_study(plan, folder / "study", executor=Serial())
-    policy = policy_path(plan, folder / "study", Run("fine-tune", 0))
+    policy = policy_path(folder / "study", Run("fine-tune", 0))
     export_onnx(load_policy(policy), folder / "policy.onnx")
     return policy, folder / "policy.onnx"
 

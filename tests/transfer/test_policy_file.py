@@ -94,7 +94,9 @@ def test_shipped_policies_load(path: Path) -> None:
     assert np.abs(policy.act(seen)).max() <= 1.0
 
 
-@pytest.mark.parametrize("path", sorted(SHIPPED.glob("vehicle/clones/*.zip")), ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path", sorted(SHIPPED.glob("vehicle/clones/*.safetensors")), ids=lambda p: p.stem
+)
 def test_shipped_clones_load(path: Path) -> None:
     """Their weights are read without unpickling."""
     assert load_clone(path).card.framing.width > 0

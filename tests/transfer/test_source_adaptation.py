@@ -77,7 +77,7 @@ def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> N
     }
     assert sources["randomised"] == {"id": FINGER.id, "kwargs": {"gap": "wide"}}
     assert sources["identified"]["kwargs"]["parameters"]["tendon_friction"] == 0.25
-    assert all(policy_path(made.plan, out, Run(kind, 1)).exists() for kind in sources)
+    assert all(policy_path(out, Run(kind, 1)).exists() for kind in sources)
     assert made.plan.task.source == FINGER
 
 

@@ -148,7 +148,7 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
     """Ant to ExtendedAnt: more senses, more motors, one command."""
     task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     plan = tiny_plan(
-        TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, steps=32
+        TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, seeds=1, steps=32
     )
     study = run_study(plan, tmp_path / "study", executor=Serial())
     for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
@@ -160,7 +160,7 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
 
 def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: Path) -> None:
     """With a source policy no source is trained, and every seed starts from that policy."""
-    policy = policy_path(finished[0].plan, finished[1], Run("source", 0))
+    policy = policy_path(finished[1], Run("source", 0))
     plan = tiny_plan(source_policy=policy)
     study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
     assert not study.of("source")
@@ -172,14 +172,14 @@ def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: P
         run_study(
             plan,
             tmp_path / "study",
-            source_policy=policy_path(finished[0].plan, finished[1], Run("source", 1)),
+            source_policy=policy_path(finished[1], Run("source", 1)),
         )
 
 
 def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
     """A pendulum's policy is no source for an ant."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
-    policy = policy_path(finished[0].plan, finished[1], Run("source", 0))
+    policy = policy_path(finished[1], Run("source", 0))
     with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
         tiny_plan(task=ants, source_policy=policy)
 

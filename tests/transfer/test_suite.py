@@ -120,7 +120,7 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
     for name in _names("source"):
         taken_over = files_of(here / "runs" / name)
         assert taken_over == files_of(there / "runs" / name)
-        assert set(taken_over) == {"curve.jsonl", "policy.zip", "run.json"}
+        assert set(taken_over) == {"curve.jsonl", "policy.safetensors", "run.json"}
     shown = {path.name: path.read_bytes() for path in (here / "demonstrations").iterdir()}
     assert set(shown) == {"source-0.npz", "source-1.npz"}
     for name, content in shown.items():
@@ -195,7 +195,7 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
 
     def full(theirs: Path, mine: Path) -> None:
         mine.mkdir(parents=True)
-        for name in ("run.json", "policy.zip"):
+        for name in ("run.json", "policy.safetensors"):
             (mine / name).write_bytes((theirs / name).read_bytes()[:100])
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -87,7 +87,7 @@ def _scenes(study: Study, folder: Path) -> list[_Scene]:
     scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
-        return learner.load(policy_path(plan, folder, run)).act
+        return learner.load(policy_path(folder, run)).act
 
     has_source = bool(study.of(SOURCE))
     if has_source:

@@ -40,7 +40,7 @@ class Train:
     body: str = ""
     """Another body of the family: its name, or edits as JSON."""
     out: Path | None = None
-    """The file to write; results/policies/ENV.safetensors if not given, ENV.zip for a clone."""
+    """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
     """Env steps; the learner's own number if not given."""
     learner: str | None = None
@@ -73,8 +73,7 @@ class Train:
         )
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
-        suffix = ".safetensors" if isinstance(settings, Sb3Settings) else ".zip"
-        out = self.out or Path("results", "policies", env.id.split("/")[-1] + suffix)
+        out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
         # The policy is written last; check first that it can be.
         with opened(env) as made:
             learner_of(learner, settings).require(env, env_traits(made))

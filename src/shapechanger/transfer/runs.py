@@ -86,7 +86,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
         CorruptStudy: If its file cannot be read or belongs to another run.
     """
     path = run.folder(study) / _RESULT
-    if not path.exists() or (plan.trains(run.kind) and not policy_path(plan, study, run).exists()):
+    if not path.exists() or (plan.trains(run.kind) and not policy_path(study, run).exists()):
         return None
     remedy = f"delete {path.parent} to repeat that run"
     result = read_json(path, RunResult, remedy)
@@ -159,7 +159,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         else:
             policy = load_method(run.kind).learn(context)
         if policy is not None:
-            context.learner.save(policy, policy_path(plan, Path(study), run))
+            context.learner.save(policy, policy_path(Path(study), run))
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
     write_json(folder / _RESULT, result)
 
@@ -178,7 +178,7 @@ def _method_run(
     done = 0
 
     def source_policy() -> object:
-        return learner.load(given or policy_path(plan, study, Run(SOURCE, run.index)))
+        return learner.load(given or policy_path(study, Run(SOURCE, run.index)))
 
     def train(
         env: EnvRef,
@@ -245,13 +245,11 @@ def _ignore(evaluation: Evaluation) -> None:
     pass
 
 
-def policy_path(plan: Plan, study: Path, run: Run) -> Path:
+def policy_path(study: Path, run: Run) -> Path:
     """Return the policy file of a run.
 
     Args:
-        plan: Plan of the study.
         study: Folder of the study.
         run: The run.
     """
-    of_sb3 = isinstance(plan.settings, Sb3Settings)
-    return run.folder(study) / ("policy.safetensors" if of_sb3 else "policy.zip")
+    return run.folder(study) / "policy.safetensors"

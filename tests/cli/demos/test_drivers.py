@@ -26,7 +26,6 @@ def clone(path: Path, **changes: Any) -> str:
         framing=Framing(),
         channels=(4,),
         features=8,
-        format=2,
         eyes="none",
         nerves=(8,),
         action_layout=env.action_layout,
@@ -42,7 +41,7 @@ def clone(path: Path, **changes: Any) -> str:
 def test_a_policy_gets_the_part_that_it_takes(shows: Shows, tmp_path: Path) -> None:
     """A state alone, or out of a Dict; its actions fit the env."""
     env = CorridorEnv(shows)
-    pilot = pilot_of(env, clone(tmp_path / "policy.zip"), "", 0)
+    pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), "", 0)
     pilot.begin()
     decision = pilot.decide(env.reset(seed=0)[0])
     assert decision.driver == "policy"
@@ -54,7 +53,7 @@ def test_a_policy_gets_the_part_that_it_takes(shows: Shows, tmp_path: Path) -> N
 def test_a_policy_that_is_corrected_has_the_expert_of_the_env(tmp_path: Path) -> None:
     """A world that tells nothing is no danger."""
     env = CorridorEnv("both")
-    pilot = pilot_of(env, clone(tmp_path / "policy.zip"), "expert", 0)
+    pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), "expert", 0)
     assert isinstance(pilot, CorrectedPilot)
     pilot.begin()
     assert pilot.decide(env.reset(seed=0)[0]).driver == "policy"
@@ -63,11 +62,11 @@ def test_a_policy_that_is_corrected_has_the_expert_of_the_env(tmp_path: Path) ->
 def test_what_feels_or_sees_something_else_is_refused(tmp_path: Path) -> None:
     """With both sides in the sentence."""
     other = Layout((Feature("way", "m"), Feature("heat", "K")))
-    policy = clone(tmp_path / "other.zip", state_layout=other)
+    policy = clone(tmp_path / "other.safetensors", state_layout=other)
     with pytest.raises(PolicyError, match=r"heat.*battery"):
         pilot_of(CorridorEnv("both"), policy, "", 0)
     with pytest.raises(PolicyError, match=r"battery.*gets none"):
-        pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.zip"), "", 0)
+        pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.safetensors"), "", 0)
     from shapechanger.envs.vehicle.drivers import CLONES
 
     with pytest.raises(DemosError, match="drives by pictures"):

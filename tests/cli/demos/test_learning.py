@@ -42,10 +42,10 @@ def test_a_recording_becomes_a_policy_with_a_report(
 ) -> None:
     """The last line of the other command is its accuracy; all files are there, and no others."""
     data = _record(tmp_path / "drive", 150, 0)
-    out = tmp_path / "made" / "policy.zip"
+    out = tmp_path / "made" / "policy.safetensors"
     TrainClone(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
     made = sorted(path.name for path in out.parent.iterdir())
-    assert made == ["policy.html", "policy.json", "policy.zip", "ppo.zip"]
+    assert made == ["policy.html", "policy.json", "policy.safetensors", "ppo.zip"]
     page = out.with_suffix(".html").read_text()
     assert page.count("data:image/png;base64,") == 12
     assert "http" not in page.replace("http://www.w3.org", "")
@@ -70,7 +70,7 @@ def test_numbers_end_with_the_accuracy_too(
     """With errors in place of a calibration; whole episodes judge, if asked for."""
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
-    out = tmp_path / "policy.zip"
+    out = tmp_path / "policy.safetensors"
     TrainClone(data, out, split="episode", sac=tmp_path / "sac.zip").run()
     assert CameraPolicy.load(out).card.data["learned"] == 90
     text = capsys.readouterr().out
@@ -86,19 +86,19 @@ def test_what_cannot_be_done_is_said_before_the_work(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="it is a folder"):
         TrainClone(data, tmp_path / "taken").run()
     with pytest.raises(OutputError, match="two files"):
-        TrainClone(data, tmp_path / "p.zip", sac=tmp_path / "p.zip").run()
+        TrainClone(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
     with pytest.raises(CloningError, match="one episode only"):
-        TrainClone(data, tmp_path / "p.zip", split="episode").run()
+        TrainClone(data, tmp_path / "p.safetensors", split="episode").run()
     with pytest.raises(DemosError):
-        TrainClone(tmp_path / "nowhere", tmp_path / "p.zip").run()
+        TrainClone(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
     with pytest.raises(PolicyError, match="no policy file"):
-        Evaluate(tmp_path / "p.zip", data).run()
-    assert not (tmp_path / "p.zip").exists()
+        Evaluate(tmp_path / "p.safetensors", data).run()
+    assert not (tmp_path / "p.safetensors").exists()
 
 
 def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
     """In one sentence."""
     policy = CameraPolicy.fresh(QUICK, 0)
-    policy.save(tmp_path / "p.zip")
+    policy.save(tmp_path / "p.safetensors")
     with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):
-        Evaluate(tmp_path / "p.zip", _record(tmp_path / "drive", 10, 0)).run()
+        Evaluate(tmp_path / "p.safetensors", _record(tmp_path / "drive", 10, 0)).run()

@@ -68,7 +68,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
         (["Cor"], "Did you mean 'Car'"),
         (["Car", "--minutes", "0"], "--minutes is more than 0"),
         (["Car", "--driver", "expret"], "no driver 'expret'"),
-        (["Car", "--driver", "text.zip"], "not a policy"),
+        (["Car", "--driver", "text.safetensors"], "not a policy"),
         (["Car", "--corrected-by", "expert"], "needs no correction"),
         (["Car", "--corrected-by", "me"], "corrected by expert"),
         (["Car", "--options", "{"], "must be JSON"),
@@ -88,7 +88,7 @@ def test_what_cannot_be_recorded_is_one_sentence(
 ) -> None:
     """And nothing is left behind."""
     monkeypatch.chdir(tmp_path)
-    Path("text.zip").write_text("text")
+    Path("text.safetensors").write_text("text")
     assert words in refused(capsys, "record", *arguments, "--out", "data")
     assert not Path("data").exists()
 

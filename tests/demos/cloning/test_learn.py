@@ -47,8 +47,8 @@ def test_an_action_comes_in_the_order_of_its_layout(keys: tuple[CameraPolicy, Tr
 def test_it_comes_back_from_its_file(keys: tuple[CameraPolicy, Training], tmp_path: Path) -> None:
     """With all of its networks, its classes and its layouts."""
     policy, _ = keys
-    policy.save(tmp_path / "keys.zip")
-    again = CameraPolicy.load(tmp_path / "keys.zip")
+    policy.save(tmp_path / "keys.safetensors")
+    again = CameraPolicy.load(tmp_path / "keys.safetensors")
     pictures = stripes(20, 2).pictures
     np.testing.assert_array_equal(again.outputs(pictures), policy.outputs(pictures))
     assert again.card == policy.card

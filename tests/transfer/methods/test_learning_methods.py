@@ -40,8 +40,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
-    made, out = study
-    return dict(load_policy(policy_path(made.plan, out, Run(kind, 0))).model.policy.state_dict())
+    _, out = study
+    return dict(load_policy(policy_path(out, Run(kind, 0))).model.policy.state_dict())
 
 
 def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
@@ -88,7 +88,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         run_study(plan, out, executor=Serial())
 
         def acts(kind: str, out: Path = out) -> Any:
-            return load_policy(policy_path(plan, out, Run(kind, 0))).act
+            return load_policy(policy_path(out, Run(kind, 0))).act
 
         shown = MappedTeacher(acts("source"), plan.body_map)(observations)
         away.append(float(np.abs(acts("kickstart")(observations) - shown).mean()))

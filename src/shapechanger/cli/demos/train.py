@@ -36,7 +36,7 @@ class TrainClone:
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, one episode of it, or anything that `demos import` reads."""
     out: Path
-    """The file to write, such as policy.zip; policy.html and policy.json come beside it."""
+    """The file to write, such as policy.safetensors; policy.html and policy.json come beside it."""
     head: Literal["auto", "class", "regression"] = "auto"
     """Output: one of the demonstrated actions (at most 16), or numbers."""
     inputs: Literal["auto", "picture", "state", "both"] = "auto"

@@ -11,10 +11,7 @@ from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyErr
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Layout
 
-__all__ = ["FORMATS", "CloneCard", "Head"]
-
-FORMATS: Final = (1, 2)
-"""Supported versions of the file; version 1 holds steering and throttle from pictures only."""
+__all__ = ["CloneCard", "Head"]
 
 Head = Literal["regression", "class"]
 """Kind of output: continuous actions, or a choice among the actions that were demonstrated."""
@@ -36,7 +33,6 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         data: Origin of the demonstrations, as given by the caller.
         command: Command that trained the policy.
         version: Version of Shapechanger.
-        format: Version of the file.
         eyes: Input of the first layer: "colours" or "edges" of a picture; "none" without pictures.
         nerves: Widths of the layers for the state; () without a state.
         members: Number of networks whose outputs are averaged.
@@ -60,7 +56,6 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     data: dict[str, Any] = {}
     command: str = ""
     version: str = msgspec.field(default_factory=lambda: version("shapechanger"))
-    format: int = 1
     eyes: Literal["colours", "edges", "none"] = "colours"
     nerves: tuple[int, ...] = ()
     members: int = 1

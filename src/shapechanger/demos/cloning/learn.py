@@ -281,7 +281,6 @@ def learn(
         framing=settings.framing,
         channels=settings.channels,
         features=settings.features,
-        format=2,
         eyes=settings.eyes if sees else "none",
         nerves=settings.nerves if feels else (),
         head=goal.head,

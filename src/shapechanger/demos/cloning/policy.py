@@ -1,29 +1,25 @@
 """A policy that acts on a picture, a state or both, and the file that it is stored in.
 
-The file is a zip with two entries: a card in JSON, which describes the policy, and the weights.
-Loading runs no code from the file, whatever its origin: it refuses weights whose pickle contains
-anything but tensors.
+The file holds the weights as safetensors, with a card in JSON that describes the policy.
 """
 
 from __future__ import annotations
 
 import copy
-import io
 import os
-import pickle
-import pickletools
-import zipfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import FORMATS, CloneCard
+from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 
 try:
     import torch
@@ -34,34 +30,13 @@ try:
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["WEIGHTS", "CameraPolicy", "CloneCard"]
+__all__ = ["KIND", "CameraPolicy", "CloneCard"]
 
-_CARD: Final = "card.json"
-WEIGHTS: Final = "weights.pt"
-"""Entry that identifies the file of a cloned policy."""
+KIND: Final = "clone"
+"""Kind of the file of a cloned policy, see `shapechanger.tensor_file`."""
 
-_MAX_ENTRY_BYTES: Final = 64 * 2**20  # A network of the default settings has half a megabyte.
-# The earliest date that a zip can hold, so that equal policies give equal files.
-_NO_DATE: Final = (1980, 1, 1, 0, 0, 0)
-# All that a pickle of single-precision tensors refers to.
-_TENSOR_GLOBALS: Final = frozenset(
-    {"collections OrderedDict", "torch._utils _rebuild_tensor_v2", "torch FloatStorage"}
-)
-# Other opcodes that import or construct objects.
-_OBJECT_OPCODES: Final = frozenset(
-    {"STACK_GLOBAL", "INST", "OBJ", "NEWOBJ", "NEWOBJ_EX", "EXT1", "EXT2", "EXT4"}
-)
-# Raised by PyTorch, pickle and zipfile for damaged or malicious files.
-_DAMAGED: Final = (
-    RuntimeError,
-    LookupError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    ArithmeticError,
-    EOFError,
-    pickle.UnpicklingError,
-)
+# Raised by PyTorch for cards of impossible sizes, and for weights that are not the card's.
+_UNBUILDABLE: Final = (RuntimeError, TypeError, ArithmeticError)
 _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
@@ -91,7 +66,6 @@ class CameraPolicy:
                 channels=settings.channels,
                 features=settings.features,
                 eyes=settings.eyes,
-                format=1 if settings.eyes == "colours" else 2,
             ),
             seed,
         )
@@ -235,14 +209,8 @@ class CameraPolicy:
         Raises:
             OutputError: If the file cannot be written.
         """
-        weights = io.BytesIO()
-        torch.save(self.network.state_dict(), weights)
-        whole = io.BytesIO()
-        with zipfile.ZipFile(whole, "w") as archive:
-            card = msgspec.json.format(msgspec.json.encode(self.card), indent=1)
-            archive.writestr(zipfile.ZipInfo(_CARD, _NO_DATE), card)
-            archive.writestr(zipfile.ZipInfo(WEIGHTS, _NO_DATE), weights.getvalue())
-        _write_whole(path, whole.getvalue())
+        weights = {name: value.numpy() for name, value in self.network.state_dict().items()}
+        _write_whole(path, tensor_bytes(weights, msgspec.json.encode(self.card), KIND))
 
     @classmethod
     def load(cls, path: Path) -> CameraPolicy:
@@ -252,67 +220,29 @@ class CameraPolicy:
             PolicyError: If the file is missing or damaged, or contains anything but a policy.
         """
         try:
-            with zipfile.ZipFile(path) as archive:
-                card = msgspec.json.decode(_entry(archive, _CARD), type=CloneCard)
-                weights = _entry(archive, WEIGHTS)
-            _require_format(card)
+            content, weights = read_tensors(path, KIND)
+            card = msgspec.json.decode(content, type=CloneCard)
             return cls(_network(card, weights), card)
         except FileNotFoundError as error:
             raise PolicyError(f"There is no policy file {path}.") from error
-        except (OSError, zipfile.BadZipFile, msgspec.MsgspecError, CloningError) as error:
-            raise PolicyError(f"{path} is not a cloned policy: {error}") from error
-        except _DAMAGED as error:
+        except (*UNREADABLE, CloningError, *_UNBUILDABLE) as error:
             # Messages of PyTorch fill a page; the first line is enough.
-            reason = str(error).strip().partition("\n")[0]
-            raise PolicyError(f"{path} is not an intact policy: {reason}") from error
+            reason = str(error).strip().partition("\n")[0].rstrip(".:")
+            raise PolicyError(f"{path} is not a cloned policy: {reason}.") from error
 
 
-def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
-    """Read an entry of the file, unless it is larger than any policy."""
-    if archive.getinfo(name).file_size > _MAX_ENTRY_BYTES:
-        raise ValueError(f"its {name} is larger than {_MAX_ENTRY_BYTES} bytes.")
-    return archive.read(name)
-
-
-def _require_format(card: CloneCard) -> None:
-    if card.format not in FORMATS:
-        raise ValueError(
-            f"it has format {card.format} of Shapechanger {card.version}; this version reads "
-            f"{' and '.join(map(str, FORMATS))}."
-        )
-
-
-def _require_tensors(archive: zipfile.ZipFile) -> None:
-    """Refuse weights whose pickle contains anything but tensors, without unpickling it."""
-    for name in archive.namelist():
-        if not name.endswith(".pkl"):
-            continue
-        for opcode, argument, _ in pickletools.genops(_entry(archive, name)):
-            foreign = opcode.name == "GLOBAL" and argument not in _TENSOR_GLOBALS
-            if foreign or opcode.name in _OBJECT_OPCODES:
-                what = str(argument).replace(" ", ".") if foreign else opcode.name
-                raise ValueError(f"its weights contain {what}, but only tensors are allowed.")
-
-
-def _network(card: CloneCard, weights: bytes) -> CameraNetwork:
+def _network(card: CloneCard, weights: Mapping[str, NDArray[Any]]) -> CameraNetwork:
     """Build the network that a card describes, with these weights."""
-    if not zipfile.is_zipfile(io.BytesIO(weights)):  # PyTorch would try older formats.
-        raise ValueError("its weights are truncated, or have another format.")
-    with zipfile.ZipFile(io.BytesIO(weights)) as archive:
-        _require_tensors(archive)
-    loaded = torch.load(  # pyright: ignore[reportUnknownMemberType]
-        io.BytesIO(weights), map_location="cpu", weights_only=True
-    )
-    if not isinstance(loaded, dict):
-        raise ValueError("its weights are not a dictionary.")
-    state = cast("dict[str, Tensor]", loaded)
     # On the meta device a forged card cannot allocate memory before the sizes are compared.
     with torch.device("meta"):
         network = CameraNetwork(card)
+    state = {name: torch.from_numpy(value.copy()) for name, value in weights.items()}  # pyright: ignore[reportUnknownMemberType]
     network.load_state_dict(state, assign=True)
-    for name, value in state.items():
-        if value.dtype != torch.float32 or not bool(torch.isfinite(value).all()):
-            raise ValueError(f"its weights {name} must be finite and in single precision.")
+    # Assigned weights lie in memory as in the file; sums in another order are other sums.
+    network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    for name, value in weights.items():
+        if value.dtype != np.float32 or not np.isfinite(value).all():
+            raise ValueError(f"its weights {name} must be finite and in single precision")
     return network
 
 

@@ -23,7 +23,7 @@ _MOVED_M: Final = 0.3
 _FOLDER: Final = Path(__file__).parent / "clones"
 
 CLONES: Final[Mapping[str, Path]] = MappingProxyType(
-    {vehicle: _FOLDER / f"{vehicle}.zip" for vehicle in ("boat", "car", "tank", "truck")}
+    {vehicle: _FOLDER / f"{vehicle}.safetensors" for vehicle in ("boat", "car", "tank", "truck")}
 )
 """Files of the shipped camera policies by vehicle; `CameraPolicy.load` reads them.
 

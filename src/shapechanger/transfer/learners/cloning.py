@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -14,8 +13,9 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
-from shapechanger.demos.cloning.policy import WEIGHTS, CameraPolicy
+from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.errors import StudyError
+from shapechanger.tensor_file import kind_of
 from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
@@ -261,15 +261,11 @@ def require_camera_env(
 
 def is_clone(path: Path) -> bool:
     """Return whether a file holds a clone, rather than another policy or something else."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return WEIGHTS in archive.namelist()
-    except (OSError, zipfile.BadZipFile):
-        return False
+    return kind_of(path) == KIND
 
 
 def load_clone(path: Path) -> CameraPolicy:
-    """Load a clone: weights, read by PyTorch with `weights_only=True`, and a JSON card.
+    """Load a clone.
 
     Raises:
         PolicyError: If the file holds none.

@@ -2,14 +2,11 @@
 
 A file holds safetensors: the weights, the normalisation statistics and the bounds of the spaces; in
 its metadata a JSON card (env, learner, settings, steps, seed, version, both layouts) and a hash of
-the tensors. Loading a file only reads numbers and JSON, so it cannot run code. Format:
-github.com/huggingface/safetensors (8 bytes of length, a JSON header, then the numbers).
+the tensors. Loading a file only reads numbers and JSON, so it cannot run code.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,6 +20,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import CorruptStudy, MissingExtra
 from shapechanger.layout import Layout
+from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
@@ -30,8 +28,6 @@ from shapechanger.transfer.learners.settings import Sb3Settings
 
 try:
     import torch
-    from safetensors import SafetensorError
-    from safetensors import numpy as safetensors
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.running_mean_std import RunningMeanStd
@@ -51,13 +47,9 @@ __all__ = [
     "save_policy",
 ]
 
-_CARD: Final = "card"
-_HASH: Final = "sha256"
 _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."
-# Length of the JSON header, little-endian.
-_LENGTH_BYTES: Final = 8
 
 
 class PolicyCard(msgspec.Struct, frozen=True):
@@ -195,11 +187,7 @@ def save_policy(policy: TrainedPolicy, path: Path) -> None:
             statistics = getattr(policy.normalisation, side)
             for name in ("mean", "var", "count"):
                 tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
-    # Safetensors keeps the bytes of an array as they lie in memory.
-    tensors = {name: np.asarray(value, order="C") for name, value in tensors.items()}
-    card = msgspec.json.encode(policy.card).decode()
-    metadata = {_CARD: card, _HASH: _digest(tensors)}
-    write_atomic(path, safetensors.save(tensors, metadata=metadata))
+    write_atomic(path, tensor_bytes(tensors, msgspec.json.encode(policy.card)))
 
 
 def load_policy(path: Path, function: str = "") -> TrainedPolicy:
@@ -214,46 +202,16 @@ def load_policy(path: Path, function: str = "") -> TrainedPolicy:
         CorruptStudy: If the file is missing, is not such a policy, or has been changed.
     """
     try:
-        content = path.read_bytes()
-        metadata = _metadata(content)
-        card = msgspec.json.decode(metadata[_CARD], type=PolicyCard)
-        tensors = safetensors.load(content)
-        if _digest(tensors) != metadata[_HASH]:
-            raise ValueError("its numbers do not have the hash of its card")
+        content, tensors = read_tensors(path)
+        card = msgspec.json.decode(content, type=PolicyCard)
         return TrainedPolicy(_model(card, tensors, function), _read_statistics(tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
-    except (
-        OSError,
-        KeyError,
-        ValueError,
-        RuntimeError,  # Weights of other shapes than the card's.
-        SafetensorError,
-        msgspec.MsgspecError,
-    ) as error:
+    except (*UNREADABLE, RuntimeError) as error:  # Weights of other shapes than the card's.
         reason = str(error).partition("\n")[0].rstrip(".:")
         raise CorruptStudy(
             f"{path} is not a policy that `shapechanger train` or a study has written ({reason})."
         ) from error
-
-
-def _metadata(content: bytes) -> dict[str, str]:
-    """Return the metadata of safetensors."""
-    length = int.from_bytes(content[:_LENGTH_BYTES], "little")
-    if length > len(content):
-        raise ValueError("it is not a safetensors file")
-    header = json.loads(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
-    return msgspec.convert(header["__metadata__"], dict[str, str])
-
-
-def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
-    """SHA-256 over names, types, shapes and numbers."""
-    digest = hashlib.sha256()
-    for name in sorted(tensors):
-        array = tensors[name]
-        digest.update(f"{name} {array.dtype} {array.shape} ".encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()
 
 
 def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str) -> BaseAlgorithm:

@@ -1,0 +1,113 @@
+"""Files of named arrays: safetensors with a JSON card and a hash. Reading one runs no code of it.
+
+Format: github.com/huggingface/safetensors (8 bytes of length, a JSON header, then the numbers).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from numpy.typing import NDArray
+
+from shapechanger.errors import MissingExtra
+
+try:
+    import numpy as np
+    from safetensors import SafetensorError
+    from safetensors import numpy as safetensors
+except ImportError as error:
+    raise MissingExtra("safetensors", "learn") from error
+
+__all__ = ["UNREADABLE", "kind_of", "read_tensors", "tensor_bytes"]
+
+_CARD: Final = "card"
+_HASH: Final = "sha256"
+_KIND: Final = "kind"
+# A file begins with the length of its JSON header.
+_LENGTH_BYTES: Final = 8
+_MAX_HEADER_BYTES: Final = 2**24
+
+UNREADABLE: Final = (OSError, LookupError, ValueError, SafetensorError, msgspec.MsgspecError)
+"""What `read_tensors` raises for files that are missing, damaged or something else."""
+
+
+def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes, kind: str = "") -> bytes:
+    """Return the content of a file; equal arrays and cards give equal bytes.
+
+    Args:
+        tensors: The arrays by name.
+        card: What they are, in JSON.
+        kind: Kind of the file, such as "clone"; "" for the policies of studies.
+    """
+    # Safetensors keeps the bytes of an array as they lie in memory.
+    arrays = {name: np.asarray(value, order="C") for name, value in tensors.items()}
+    metadata = {_CARD: card.decode(), _HASH: _digest(arrays)}
+    if kind:
+        metadata[_KIND] = kind
+    content = safetensors.save(arrays, metadata=metadata)
+    # Safetensors writes the metadata in any order.
+    end = _LENGTH_BYTES + int.from_bytes(content[:_LENGTH_BYTES], "little")
+    header = json.loads(content[_LENGTH_BYTES:end])
+    header["__metadata__"] = dict(sorted(metadata.items()))
+    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % _LENGTH_BYTES)
+    return len(text).to_bytes(_LENGTH_BYTES, "little") + text + content[end:]
+
+
+def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[Any]]]:
+    """Read a file of one kind.
+
+    Args:
+        path: The file.
+        kind: Its kind.
+
+    Returns:
+        The card in JSON, and the arrays by name.
+
+    Raises:
+        FileNotFoundError: If there is none.
+        OSError, LookupError, ValueError, SafetensorError, msgspec.MsgspecError: If it cannot be
+            read, is of another kind, or has been changed.
+    """
+    content = path.read_bytes()
+    length = int.from_bytes(content[:_LENGTH_BYTES], "little")
+    metadata = _metadata(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
+    if metadata.get(_KIND, "") != kind:
+        raise ValueError(f"it is a {metadata.get(_KIND, 'policy')}")
+    tensors = safetensors.load(content)
+    if _digest(tensors) != metadata[_HASH]:
+        raise ValueError("its numbers do not have the hash of its card")
+    return metadata[_CARD].encode(), tensors
+
+
+def kind_of(path: Path) -> str | None:
+    """Return the kind of a file from its header alone; None if it is missing or something else."""
+    try:
+        with path.open("rb") as file:
+            length = int.from_bytes(file.read(_LENGTH_BYTES), "little")
+            return _metadata(file.read(min(length, _MAX_HEADER_BYTES))).get(_KIND, "")
+    except UNREADABLE:
+        return None
+
+
+def _metadata(header: bytes) -> dict[str, str]:
+    try:
+        found = json.loads(header)["__metadata__"]
+    except (ValueError, LookupError, TypeError) as error:
+        raise ValueError("it is not a safetensors file with a card") from error
+    return msgspec.convert(found, dict[str, str])
+
+
+def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
+    """SHA-256 over names, types, shapes and numbers."""
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        array = tensors[name]
+        digest.update(f"{name} {array.dtype} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
