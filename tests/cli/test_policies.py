@@ -12,6 +12,7 @@ from torch import nn
 
 from shapechanger.cli import main
 from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.transfer.learners.policy_file import load_policy
 
 
@@ -28,6 +29,17 @@ def test_a_card_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert "shapechanger/Finger-v1" in said
     assert "307,200" in said
     assert "PIP_flexion" in said or "angle" in said
+
+
+def test_a_clone_is_shown_and_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    """It is a policy as any other, with a card of its own."""
+    main(["policies", "show", str(CLONES["car"])])
+    said = capsys.readouterr().out
+    assert "steering, throttle" in said
+    assert "shapechanger train Car" in said
+    main(["policies", "list", str(CLONES["car"].parent)])
+    lines = capsys.readouterr().out.splitlines()
+    assert sum("cloning" in line for line in lines) == len(CLONES)
 
 
 def test_a_zip_of_stable_baselines3_is_converted(tmp_path: Path) -> None:

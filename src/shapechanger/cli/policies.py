@@ -13,9 +13,11 @@ from rich.table import Table
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import env_ref, opened
-from shapechanger.errors import CorruptStudy, StudyError
+from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
 
 if TYPE_CHECKING:
+    from shapechanger.demos.cloning.card import CloneCard
+    from shapechanger.demos.cloning.settings import CloneSettings
     from shapechanger.transfer.learners.settings import PpoSettings
 
 __all__ = ["Policies"]
@@ -32,10 +34,14 @@ class Show:
 
     def run(self) -> None:
         """Print the card."""
+        from shapechanger.transfer.learners.cloning import is_clone, load_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
+        if is_clone(self.file):
+            self._print(*_clone_lines(load_clone(self.file).card))
+            return
         policy = load_policy(self.file)
-        card, console = policy.card, plain_console()
+        card = policy.card
         lines = {
             "env": str(card.env),
             "learner": card.learner,
@@ -46,10 +52,33 @@ class Show:
             "observation": ", ".join(card.observation.names),
             "action": ", ".join(card.action.names),
         }
+        self._print(lines, card.settings)
+
+    def _print(self, lines: dict[str, str], settings: msgspec.Struct | None) -> None:
+        """Print lines, and below them the settings of the learner."""
+        console = plain_console()
         for name, text in lines.items():
             console.print(f"{name:12} {text}", soft_wrap=True)
-        for name, value in msgspec.structs.asdict(card.settings).items():
-            console.print(f"  {name:16} {value}", soft_wrap=True)
+        if settings is not None:
+            for name, value in msgspec.structs.asdict(settings).items():
+                console.print(f"  {name:16} {value}", soft_wrap=True)
+
+
+def _clone_lines(card: CloneCard) -> tuple[dict[str, str], CloneSettings | None]:
+    """Return what a clone's card says, and its settings."""
+    actions = ("steering", "throttle") if card.action_layout is None else card.action_layout.names
+    lines = {
+        "env": str(card.data.get("env", "recorded")),
+        "learner": "cloning",
+        "steps": f"{card.steps:,}",
+        "seed": ", ".join(map(str, card.seeds)),
+        "version": card.version,
+        "command": card.command,
+        "picture": card.eyes,
+        "state": "none" if card.state_layout is None else ", ".join(card.state_layout.names),
+        "action": ", ".join(actions),
+    }
+    return lines, card.settings
 
 
 @dataclass(frozen=True)
@@ -63,6 +92,7 @@ class ListPolicies:
 
     def run(self) -> None:
         """Print a line for each policy; a file that is none gets its reason."""
+        from shapechanger.transfer.learners.cloning import is_clone, load_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
         if self.references:
@@ -73,8 +103,14 @@ class ListPolicies:
         for path in sorted(self.folder.rglob("*.safetensors")):
             name = str(path.relative_to(self.folder))
             try:
+                if is_clone(path):
+                    lines, _ = _clone_lines(load_clone(path).card)
+                    table.add_row(
+                        name, *(lines[each] for each in ("env", "learner", "steps", "seed"))
+                    )
+                    continue
                 card = load_policy(path).card
-            except CorruptStudy as error:
+            except ShapechangerError as error:
                 table.add_row(name, str(error))
                 continue
             table.add_row(name, str(card.env), card.learner, f"{card.steps:,}", str(card.seed))
