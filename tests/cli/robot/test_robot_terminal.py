@@ -245,7 +245,7 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
     """At the cap it stays until the person says Y."""
     profile = write_profile(tmp_path, ESC)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("slowest backward")
+        read = person.read_until("fastest backward")
         person.press("a" * 40)
         read = person.read_until("Go beyond it?", read)
         person.press("\r")

@@ -311,7 +311,7 @@ class Calibration:
             f"output.{output.name}.{key}": wide.settings[key] for key in (low_key, high_key)
         }
         names = {"servo": ("full left", "straight", "full right")}.get(
-            output.driver, ("its slowest backward", "surely at rest", "its fastest forward")
+            output.driver, ("its fastest backward", "surely at rest", "its fastest forward")
         )
         self._console.print(f"\n{output.name}: A and D move it, Enter where it is …")
         with self._served(settings) as robot:
