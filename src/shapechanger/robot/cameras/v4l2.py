@@ -21,12 +21,16 @@ from shapechanger.robot.cameras.jpeg import checked_frame
 __all__ = [
     "BUFFER_FLAG_ERROR",
     "BUFFER_FLAG_MONOTONIC",
+    "BUFFER_FLAG_TIMESTAMP_MASK",
+    "CAPTURE",
     "DEQUEUE",
+    "MJPEG",
     "QUERY_BUFFER",
     "QUEUE",
     "REQUEST_BUFFERS",
     "SET_FORMAT",
     "SET_PARAMETERS",
+    "STREAM_OFF",
     "STREAM_ON",
     "Buffer",
     "V4l2",
@@ -44,12 +48,12 @@ QUERY_BUFFER: Final = 0xC0585609  # VIDIOC_QUERYBUF
 QUEUE: Final = 0xC058560F  # VIDIOC_QBUF
 DEQUEUE: Final = 0xC0585611  # VIDIOC_DQBUF
 STREAM_ON: Final = 0x40045612  # VIDIOC_STREAMON
-_STREAM_OFF: Final = 0x40045613  # VIDIOC_STREAMOFF
+STREAM_OFF: Final = 0x40045613  # VIDIOC_STREAMOFF
 
-_CAPTURE: Final = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
-_MJPEG: Final = 0x47504A4D  # V4L2_PIX_FMT_MJPEG
+CAPTURE: Final = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
+MJPEG: Final = 0x47504A4D  # V4L2_PIX_FMT_MJPEG
 BUFFER_FLAG_ERROR: Final = 0x40
-_BUFFER_FLAG_TIMESTAMP_MASK: Final = 0xE000
+BUFFER_FLAG_TIMESTAMP_MASK: Final = 0xE000
 BUFFER_FLAG_MONOTONIC: Final = 0x2000
 
 _MEMORY_MMAP: Final = 1
@@ -86,7 +90,7 @@ class Buffer:
         return bytearray(
             _BUFFER.pack(
                 self.index,
-                _CAPTURE,
+                CAPTURE,
                 self.used,
                 self.flags,
                 _FIELD_NONE,
@@ -113,7 +117,7 @@ class Buffer:
 
 def pixel_format(width: int, height: int) -> bytearray:
     """Return a request for JPEG frames of a size."""
-    return bytearray(_FORMAT.pack(_CAPTURE, width, height, _MJPEG, _FIELD_NONE))
+    return bytearray(_FORMAT.pack(CAPTURE, width, height, MJPEG, _FIELD_NONE))
 
 
 def image_size(data: bytes | bytearray) -> tuple[int, int, int]:
@@ -123,13 +127,13 @@ def image_size(data: bytes | bytearray) -> tuple[int, int, int]:
 
 
 def frame_rate(fps: float) -> bytearray:
-    """Pacing at a fixed rate."""
-    return bytearray(_PARAMETERS.pack(_CAPTURE, 1000, round(fps * 1000)))
+    """Return a request for a number of frames a second."""
+    return bytearray(_PARAMETERS.pack(CAPTURE, 1000, round(fps * 1000)))
 
 
 def request(buffers: int) -> bytearray:
     """Return a request for a number of buffers."""
-    return bytearray(_REQUEST.pack(buffers, _CAPTURE, _MEMORY_MMAP))
+    return bytearray(_REQUEST.pack(buffers, CAPTURE, _MEMORY_MMAP))
 
 
 _BUFFERS: Final = 3
@@ -181,7 +185,7 @@ class V4l2:
         wanted = pixel_format(*self._plan.size)
         self._ioctl(self._fd, SET_FORMAT, wanted)
         width, height, kind = image_size(wanted)
-        if (width, height, kind) != (*self._plan.size, _MJPEG):
+        if (width, height, kind) != (*self._plan.size, MJPEG):
             raise RobotError(
                 f"The camera {self._device} has no JPEG pictures of {self._plan.size[0]} by "
                 f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it has."
@@ -202,7 +206,7 @@ class V4l2:
                 )
             )
             self._ioctl(self._fd, QUEUE, data)
-        self._ioctl(self._fd, STREAM_ON, struct.pack("=i", _CAPTURE))
+        self._ioctl(self._fd, STREAM_ON, struct.pack("=i", CAPTURE))
 
     def _newest(self) -> tuple[bytes, int]:
         newest: tuple[bytes, int] | None = None
@@ -216,7 +220,7 @@ class V4l2:
                 return newest
             buffer = Buffer.unpack(data)
             if not buffer.flags & BUFFER_FLAG_ERROR:
-                monotonic = buffer.flags & _BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
+                monotonic = buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
                 # Cameras pad frames with zeros.
                 jpeg = self._buffers[buffer.index][: buffer.used].rstrip(b"\0")
                 newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()

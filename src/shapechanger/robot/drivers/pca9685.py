@@ -29,7 +29,7 @@ _AUTO_INCREMENT: Final = 0x20  # MODE1, AI.
 _SLEEP: Final = 0x10  # MODE1; the prescaler can be written only then.
 _TOTEM_POLE: Final = 0x04  # MODE2, OUTDRV; outputs change at the stop of a transfer (OCH = 0).
 
-_OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator, Hz; boards deviate, so calibrate the widths.
+_OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator; boards deviate, so calibrate the widths.
 _STEPS: Final = 4096
 _NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulses.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
