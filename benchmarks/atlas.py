@@ -280,7 +280,7 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
             column,
             row,
             f"{ends['scratch']:.2f} → {ends['fine-tune']:.2f} m/s\n"
-            f"{estimate_text(gain, signed=True)}\nzero-shot {ends['zero-shot']:.2f}",
+            f"{estimate_text(gain, signed=True)}\nzero-shot {ends['zero-shot']:z.2f}",
             ha="center",
             va="center",
             fontsize=8,
