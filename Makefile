@@ -1,8 +1,8 @@
 # Every target installs what it needs first, and only when something changed. `make help` lists the
 # targets.
 
-# Some images of containers forbid Python to cache what it compiles. Then every process of a test or
-# a study compiles the package again, and every run of pytest all tests.
+# Some container images forbid Python to cache bytecode. Then each process of a study compiles the
+# package again, and each worker of pytest all tests.
 export PYTHONDONTWRITEBYTECODE :=
 
 PYTHON ?= python3
@@ -17,7 +17,7 @@ RUN := $(BIN)/python
 # Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
-# Tests of one module stay together, so that its fixtures are made once.
+# Tests of one module mostly stay on one worker, so that its fixtures are made once.
 PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.

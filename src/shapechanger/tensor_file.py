@@ -1,4 +1,4 @@
-"""Files of named arrays: safetensors with a JSON card and a hash. Reading one runs no code of it.
+"""Files of named arrays: safetensors with a JSON card and a hash. Reading one runs no code from it.
 
 Format: github.com/huggingface/safetensors (8 bytes of length, a JSON header, then the numbers).
 """
@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra
 
 try:
-    import numpy as np
     from safetensors import SafetensorError
     from safetensors import numpy as safetensors
 except ImportError as error:
@@ -50,7 +50,7 @@ def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes, kind: str = "
     if kind:
         metadata[_KIND] = kind
     content = safetensors.save(arrays, metadata=metadata)
-    # Safetensors writes the metadata in any order.
+    # Safetensors writes the metadata in any order: write the header again with sorted metadata.
     end = _LENGTH_BYTES + int.from_bytes(content[:_LENGTH_BYTES], "little")
     header = json.loads(content[_LENGTH_BYTES:end])
     header["__metadata__"] = dict(sorted(metadata.items()))
@@ -78,7 +78,7 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
     metadata = _metadata(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
     if metadata.get(_KIND, "") != kind:
-        raise ValueError(f"it is a {metadata.get(_KIND, 'policy')}")
+        raise ValueError(f"it is a {metadata.get(_KIND, 'policy of a study')}")
     tensors = safetensors.load(content)
     if _digest(tensors) != metadata[_HASH]:
         raise ValueError("its numbers do not have the hash of its card")

@@ -49,9 +49,13 @@ def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
 def test_actions_are_those_of_the_model() -> None:
     """The short way to PPO's mean actions gives `predict`'s, clipped like them."""
     policy, _ = trained(TINY)
-    observations = np.random.default_rng(0).normal(scale=100.0, size=(50, 4))
-    expected, _ = policy.model.predict(observations, deterministic=True)
-    np.testing.assert_array_equal(policy.act(observations), expected)
+    network: Any = policy.model.policy
+    observations = np.random.default_rng(0).normal(size=(50, 4))
+    for factor, clipped in ((1.0, False), (1000.0, True)):
+        network.action_net.weight.data *= factor
+        expected, _ = policy.model.predict(observations, deterministic=True)
+        assert (np.abs(expected) == 3.0).any() == clipped  # The bounds of the pendulum's motor.
+        np.testing.assert_array_equal(policy.act(observations), expected)
 
 
 def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:

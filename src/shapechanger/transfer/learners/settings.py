@@ -131,7 +131,8 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
             "policy_kwargs": {
                 "net_arch": list(self.net_arch),
                 "log_std_init": self.log_std_init,
-                # Stable-Baselines3's own for PPO, and fewer calls from Python for equal numbers.
+                # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python,
+                # for equal numbers.
                 "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
             },
             "n_steps": self.n_steps,
