@@ -43,6 +43,7 @@ from benchmarks import (
     vehicles,
     vehicles_studies,
     vehicles_twin,
+    waypoints,
 )
 from benchmarks.row import Row
 from shapechanger.bodies.ant import ANT
@@ -170,6 +171,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-pairs": vehicles_studies.pairs,
     "vehicles-lenses": vehicles_studies.lenses,
     "vehicles-tries": vehicles_studies.tries,
+    "vehicles-waypoints": waypoints.pairs,
 }
 
 

@@ -33,6 +33,10 @@ _VEHICLES = (
     "shapechanger/Truck-v1",
     "shapechanger/Boat-v1",
 )
+# Each of them on distances, and with waypoints.
+_MORE_VEHICLES = tuple(
+    name.replace("-v1", f"{kind}-v1") for kind in ("Ranges", "Waypoint") for name in _VEHICLES
+)
 
 _FINGERS = ("shapechanger/Finger-v1", "shapechanger/FingerTrack-v1")
 
@@ -77,7 +81,8 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     )
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
-    assert tuple(ids.split()) == (*_IDS, *_VEHICLES, *_FINGERS, REMOTE_FINGER, REMOTE_VEHICLE)
+    vehicles = (*_VEHICLES, *_MORE_VEHICLES)
+    assert tuple(ids.split()) == (*_IDS, *vehicles, *_FINGERS, REMOTE_FINGER, REMOTE_VEHICLE)
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 

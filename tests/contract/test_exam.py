@@ -14,7 +14,7 @@ import pytest
 from stable_baselines3.common.env_checker import check_env
 
 from shapechanger.envs import CATALOGUE
-from shapechanger.envs.catalogue import FINGER_ENVS, VEHICLE_ENVS
+from shapechanger.envs.catalogue import FINGER_ENVS, RANGES_ENVS, VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.testing import PROMISES, MakeEnv, examine
 
 # Bodies that no id names, and arguments that change a space, keep the same promises.
@@ -40,6 +40,9 @@ _BLIND: dict[str, MakeEnv] = {
     env_id: partial(gym.make, env_id, image=False, world="corridor" if vehicle == "truck" else None)
     for env_id, (vehicle, _) in VEHICLE_ENVS.items()
 }
+_RANGES: dict[str, MakeEnv] = {
+    env_id: partial(gym.make, env_id, courses=(0, 1)) for env_id in RANGES_ENVS
+}
 _FINGER, _TRACK = FINGER_ENVS
 _FINGERS: dict[str, MakeEnv] = {
     **{env_id: partial(gym.make, env_id) for env_id in FINGER_ENVS},
@@ -52,10 +55,11 @@ _FINGERS: dict[str, MakeEnv] = {
     "another path each time": partial(gym.make, _TRACK, path="random"),
     "an eight": partial(gym.make, _TRACK, path={"kind": "figure-eight", "hz": 0.25}),
 }
-_ALL = _MAKERS | _VARIANTS | _BLIND | _FINGERS
+_ALL = _MAKERS | _VARIANTS | _BLIND | _RANGES | _FINGERS
 _SMALL = (32, 24)
 _SEEING: dict[str, MakeEnv] = {
     **{env_id: partial(gym.make, env_id, size=_SMALL) for env_id in VEHICLE_ENVS},
+    **{env_id: partial(gym.make, env_id, courses=(0, 1)) for env_id in WAYPOINT_ENVS},
     "picture and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
     "random light": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, randomise=True),
 }

@@ -33,7 +33,7 @@ class _Bench:
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
-            self.touch.follow(self.data, PlanarPose(x, 0.0, heading), _DT)
+            self.touch.follow(self.data, lambda: PlanarPose(x, 0.0, heading), _DT)
 
 
 def test_the_ground_is_nothing_to_run_into() -> None:

@@ -14,8 +14,10 @@ import gymnasium as gym
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    RANGES_ENVS,
     REMOTE_FINGER,
     VEHICLE_ENVS,
+    WAYPOINT_ENVS,
     find,
     find_task,
 )
@@ -76,6 +78,10 @@ def default_learner(env: EnvRef) -> str:
     """Return the learner tuned on the env's family; for other envs, that of the ant."""
     if env.id in VEHICLE_ENVS:
         return "cloning"
+    if env.id in WAYPOINT_ENVS:
+        return "waypoint"
+    if env.id in RANGES_ENVS:
+        return "ppo-drive"
     if env.id == REMOTE_FINGER:
         return "ppo-rig"
     entry = CATALOGUE.get(env.id) or FINGER_ENVS.get(env.id)
@@ -92,6 +98,8 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
     Raises:
         StudyError: If it has no camera.
     """
+    if env.id in WAYPOINT_ENVS or env.id in RANGES_ENVS:
+        env = EnvRef(env.id, {**env.kwargs, "put_back": True})
     if env.id not in VEHICLE_ENVS:
         if lenses:
             raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")

@@ -12,7 +12,13 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console
 from shapechanger.cli.env_arguments import asked, env_ref, opened
-from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, VEHICLE_ENVS
+from shapechanger.envs.catalogue import (
+    CATALOGUE,
+    FINGER_ENVS,
+    RANGES_ENVS,
+    VEHICLE_ENVS,
+    WAYPOINT_ENVS,
+)
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
@@ -30,7 +36,7 @@ class ListEnvs:
         table = Table("id", "body", box=None, pad_edge=False)
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
-        for env_id, (vehicle, summary) in VEHICLE_ENVS.items():
+        for env_id, (vehicle, summary) in (VEHICLE_ENVS | RANGES_ENVS | WAYPOINT_ENVS).items():
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)

@@ -21,7 +21,7 @@ from shapechanger.cli.env_arguments import (
     require_seed,
     settings_of,
 )
-from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.errors import MissingExtra, OutputError, StudyError
 
 if TYPE_CHECKING:
     from shapechanger.transfer.env_ref import EnvRef
@@ -50,6 +50,9 @@ class Train:
     """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     seed: int = 0
     """Seed of everything random."""
+    teacher: Path | None = None
+    """Policy of the same vehicle on distances, such as one of CarRanges: its student, which sees
+    pictures alone, is trained instead of learning by trial."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 
@@ -68,6 +71,9 @@ class Train:
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
+        if self.teacher is not None:
+            self._train_student(env, self.teacher)
+            return
         learner, settings = resolve_learner(
             self.learner or default_learner(env), settings_of(self.set)
         )
@@ -115,6 +121,34 @@ class Train:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         save_policy(policy, out)
         console.print(f"wrote {out}")
+
+    def _train_student(self, env: EnvRef, teacher: Path) -> None:
+        from shapechanger.transfer.files import make_folder
+        from shapechanger.transfer.learners.policy_file import load_policy
+        from shapechanger.transfer.learners.sb3 import use_one_thread
+        from shapechanger.transfer.learners.student import STUDENT_STEPS, train_student
+
+        if self.learner is not None or self.set or self.tensorboard is not None:
+            raise StudyError("A student has no learner of its own: give --teacher without one.")
+        steps = STUDENT_STEPS if self.steps is None else self.steps
+        out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
+        if out.is_dir():
+            raise OutputError(f"Cannot write {out}: it is a folder.")
+        make_folder(out.parent)
+        use_one_thread()
+        try:
+            with StudyProgress({env.id: steps}) as progress:
+                policy = train_student(
+                    env,
+                    load_policy(teacher),
+                    steps,
+                    self.seed,
+                    on_steps=lambda done: progress(env.id, done, False),
+                )
+        except KeyboardInterrupt:
+            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+        policy.described(command=shlex.join(["shapechanger", *sys.argv[1:]])).save(out)
+        plain_console().print(f"wrote {out}")
 
 
 def _learn_to_drive(

@@ -14,9 +14,11 @@ from shapechanger.errors import UnknownName
 __all__ = [
     "CATALOGUE",
     "FINGER_ENVS",
+    "RANGES_ENVS",
     "REMOTE_FINGER",
     "REMOTE_VEHICLE",
     "VEHICLE_ENVS",
+    "WAYPOINT_ENVS",
     "CatalogueEntry",
     "TaskEntry",
     "find",
@@ -42,6 +44,22 @@ VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     }
 )
 """Vehicle and summary by id; all have the same task, and their bodies form no family."""
+
+RANGES_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        env_id.replace("-v1", "Ranges-v1"): (vehicle, "the same, seeing distances; fast")
+        for env_id, (vehicle, _) in VEHICLE_ENVS.items()
+    }
+)
+"""Vehicle and summary by id, for the same task on distances instead of pictures."""
+
+WAYPOINT_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        env_id.replace("-v1", "Waypoint-v1"): (vehicle, "camera and action the same for all")
+        for env_id, (vehicle, _) in VEHICLE_ENVS.items()
+    }
+)
+"""Vehicle and summary by id, for the same task with waypoints as actions."""
 
 
 class TaskEntry(msgspec.Struct, frozen=True):
@@ -195,6 +213,7 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
 }
 
 _EPISODE_STEPS: Final = 1000
+_RANGES_STEPS: Final = 400  # A learner meets more courses.
 # Families with a fast step of their own, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
@@ -214,14 +233,19 @@ def register_all() -> None:
                 disable_env_checker=entry.family in _TUNED,
                 kwargs={"body": entry.body} if entry.body else {},
             )
-    for env_id, (vehicle, _) in VEHICLE_ENVS.items():
-        if env_id not in gym.registry:
-            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-                env_id,
-                "shapechanger.envs.vehicle:VehicleEnv",
-                max_episode_steps=_EPISODE_STEPS,
-                kwargs={"vehicle": vehicle},
-            )
+    for envs, kind, limit in (
+        (VEHICLE_ENVS, "VehicleEnv", _EPISODE_STEPS),
+        (RANGES_ENVS, "RangesEnv", _RANGES_STEPS),
+        (WAYPOINT_ENVS, "WaypointEnv", _EPISODE_STEPS),
+    ):
+        for env_id, (vehicle, _) in envs.items():
+            if env_id not in gym.registry:
+                gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+                    env_id,
+                    f"shapechanger.envs.vehicle:{kind}",
+                    max_episode_steps=limit,
+                    kwargs={"vehicle": vehicle},
+                )
     for env_id, task in FINGER_ENVS.items():
         if env_id not in gym.registry:
             gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
@@ -252,7 +276,9 @@ def find(env_id: str) -> CatalogueEntry:
     entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
     if entry is None:
         known = [entry.name for entry in CATALOGUE.values()]
-        others = map(_name, (*VEHICLE_ENVS, *FINGER_ENVS, REMOTE_FINGER))
+        others = map(
+            _name, (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
+        )
         raise UnknownName("environment", name, [*known, *others])
     return entry
 
@@ -260,8 +286,8 @@ def find(env_id: str) -> CatalogueEntry:
 def find_task(env_id: str) -> str | None:
     """Return the id of an env without a family, such as `Car` or `Finger`; None for others."""
     full = f"{NAMESPACE}/{_name(env_id)}-v1"
-    known = full in VEHICLE_ENVS or full in FINGER_ENVS or full == REMOTE_FINGER
-    return full if known else None
+    known = (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
+    return full if full in known else None
 
 
 def _name(env_id: str) -> str:

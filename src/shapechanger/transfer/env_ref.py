@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast, runtime_checkable
 
@@ -16,6 +16,7 @@ from shapechanger.layout import Layout
 from shapechanger.tasks.measure import RETURN, Measure
 
 __all__ = [
+    "CanBeTaught",
     "EnvRef",
     "EnvTraits",
     "HasBodyFamily",
@@ -92,6 +93,21 @@ class HasDemonstrator(Protocol):
 
     def demonstrator(self, seed: int) -> TaskDemonstrator:
         """Return the expert; `seed` determines its mistakes."""
+        ...
+
+
+@runtime_checkable
+class CanBeTaught(Protocol):
+    """An env whose task a policy of another env can demonstrate, which sees more than pictures.
+
+    Attributes:
+        teacher_env: Id of that env.
+    """
+
+    teacher_env: str
+
+    def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> TaskDemonstrator:
+        """Return the policy as a demonstrator; `seed` determines its mistakes."""
         ...
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Final
 
 import mujoco
@@ -38,6 +40,10 @@ _IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = (-math.radians(7.0), 0.0, math.radians(7.0))  # An HC-SR04 hears 15 degrees.
 _SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.worlds.scene`.
 _ROUNDING_S: Final = 1e-9
+# Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
+_KEPT_COURSES: Final = 64
+# Farthest distance between two updates of the progress, m: well below `line.WINDOW_M`.
+_PROGRESS_M: Final = 0.5
 
 
 class MujocoWorld:
@@ -101,9 +107,14 @@ class MujocoWorld:
         return self._contacts.touches
 
     @property
+    def bumped(self) -> bool:
+        """Return whether a contact presses the front bumper."""
+        return self._contacts.bumped
+
+    @property
     def progress_m(self) -> float:
         """Distance along the course since the vehicle was placed, m; backwards counts down."""
-        return self._progress.metres
+        return self._progress.update(*self._bound.pose()[:2])
 
     @property
     def pose(self) -> Pose:
@@ -125,13 +136,10 @@ class MujocoWorld:
                 is unchanged then.
         """
         look = self.look if look is None else look
-        course = lay_out(self._world, seed)
         require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
-        spec = mujoco.MjSpec()
-        add_course(spec, course, look)
-        add_vehicle(spec, self.vehicle.name)
-        model = spec.compile()
+        course, model = _compiled(self.vehicle.name, self._world, seed, look)
         if camera is not None:
+            model = copy.copy(model)
             move_camera(model, _CAMERA, camera)
         # All checks are above, so that an error leaves the world unchanged.
         self.look, self.model = look, model
@@ -141,7 +149,6 @@ class MujocoWorld:
         self._bound.set_current(*self.course.current_mps)
         self._contacts = ContactTracker(self.model)
         self._progress = CourseProgress(self.course)
-        self._path: CoursePath | None = None
         self._chassis = self.model.body(_CHASSIS).id
         self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
         self._solid[_SOLID_GROUP] = 1
@@ -158,6 +165,7 @@ class MujocoWorld:
         self._rest_at(pose)
         self._contacts.reset()
         self._progress.reset(pose.x, pose.y)
+        self._updated_at = pose.x, pose.y
 
     def path(self) -> CoursePath:
         """A path around the course for this vehicle, planned on the first call.
@@ -165,9 +173,7 @@ class MujocoWorld:
         Raises:
             WorldError: If there is no such path.
         """
-        if self._path is None:
-            self._path = plan_path_for(self.course, traits_of(self.vehicle.name))
-        return self._path
+        return _planned(self.vehicle.name, self._world, self.course.seed)
 
     def put_back(self) -> None:
         """Put the vehicle on the nearest point of its path, at rest.
@@ -183,6 +189,7 @@ class MujocoWorld:
         self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
         self._contacts.release()
         self._progress.update(float(x), float(y))
+        self._updated_at = float(x), float(y)
 
     def zero_odometer(self) -> None:
         """Reset the travelled distance, as restarting the robot does."""
@@ -193,13 +200,21 @@ class MujocoWorld:
         return {"progress_m": self.progress_m, "collisions": float(self.collisions)}
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Simulate for a time, in whole steps; see `World.advance`."""
+        """Simulate for a time, in whole steps; see `World.advance`.
+
+        The voltage of the battery and the contacts are updated once, so call it every 10 ms where
+        these matter.
+        """
         self._rest_s += dt_s
-        while self._rest_s >= SIM_DT - _ROUNDING_S:
-            self._rest_s -= SIM_DT
-            self._step(outputs)
-        pose = self._bound.pose()
-        self._progress.update(pose.x, pose.y)
+        steps = int((self._rest_s + _ROUNDING_S) / SIM_DT)
+        if steps:
+            self._rest_s -= steps * SIM_DT
+            self._step(outputs, steps)
+        x, y, _ = self._bound.pose()
+        before_x, before_y = self._updated_at
+        if math.hypot(x - before_x, y - before_y) > _PROGRESS_M:
+            self._updated_at = x, y
+            self._progress.update(x, y)
 
     def inputs(self) -> Readings:
         """Quantities that sensors measure; see `World.inputs`."""
@@ -231,6 +246,47 @@ class MujocoWorld:
             if distance >= 0.0:
                 found = min(found, distance)
         return max(0.0, found - self.vehicle.nose_m)
+
+    def ranges_m(
+        self, bearings: NDArray[np.float64], farthest_m: float = 6.0
+    ) -> NDArray[np.float64]:
+        """Distances from the middle of the front bumper to walls and obstacles.
+
+        Args:
+            bearings: Directions from the heading, rad, positive to the left, (n,); each from -pi/2
+                to pi/2, where the vehicle itself is not in the way.
+            farthest_m: Distance returned where there is nothing nearer, m.
+
+        Returns:
+            Distances, m, (n,).
+        """
+        pose, nose = self._bound.pose(), self.vehicle.nose_m
+        start = np.array(
+            (
+                pose.x + nose * math.cos(pose.heading),
+                pose.y + nose * math.sin(pose.heading),
+                0.5 * self.vehicle.camera.z,
+            )
+        )
+        angles = pose.heading + bearings
+        rays = np.stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))), axis=1)
+        hit = np.empty(len(angles), np.int32)
+        found = np.empty(len(angles))
+        mujoco.mj_multiRay(
+            self.model,
+            self.data,
+            start,
+            rays.ravel(),
+            self._solid,
+            True,
+            self._chassis,
+            hit,
+            found,
+            None,
+            len(angles),
+            farthest_m,
+        )
+        return np.where(hit >= 0, np.minimum(found, farthest_m), farthest_m)
 
     def picture(self) -> NDArray[np.uint8]:
         """Picture of the front camera; see `World.picture`.
@@ -265,18 +321,35 @@ class MujocoWorld:
     def _battery_v(self) -> float:
         return self.resting_v - _INNER_OHM * self._current_a
 
-    def _step(self, outputs: Mapping[str, float | None]) -> None:
-        bound = self._bound
+    def _step(self, outputs: Mapping[str, float | None], steps: int) -> None:
+        """Take simulation steps with the same outputs and the same voltage of the battery."""
+        bound, dt_s = self._bound, steps * SIM_DT
         bound.drive(outputs, self._battery_v)
-        mujoco.mj_step(self.model, self.data)
-        self._contacts.follow(self.data, bound.pose(), SIM_DT)
+        mujoco.mj_step(self.model, self.data, nstep=steps)
+        self._contacts.follow(self.data, bound.pose, dt_s)
         speed = bound.speed()
-        self._acceleration = ((speed - self._speed) / SIM_DT, speed * bound.yaw_rate())
+        self._acceleration = ((speed - self._speed) / dt_s, speed * bound.yaw_rate())
         self._speed = speed
         rolled_m = bound.travelled_m()
         self._travelled_m += rolled_m - self._rolled_m
         self._rolled_m = rolled_m
         self._current_a = _IDLE_A + bound.current_a()
+
+
+@lru_cache(maxsize=_KEPT_COURSES)
+def _compiled(vehicle: str, world: str, seed: int, look: Look) -> tuple[Course, mujoco.MjModel]:
+    """Return a course, and the compiled model of a vehicle on it; neither may be changed."""
+    course = lay_out(world, seed)
+    spec = mujoco.MjSpec()
+    add_course(spec, course, look)
+    add_vehicle(spec, vehicle)
+    return course, spec.compile()
+
+
+@lru_cache(maxsize=_KEPT_COURSES)
+def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
+    """Return a path around a course for a vehicle."""
+    return plan_path_for(lay_out(world, seed), traits_of(vehicle))
 
 
 class ContactTracker:
@@ -308,12 +381,12 @@ class ContactTracker:
         self.bumped = self.touches = False
         self._since_s = math.inf
 
-    def follow(self, data: mujoco.MjData, pose: PlanarPose, dt_s: float) -> None:
+    def follow(self, data: mujoco.MjData, pose: Callable[[], PlanarPose], dt_s: float) -> None:
         """Update from the contacts of a simulation step.
 
         Args:
             data: State after the step.
-            pose: Pose of the vehicle.
+            pose: Returns the pose of the vehicle.
             dt_s: Length of the step, s.
         """
         self._since_s += dt_s
@@ -332,6 +405,7 @@ class ContactTracker:
         if self._since_s > APART_S:
             self.collisions += 1
         self._since_s = 0.0
+        here = pose()
         for x, y, _ in data.contact.pos[hits]:
-            bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
+            bearing = math.atan2(y - here.y, x - here.x) - here.heading
             self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

@@ -218,6 +218,7 @@ class Floating:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, boat: Afloat) -> None:
         self._model = model
         self._data = data
+        self._dt = float(model.opt.timestep)
         self._boat = boat
         self._shafts = tuple(
             (
@@ -235,11 +236,11 @@ class Floating:
         self._rudder = int(model.joint("vehicle/rudder").qposadr[0])
         self._servo = int(model.actuator("vehicle/rudder").id)
         self._joints = joints_below_chassis(model)
-        self._dt = float(model.opt.timestep)
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._push = data.qfrc_applied
         self._flow = (0.0, 0.0)
         self._log_m = 0.0
+        self._logged_s = 0.0
         self._has_rudder = True
 
     def place(self, x: float, y: float, heading: float) -> None:
@@ -248,6 +249,7 @@ class Floating:
         self._qpos[p : p + 3] = (x, y, heading)
         self._qvel[v : v + 3] = 0.0
         self._log_m = 0.0
+        self._logged_s = float(self._data.time)
         settle(self._model, self._data, self._joints)
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
@@ -303,7 +305,11 @@ class Floating:
         cosine, sine, vx, vy, r = self._motion()
         wx, wy = vx - self._flow[0], vy - self._flow[1]
         u, v = wx * cosine + wy * sine, wy * cosine - wx * sine
-        self._log_m += u * self._dt
+        now_s = float(self._data.time)
+        # Whole steps, so that the same drive is as long at any time.
+        steps = round((now_s - self._logged_s) / self._dt)
+        self._log_m += u * self._dt * steps
+        self._logged_s = now_s
         x, y, n = boat.skeg.force(u, v, r, 0.0)
         flow = u
         for part, propeller, beside, drive, dof in self._shafts:

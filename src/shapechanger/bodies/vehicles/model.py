@@ -65,7 +65,7 @@ class BoundVehicle(Protocol):
         ...
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Apply outputs; call it before every simulation step.
+        """Apply outputs and, to a boat, the forces of the water; call it every 10 ms.
 
         Args:
             outputs: Output of each part; 0 for those that are missing.

@@ -6,7 +6,9 @@ from shapechanger.errors import MissingExtra
 
 try:
     from shapechanger.envs.vehicle.env import VehicleEnv
+    from shapechanger.envs.vehicle.ranges import RangesEnv
+    from shapechanger.envs.vehicle.waypoints import WaypointEnv
 except ModuleNotFoundError as error:
     raise MissingExtra(error.name or "mujoco", "sim,robot") from error
 
-__all__ = ["VehicleEnv"]
+__all__ = ["RangesEnv", "VehicleEnv", "WaypointEnv"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -16,7 +16,23 @@ from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.simulation import MujocoWorld
 from shapechanger.worlds.world import Pose
 
-__all__ = ["CLONES", "ExpertDriver", "VehicleDemonstrator"]
+__all__ = [
+    "BEARINGS_DEG",
+    "CLONES",
+    "FARTHEST_M",
+    "ExpertDriver",
+    "TeacherDemonstrator",
+    "VehicleDemonstrator",
+    "observe_ranges",
+]
+
+BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
+"""Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
+
+FARTHEST_M: Final = 6.0
+"""Distance that it sees where nothing is nearer, m."""
+
+_BEARINGS: Final = np.radians(BEARINGS_DEG)
 
 # A vehicle that is farther away after one period of 1/20 s was put back, m.
 _MOVED_M: Final = 0.3
@@ -61,6 +77,46 @@ class VehicleDemonstrator:
         """
         seen = self._world.inputs()
         action = self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+        return action, self._disturbance.applied(action)
+
+
+def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
+    """Return what a teacher sees, shape (11,).
+
+    Distances from the middle of the front bumper at `BEARINGS_DEG`, m, up to `FARTHEST_M`; speed
+    along the heading, m/s; rate of turn, rad/s, counter-clockwise.
+    """
+    seen = world.inputs()
+    distances = world.ranges_m(_BEARINGS, FARTHEST_M)
+    return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
+
+
+class TeacherDemonstrator:
+    """A policy that sees distances, as a demonstrator that makes mistakes; see `observe_ranges`.
+
+    Args:
+        world: The world of the vehicle.
+        act: The policy: maps observations, (n, 11), to actions, (n, 2).
+        seed: Seed of the mistakes.
+    """
+
+    def __init__(
+        self, world: MujocoWorld, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int
+    ) -> None:
+        self._world = world
+        self._act = act
+        self._seeds = np.random.default_rng(seed)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        self._disturbance = Disturbance.of(
+            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
+        )
+
+    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the policy's action, to learn from, and the disturbed one, to take."""
+        action = self._act(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
         return action, self._disturbance.applied(action)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -23,7 +23,7 @@ from shapechanger.envs.vehicle.arguments import (
     check_frame_size,
     resolve_profile,
 )
-from shapechanger.envs.vehicle.drivers import VehicleDemonstrator
+from shapechanger.envs.vehicle.drivers import TeacherDemonstrator, VehicleDemonstrator
 from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
 from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldError
 from shapechanger.layout import Layout
@@ -34,7 +34,7 @@ from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["VehicleEnv"]
+__all__ = ["VehicleEnv", "without_world"]
 
 # The ground in images of the vehicle: half of its side, m, and its colour on land and on water.
 _GROUND_M: Final = 2.0
@@ -245,6 +245,22 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """
         return VehicleDemonstrator(self._world, seed)
 
+    @property
+    def teacher_env(self) -> str:
+        """Id of the env in which a teacher for this vehicle learns; see `RangesEnv`."""
+        return f"shapechanger/{self._world.vehicle.name.capitalize()}Ranges-v1"
+
+    def taught_by(
+        self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int
+    ) -> TeacherDemonstrator:
+        """Return a teacher as the demonstrator of this env.
+
+        Args:
+            act: Policy of `teacher_env`: maps observations, (n, 11), to actions, (n, 2).
+            seed: Seed of its mistakes.
+        """
+        return TeacherDemonstrator(self._world, act, seed)
+
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's frame, shape (height, width, 3); None without a render mode.
 
@@ -279,7 +295,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     @property
     def reach(self) -> float:
         """Distance from the middle of the vehicle to its farthest point, m."""
-        model = _without_world(self._world.vehicle.name)
+        model = without_world(self._world.vehicle.name)
         return body_reach(model, model.qpos0)
 
     def picture(
@@ -295,7 +311,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         Raises:
             RenderError: If nothing can be drawn here.
         """
-        model = _without_world(self._world.vehicle.name)
+        model = without_world(self._world.vehicle.name)
         return draw(model, model.qpos0, width, height, reach or body_reach(model, model.qpos0))
 
     def close(self) -> None:
@@ -324,7 +340,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         }
 
 
-def _without_world(vehicle: str) -> mujoco.MjModel:
+def without_world(vehicle: str) -> mujoco.MjModel:
     """Return a model of the vehicle on flat ground."""
     spec = mujoco.MjSpec()
     model = add_vehicle(spec, vehicle)

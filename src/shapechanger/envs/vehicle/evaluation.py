@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from shapechanger.envs.vehicle.env import VehicleEnv
 from shapechanger.errors import WorldError
 
 __all__ = ["LIMIT_S", "METRES", "Act", "DriveResult", "DriveScore", "drive", "poisson_interval"]
@@ -52,7 +52,7 @@ class DriveResult:
 
 
 def drive(
-    env: VehicleEnv,
+    env: gym.Env[Any, Any],
     act: Act,
     *,
     course: int,

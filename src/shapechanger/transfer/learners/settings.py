@@ -457,6 +457,18 @@ LEARNERS: Final[dict[str, Settings]] = {
     "ppo-rig": msgspec.structs.replace(
         _FINGER, steps=30_720, source_steps=307_200, eval_every=6144
     ),
+    "ppo-drive": PpoSettings(
+        n_envs=16,
+        n_steps=128,
+        batch_size=256,
+        n_epochs=10,
+        learning_rate=3e-4,
+        log_std_init=-0.5,
+        normalise=True,
+        steps=81_920,
+        eval_every=20_480,
+        eval_episodes=5,
+    ),
     # Half a minute, and 1, 2, 5 and 10 minutes, at 20 steps a second.
     "cloning": CloningSettings(
         budgets=(600, 1200, 2400, 6000, 12_000),
@@ -465,6 +477,15 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_steps=400,
         # Early stopping on few held-out pictures is unreliable: it stopped after 150 steps.
         clone=CloneSettings(held_out=0.0),
+    ),
+    # 5, 15, 30 and 60 s of a target, and 6 minutes of a source. Each evaluation is of about 500 m,
+    # so that a collision more or less decides nothing.
+    "waypoint": CloningSettings(
+        budgets=(100, 300, 600, 1200, 7200),
+        episode_steps=200,
+        eval_episodes=12,
+        eval_steps=500,
+        clone=CloneSettings(held_out=0.0, passes=50.0, most_steps=3000),
     ),
     # The settings that the papers of SAC and TQC share, and Stable-Baselines3's defaults.
     "sac": OffPolicySettings(algorithm="SAC", steps=200_000, eval_every=20_000),
@@ -497,7 +518,9 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-planar": ("Hopper", "Walker2d", "InvertedDoublePendulum"),
     "ppo-finger": ("Finger",),
     "ppo-rig": ("Finger",),
+    "ppo-drive": ("CarRanges",),
     "cloning": ("Car",),
+    "waypoint": ("CarWaypoint", "TankWaypoint"),
     "sac": (),
     "tqc": (),
     "sac-camera": ("Tank",),

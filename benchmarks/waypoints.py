@@ -1,0 +1,109 @@
+"""What a clone that points out the free way is worth in another vehicle, never seen by it.
+
+The sources are trained once for each seed and lie in `results/waypoints`; `SEEDS` says how many.
+Nothing is learned or tuned on the courses that are driven.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
+from dataclasses import asdict
+from itertools import permutations
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, cast
+
+from benchmarks.row import Row
+from benchmarks.vehicles import counted
+from shapechanger.demos.cloning.learn import clone
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.vehicle import WaypointEnv
+from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.cloning import record_demonstrations
+from shapechanger.transfer.learners.sb3 import use_one_thread
+from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
+from shapechanger.worlds.course import HELD_OUT
+
+__all__ = ["pairs"]
+
+VEHICLES: Final = ("car", "tank", "truck")
+SEEDS: Final = 3
+COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.
+OUT: Final = Path("results", "waypoints")
+# Collisions per 100 m, on so many of the six pairs.
+FEW: Final = 4.0
+GOOD: Final = 4
+
+
+def pairs() -> list[Row]:
+    """The six directed pairs of land vehicles, all in the corridor."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    seeds = range(int(os.environ.get("SEEDS", SEEDS)))
+    jobs = [(vehicle, seed) for seed in seeds for vehicle in VEHICLES]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        found = dict(zip(jobs, pool.map(_driven, jobs), strict=True))
+    rows: list[Row] = []
+    good = 0
+    own = [(vehicle, vehicle) for vehicle in VEHICLES]
+    for source, target in (*permutations(VEHICLES, 2), *own):
+        each = [DriveScore.of(found[source, seed][target]) for seed in seeds]
+        score = DriveScore.of([one for seed in seeds for one in found[source, seed][target]])
+        good += source != target and score.per_100_m <= FEW
+        by_seed = ", ".join(f"{one.per_100_m:.1f}" for one in each)
+        rows.append(
+            Row(
+                f"waypoints, {source} to {target}: collisions per 100 m, zero-shot",
+                f"{score.per_100_m:.1f}",
+                f"{counted(score)}; {score.speed:.2f} m/s; by seed {by_seed}",
+                "none for a single pair",
+                True,
+            )
+        )
+    rows.append(
+        Row(
+            f"waypoints: pairs with at most {FEW:g} collisions per 100 m, zero-shot",
+            f"{good} of 6",
+            f"{len(seeds)} seeds, six minutes of a source's driving each",
+            f">= {GOOD}",
+            good >= GOOD,
+        )
+    )
+    return rows
+
+
+def _driven(job: tuple[str, int]) -> dict[str, list[DriveResult]]:
+    """Train a source, drive it in all vehicles, and keep both."""
+    vehicle, seed = job
+    use_one_thread()
+    kept = OUT / f"{vehicle}-{seed}.json"
+    if kept.exists():
+        drives = json.loads(kept.read_bytes())
+        return {name: [DriveResult(**one) for one in each] for name, each in drives.items()}
+    policy = _source(vehicle, seed)
+    results: dict[str, list[DriveResult]] = {}
+    for target in VEHICLES:
+        with closing(WaypointEnv(target, courses="held-out", put_back=True)) as env:
+            results[target] = [drive(env, policy.predict, course=course) for course in COURSES]
+    plain = {name: [asdict(one) for one in each] for name, each in results.items()}
+    kept.write_text(json.dumps(plain), encoding="utf-8")
+    return results
+
+
+def _source(vehicle: str, seed: int) -> CameraPolicy:
+    path = OUT / f"{vehicle}-{seed}.safetensors"
+    if path.exists():
+        return CameraPolicy.load(path)
+    settings = cast("CloningSettings", LEARNERS["waypoint"])
+    env = EnvRef(f"shapechanger/{vehicle.capitalize()}Waypoint-v1", {"put_back": True})
+    shown = record_demonstrations(
+        env, settings.steps, settings.episode_steps, seed, settings.clone.framing
+    )
+    policy, _ = clone(
+        shown.pictures, shown.actions, settings=settings.clone, seed=seed, episodes=shown.episodes
+    )
+    policy.save(path)
+    return policy

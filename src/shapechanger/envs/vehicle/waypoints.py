@@ -1,0 +1,326 @@
+"""One camera and one action for all vehicles: where the free way is, and how fast to go there.
+
+Networks that predict steering learn the body with it: full left is another circle in each vehicle.
+A waypoint means the same in all of them. What a body must know is how fast it turns when it steers,
+two numbers that it measures itself, in seconds and without pictures.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from shapechanger.bodies.vehicles import vehicle_model
+from shapechanger.envs.vehicle.arguments import Courses
+from shapechanger.envs.vehicle.env import VehicleEnv
+from shapechanger.envs.vehicle.ranges import RangesEnv
+from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
+from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.worlds.expert import CourseExpert, Disturbance
+from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
+from shapechanger.worlds.simulation import MujocoWorld
+
+__all__ = ["AHEAD_M", "SteeringResponse", "WaypointDemonstrator", "WaypointEnv", "measure_response"]
+
+AHEAD_M: Final = 0.8
+"""Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
+
+WIDEST_RAD: Final = 1.0
+"""Bearing of the waypoint at an action of -1 or 1, rad."""
+
+_SIZE: Final = (160, 120)
+_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
+_LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
+# Of the slow wandering and jerks of a demonstrator: as much as steering by 0.25 is in the car.
+_SWAY: Final = (0.18, 0.1)
+
+# Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
+# is left out because the vehicle is still changing its motion.
+_SECONDS: Final = 5.0
+_HOLD: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class SteeringResponse:
+    """How fast a vehicle turns when it steers.
+
+    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn the vehicle
+    the more, the faster it rolls; tracks turn it where it stands.
+
+    Attributes:
+        per_metre: Turn for each metre at full steering, rad/m.
+        per_second: Turn for each second at full steering, rad/s.
+
+    Raises:
+        StudyError: If the vehicle does not turn, or a number is negative.
+    """
+
+    per_metre: float
+    per_second: float
+
+    def __post_init__(self) -> None:
+        if not (min(self.per_metre, self.per_second) >= 0.0 < self.per_metre + self.per_second):
+            raise StudyError(
+                "A vehicle must turn to the right when it steers to the right: the turn was "
+                f"{self.per_metre:.2f} rad/m and {self.per_second:.2f} rad/s."
+            )
+
+    def steering(self, bearing: float, speed: float) -> float:
+        """Return the steering, from -1 to 1, that leads to a waypoint `AHEAD_M` ahead.
+
+        Pure pursuit: the circle through a point at the distance L and the bearing b has the
+        curvature 2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
+
+        Args:
+            bearing: Bearing of the waypoint, rad, positive to the right.
+            speed: Speed along the heading, m/s.
+        """
+        speed = max(speed, _SLOWEST_MPS)
+        rate = 2.0 * math.sin(bearing) / AHEAD_M * speed
+        return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
+
+
+def measure_response(
+    env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int, seed: int = 0
+) -> SteeringResponse:
+    """Measure how a vehicle turns, from 5 s of its own motion at random commands.
+
+    Args:
+        env: A vehicle that observes numbers, with steering and throttle as its action. It is reset.
+        speed_at: Place of the speed, m/s, in its observation.
+        yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
+        seed: Seed of the start and the commands.
+
+    Raises:
+        StudyError: If it does not turn as it steers.
+    """
+    rng = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    command = np.zeros(2, np.float32)
+    turning: list[tuple[float, float]] = []
+    rates: list[float] = []
+    for step in range(round(_SECONDS * env.metadata["render_fps"])):
+        if step % _HOLD == 0:
+            command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
+        seen, _, terminated, truncated, _ = env.step(command)
+        if step % _HOLD >= _HOLD // 2:
+            turning.append((float(command[0] * seen[speed_at]), float(command[0])))
+            rates.append(-float(seen[yaw_rate_at]))
+        if terminated or truncated:
+            env.reset()
+    per_metre, per_second = nnls(np.array(turning), np.array(rates))[0]
+    return SteeringResponse(float(per_metre), float(per_second))
+
+
+@lru_cache(maxsize=32)
+def _response_of(
+    vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
+) -> SteeringResponse:
+    """Measure the response of a simulated vehicle, once in a process."""
+    if full_robot:
+        env: VehicleEnv | RangesEnv = VehicleEnv(
+            vehicle, world=world, robot=robot, image=False, put_back=True, courses=(0,)
+        )
+    else:
+        env = RangesEnv(vehicle, world=world, robot=robot, put_back=True, courses=(0,))
+    try:
+        places = env.observation_layout.slices
+        return measure_response(env, places["speed"].start, places["yaw_rate"].start)
+    finally:
+        env.close()
+
+
+class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
+    """The driving task with a camera and an action that are the same for all vehicles.
+
+    A policy that learned in one vehicle drives another one as it is: pictures are warped to one
+    virtual camera (`shapechanger.worlds.rectify`), and the action is a waypoint, which the vehicle
+    turns into steering by its own `SteeringResponse`, measured when the env is made.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`: bearing of the free way `AHEAD_M` ahead, in `WIDEST_RAD`, positive
+    to the right; and the speed, -1 for standing and 1 for full throttle. It acts for one control
+    period, 1/20 s.
+
+    ## Observation space
+    The rectified frame, RGB, `uint8`, shape (48, 80, 3).
+
+    ## Reward, start, end and info
+    Those of `RangesEnv`, or of `VehicleEnv` with `full_robot`.
+
+    Args:
+        vehicle: "car", "tank", "boat" or "truck".
+        world: "corridor", "yard" or "harbour"; None for the corridor, or the harbour for a boat, so
+            that land vehicles differ in their bodies alone.
+        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
+        full_robot: Whether the robot is emulated, as in `VehicleEnv`.
+        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
+        put_back: Whether to put the vehicle back on the lane after a collision. A collision then
+            does not end the episode.
+
+    Attributes:
+        parts: The parts that the robot's outputs move.
+        response: How the vehicle turns.
+
+    Raises:
+        UnknownName: If there is no such vehicle, world, profile or kind of courses.
+        ProfileError: If the profile moves other parts than the vehicle has, or has no camera.
+        WorldError: If the vehicle cannot drive in the world.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 20}  # noqa: RUF012
+
+    def __init__(
+        self,
+        vehicle: str,
+        *,
+        world: str | None = None,
+        robot: str | os.PathLike[str] | None = None,
+        full_robot: bool = False,
+        courses: Courses = "training",
+        put_back: bool = False,
+    ) -> None:
+        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
+        EzPickle.__init__(self, vehicle, **arguments)
+        body = vehicle_model(vehicle)
+        world = world or ("harbour" if body.floats else "corridor")
+        common: dict[str, Any] = {"world": world, "robot": robot, "courses": courses}
+        self._env: VehicleEnv | RangesEnv = (
+            VehicleEnv(vehicle, size=_SIZE, state=True, put_back=put_back, **common)
+            if full_robot
+            else RangesEnv(vehicle, camera=_SIZE, put_back=put_back, **common)
+        )
+        self.parts = self._env.parts
+        self.response = _response_of(vehicle, world, robot, full_robot)
+        self._turns_on_the_spot = body.turning_radius_m == 0.0
+        mount = body.camera
+        self._rectifier = Rectifier(
+            CameraGeometry(math.degrees(mount.pitch_rad), mount.fovy_deg), _SIZE
+        )
+        columns, rows = CANONICAL_SIZE
+        self.observation_space = gym.spaces.Box(0, 255, (rows, columns, 3), np.uint8)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        camera = Element("camera", "front")
+        self.observation_layout = Layout(
+            (Feature("camera/canonical", "1", 0.0, 255.0, camera, (rows, columns, 3)),)
+        )
+        self.action_layout = Layout(
+            (
+                Feature("waypoint/bearing", "1", -1.0, 1.0, gain=WIDEST_RAD, gain_unit="rad"),
+                Feature("waypoint/speed", "1", -1.0, 1.0),
+            )
+        )
+        self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}
+        self._speed = 0.0
+
+    @property
+    def world(self) -> MujocoWorld:
+        """The simulated world, with its ground truth."""
+        return self._env.world
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+        """Start an episode; see `VehicleEnv.reset`."""
+        super().reset(seed=seed)
+        seen, info = self._env.reset(seed=seed, options=options)
+        return self._observe(seen), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
+        """Drive towards a waypoint for one control period.
+
+        Raises:
+            SpaceMismatch: If the action is not two finite numbers.
+            ResetNeeded: If `reset` was never called.
+        """
+        values = np.asarray(action, np.float64)
+        if values.shape != (2,) or not np.isfinite(values).all():
+            raise SpaceMismatch(
+                f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
+            )
+        bearing, speed = np.clip(values, -1.0, 1.0).tolist()
+        steering = self.response.steering(bearing * WIDEST_RAD, self._speed)
+        throttle = max(_LEAST_THROTTLE, 0.5 * (speed + 1.0))
+        if self._turns_on_the_spot:  # Saturating one track would prevent the turn.
+            throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
+        command = np.array((steering, throttle), np.float32)
+        seen, reward, terminated, truncated, info = self._env.step(command)
+        return self._observe(seen), reward, terminated, truncated, info
+
+    def hold_out(self) -> None:
+        """Sample held-out courses from the next reset on."""
+        self._env.hold_out()
+
+    def demonstrator(self, seed: int) -> WaypointDemonstrator:
+        """Return an expert that knows the whole course and recovers from its own mistakes.
+
+        Args:
+            seed: Seed of the mistakes.
+        """
+        return WaypointDemonstrator(self.world, seed)
+
+    def close(self) -> None:
+        """Release the pins and the renderer."""
+        self._env.close()
+
+    @staticmethod
+    def certify_shift(
+        source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
+    ) -> VehicleShift:
+        """Compare two vehicles; see `VehicleEnv.certify_shift`."""
+        return certify_vehicles(source, target, allow_empty=allow_empty)
+
+    def _observe(self, seen: Any) -> NDArray[np.uint8]:
+        places = self._env.observation_layout.slices
+        if isinstance(self._env, RangesEnv):
+            self._speed = float(seen[places["speed"].start])
+            return self._rectifier(self.world.picture())
+        offset = places["speed"].start - places["camera/image"].stop
+        self._speed = float(np.nan_to_num(seen["state"][offset]))
+        return self._rectifier(seen["image"])
+
+
+class WaypointDemonstrator:
+    """Expert that points out the free way, makes mistakes and recovers from them.
+
+    Args:
+        world: The world of the vehicle.
+        seed: Seed of the mistakes.
+    """
+
+    def __init__(self, world: MujocoWorld, seed: int) -> None:
+        self._world = world
+        self._seeds = np.random.default_rng(seed)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        world = self._world
+        self._expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
+        self._disturbance = Disturbance(seed=int(self._seeds.integers(2**31)), size=_SWAY)
+
+    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the waypoint, to learn from, and the disturbed one, to drive to.
+
+        Returns:
+            Each has shape (2,): bearing and speed.
+        """
+        pose, path = self._world.pose, self._expert.path
+        station = path.nearest(pose.x, pose.y).station
+        x, y = path.ahead(station, AHEAD_M)
+        left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+        share = self._expert.speeds[path.index(station)] / self._world.vehicle.top_speed_mps
+        waypoint = np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)
+        return waypoint, self._disturbance.applied(waypoint)

@@ -1,0 +1,142 @@
+"""A camera policy that learns from a teacher which sees what no camera shows.
+
+The teacher drives on distances, speed and rate of turn, where learning by trial takes a minute. It
+shows its driving to the student, which sees pictures alone (D. Chen et al., "Learning by Cheating",
+CoRL 2019). Then the student drives, and the teacher says what it would have done (S. Ross et al.,
+"A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning", AISTATS
+2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.demos.cloning.learn import clone
+from shapechanger.demos.cloning.pictures import prepare
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.errors import StudyError
+from shapechanger.transfer.env_ref import CanBeTaught, EnvRef, TaskDemonstrator
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
+
+__all__ = ["STUDENT_CLONING", "STUDENT_STEPS", "train_student"]
+
+STUDENT_STEPS: Final = 4800
+"""Default steps of a student: four minutes, half of which the teacher drives."""
+
+STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=3000)
+"""Default settings of its cloning."""
+
+_EPISODE_STEPS: Final = 200
+
+
+def train_student(
+    env: EnvRef,
+    teacher: TrainedPolicy,
+    steps: int,
+    seed: int,
+    *,
+    settings: CloneSettings = STUDENT_CLONING,
+    on_steps: Callable[[int], None] = lambda steps: None,
+) -> CameraPolicy:
+    """Train a camera policy from a teacher.
+
+    Args:
+        env: The student's env, such as `Car`.
+        teacher: A policy of the same vehicle on distances, such as one of `CarRanges`.
+        steps: Steps of driving: half by the teacher, half by the student.
+        seed: Seed of everything random.
+        settings: Settings of its cloning.
+        on_steps: Called with the number of steps driven, after each episode.
+
+    Raises:
+        StudyError: If the env has no teachers, the policy is of another env, or there is not at
+            least one step for each.
+    """
+    if steps < 2:
+        raise StudyError(f"Teacher and student need at least one step each, got {steps} in total.")
+    made = env.make(max_episode_steps=_EPISODE_STEPS)
+    try:
+        inner = made.unwrapped
+        if not isinstance(inner, CanBeTaught):
+            raise StudyError(f"{env} has no teachers: those that a vehicle's camera drives have.")
+        wanted, taught = inner.teacher_env, teacher.card.env.id
+        if taught != wanted:
+            name = wanted.rpartition("/")[2].removesuffix("-v1")
+            raise StudyError(
+                f"A teacher for {env.id} is a policy of {wanted}, and this one is of {taught}: "
+                f"train one by `shapechanger train {name}`."
+            )
+        lessons = _Lessons(made, inner.taught_by(teacher.act, seed), settings, seed, on_steps)
+        lessons.drive(steps // 2)
+        first = lessons.learned()
+        lessons.drive(steps - steps // 2, first)
+        policy = lessons.learned()
+    finally:
+        made.close()
+    return policy.described(
+        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, teacher=taught
+    )
+
+
+class _Lessons:
+    """Pictures, and what the teacher would do where they were taken.
+
+    Args:
+        env: The student's env.
+        teacher: The teacher, as its demonstrator.
+        settings: Settings of the cloning.
+        seed: Seed of the starts and of the cloning.
+        on_steps: Called with the number of steps driven.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Any, Any],
+        teacher: TaskDemonstrator,
+        settings: CloneSettings,
+        seed: int,
+        on_steps: Callable[[int], None],
+    ) -> None:
+        self._env = env
+        self._teacher = teacher
+        self._settings = settings
+        self._seed = seed
+        self._on_steps = on_steps
+        self._pictures: list[NDArray[np.uint8]] = []
+        self._actions: list[NDArray[np.float32]] = []
+        self._episodes: list[int] = []
+
+    def drive(self, steps: int, student: CameraPolicy | None = None) -> None:
+        """Drive and record; the teacher makes mistakes on purpose, the student its own."""
+        end = len(self._actions) + steps
+        while len(self._actions) < end:
+            picture = self._env.reset(seed=None if self._episodes else self._seed)[0]
+            self._teacher.begin()
+            began = len(self._actions)
+            over = False
+            while not over and len(self._actions) < end:
+                meant, disturbed = self._teacher.act()
+                self._pictures.append(prepare(picture[np.newaxis], self._settings.framing)[0])
+                self._actions.append(meant)
+                done = disturbed if student is None else student.predict(picture)
+                picture, _, terminated, truncated, _ = self._env.step(done)
+                over = terminated or truncated
+            self._episodes.append(len(self._actions) - began)
+            self._on_steps(len(self._actions))
+
+    def learned(self) -> CameraPolicy:
+        """Clone the teacher from all that was recorded."""
+        policy, _ = clone(
+            np.stack(self._pictures),
+            np.stack(self._actions),
+            settings=self._settings,
+            seed=self._seed % 2**31,
+            episodes=self._episodes,
+        )
+        return policy

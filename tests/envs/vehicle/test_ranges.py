@@ -1,0 +1,131 @@
+"""The fast env of a vehicle: it drives as the whole robot does, and sees distances."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
+from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, ExpertDriver
+from shapechanger.envs.vehicle.ranges import OutputShaper
+from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
+from shapechanger.worlds.course import HELD_OUT, HOME
+
+_COURSE = {"course": 2, "start": 2}
+_STEPS = 60
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_it_drives_as_the_whole_robot_does(vehicle: str) -> None:
+    """Three seconds of the expert's actions, without looking, lead to nearly the same place."""
+    with (
+        closing(VehicleEnv(vehicle, image=False)) as robot,
+        closing(RangesEnv(vehicle)) as fast,
+    ):
+        robot.reset(options=_COURSE)
+        fast.reset(options=_COURSE)
+        expert = ExpertDriver(robot.world)
+        info: dict[str, Any] = {}
+        other: dict[str, Any] = {}
+        for _ in range(_STEPS):
+            action = expert(None)
+            info = robot.step(action)[-1]
+            other = fast.step(action)[-1]
+        (x, y, heading), (fast_x, fast_y, fast_heading) = info["pose"], other["pose"]
+        assert info["progress"] > 1.0
+        assert math.hypot(x - fast_x, y - fast_y) < 0.03 * info["progress"]
+        assert abs(math.remainder(heading - fast_heading, math.tau)) < math.radians(3.0)
+        assert other["progress"] == pytest.approx(info["progress"], rel=0.02)
+        assert other["collisions"] == info["collisions"] == 0
+
+
+def test_distances_are_those_to_the_walls() -> None:
+    """The one ahead is the ultrasonic sensor's, and all change as the vehicle turns."""
+    with closing(RangesEnv("car")) as env:
+        seen, _ = env.reset(options=_COURSE)
+        assert env.observation_space.contains(seen)
+        distances = dict(zip(BEARINGS_DEG, seen, strict=False))
+        assert distances[0] == pytest.approx(env.world.distance_m(), rel=0.1)
+        assert 0.1 < distances[90] < FARTHEST_M
+        assert 0.1 < distances[-90] < FARTHEST_M
+        width = distances[90] + distances[-90]
+        pose = env.world.pose
+        env.world.put(type(pose)(pose.x, pose.y, pose.heading + math.pi))
+        turned = env.world.ranges_m(np.radians(BEARINGS_DEG))
+        assert turned[0] + turned[-1] == pytest.approx(width, rel=0.3)
+
+
+def test_a_collision_costs_and_ends_the_episode() -> None:
+    """Full throttle into the wall; put back, the vehicle goes on and pays once for each."""
+    ahead = np.array([0.0, 1.0], np.float32)
+    with closing(RangesEnv("car")) as env:
+        env.reset(options=_COURSE)
+        for _ in range(200):
+            _, reward, terminated, _, info = env.step(ahead)
+            if terminated:
+                break
+        assert info["collisions"] == 1
+        assert info["reward_terms"]["reward_collision"] == -3.0
+        assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    with closing(RangesEnv("car", put_back=True)) as env:
+        env.reset(options=_COURSE)
+        costs = 0.0
+        for _ in range(200):
+            _, _, terminated, _, info = env.step(ahead)
+            costs += info["reward_terms"]["reward_collision"]
+            assert not terminated
+        assert info["collisions"] >= 2
+        assert costs == -3.0 * info["collisions"]
+
+
+def test_standing_costs() -> None:
+    """Who stops in front of a wall must not think that it is worth it."""
+    with closing(RangesEnv("tank")) as env:
+        env.reset(options=_COURSE)
+        total = sum(env.step(np.zeros(2, np.float32))[1] for _ in range(20))
+        assert total == pytest.approx(-1.0, abs=0.01)
+
+
+def test_the_guard_shapes_the_outputs() -> None:
+    """Slew, caps, and the block after a bump, by the guard's own functions."""
+    plan = GuardPlan(
+        "test",
+        (ActionPlan("throttle", high=0.5, slew_per_s=4.0, propels=True),),
+        (OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}),),
+        limits=LimitPlan(bump_hold_ms=100),
+    )
+    shaper = OutputShaper(plan)
+    # Ticks of 10 ms: 0, 0.04, ... 0.16 before each of five.
+    assert shaper.outputs((1.0,), False, 5)["wheels"] == pytest.approx(0.08)
+    for _ in range(4):
+        last = shaper.outputs((1.0,), False, 5)["wheels"]
+    assert last == pytest.approx(0.5)
+    blocked = [shaper.outputs((1.0,), bumped, 5)["wheels"] for bumped in (True, False, False)]
+    assert blocked[1] == pytest.approx(0.0)
+    assert blocked[2] == pytest.approx(0.08)
+    shaper.reset()
+    assert shaper.applied == (0.0,)
+
+
+def test_what_it_refuses() -> None:
+    """Each in a sentence."""
+    with pytest.raises(UnknownName, match="No vehicle matches 'carr'"):
+        RangesEnv("carr")
+    with pytest.raises(UnknownName, match="No weight of the reward matches 'colision'"):
+        RangesEnv("car", reward={"colision": -1.0})
+    with closing(RangesEnv("car", courses=HELD_OUT)) as env:
+        with pytest.raises(gym.error.ResetNeeded):
+            env.step(np.zeros(2, np.float32))
+        env.reset(seed=0)
+        with pytest.raises(SpaceMismatch, match="steering and throttle"):
+            env.step(np.zeros(3, np.float32))
+        with pytest.raises(SpaceMismatch, match="steering and throttle"):
+            env.step(np.array([np.nan, 0.0], np.float32))
+        with pytest.raises(WorldError, match="has no camera"):
+            env.world.picture()

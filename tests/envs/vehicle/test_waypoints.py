@@ -1,0 +1,89 @@
+"""Waypoints: one action for all vehicles, and each body measures what it needs for it."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from shapechanger.envs.catalogue import WAYPOINT_ENVS
+from shapechanger.envs.vehicle import RangesEnv, WaypointEnv
+from shapechanger.envs.vehicle.waypoints import AHEAD_M, SteeringResponse, measure_response
+from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.worlds.course import HOME
+
+_COURSE = {"course": 2, "start": 2}
+
+
+def test_a_response_turns_a_bearing_into_steering() -> None:
+    """Left is left, the middle is the middle, and what the body cannot do is its full lock."""
+    car, tank = SteeringResponse(2.0, 0.0), SteeringResponse(0.0, 4.0)
+    assert car.steering(0.0, 1.0) == 0.0
+    assert car.steering(0.1, 1.0) == -car.steering(-0.1, 1.0) > 0.0
+    assert car.steering(1.0, 1.0) == 1.0
+    # A car steers the same at each speed, tracks the more the faster they go.
+    assert car.steering(0.2, 2.0) == pytest.approx(car.steering(0.2, 1.0))
+    assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * tank.steering(0.2, 0.5))
+    assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * math.sin(0.2) / AHEAD_M / 4.0)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 0.0), (-1.0, 2.0), (math.nan, 1.0)])
+def test_a_body_that_does_not_turn_is_refused(numbers: tuple[float, float]) -> None:
+    """Such as one whose steering is not plugged in, or the wrong way round."""
+    with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
+        SteeringResponse(*numbers)
+
+
+def test_a_car_measures_its_own_circle() -> None:
+    """Five seconds of its own motion give nearly what its drawing says."""
+    with closing(RangesEnv("car", put_back=True)) as env:
+        places = env.observation_layout.slices
+        found = measure_response(env, places["speed"].start, places["yaw_rate"].start)
+    # The tangent of the full lock over the wheelbase, 1/m; the tyres slip a little.
+    drawn = math.tan(math.radians(28.0)) / 0.26
+    assert found.per_metre + found.per_second == pytest.approx(drawn, rel=0.15)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize(("env_id", "vehicle"), [(i, v) for i, (v, _) in WAYPOINT_ENVS.items()])
+def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> None:
+    """The same law drives all vehicles; what is left to learn is to see the free way."""
+    with closing(WaypointEnv(vehicle, put_back=True)) as env:
+        seen, _ = env.reset(options=_COURSE)
+        assert env.observation_space.contains(seen)
+        guide = env.demonstrator(0)
+        for _ in range(150):
+            waypoint, _ = guide.act()
+            assert env.action_space.contains(waypoint)
+            *_, info = env.step(waypoint)
+        assert info["collisions"] == 0, env_id
+        assert info["progress"] > 2.0
+        assert env.world.course.world == ("corridor" if HOME[vehicle] != "harbour" else "harbour")
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_the_whole_robot_follows_them_too() -> None:
+    """By what its own sensors measure."""
+    with closing(WaypointEnv("car", full_robot=True, put_back=True)) as env:
+        env.reset(options=_COURSE)
+        guide = env.demonstrator(0)
+        for _ in range(60):
+            seen, _, _, _, info = env.step(guide.act()[0])
+        assert seen.shape == (48, 80, 3)
+        assert info["collisions"] == 0
+        assert info["progress"] > 3.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_what_is_no_waypoint_is_refused() -> None:
+    """Three numbers, or none."""
+    with closing(WaypointEnv("car")) as env:
+        env.reset(options=_COURSE)
+        for wrong in (np.zeros(3, np.float32), np.array([0.0, np.inf], np.float32)):
+            with pytest.raises(SpaceMismatch, match="A waypoint is a bearing and a speed"):
+                env.step(wrong)
