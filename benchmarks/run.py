@@ -165,6 +165,8 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "robot-hold": robots.hold,
     "robot-faults": robot_faults.faults,
     "vehicles-frames": vehicles.frames,
+    "vehicles-fast": vehicles.fast,
+    "vehicles-students": vehicles.students,
     "vehicles-expert": vehicles.expert,
     "vehicles-clone": vehicles.clone,
     "vehicles-twin": vehicles_twin.twin,

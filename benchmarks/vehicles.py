@@ -9,6 +9,7 @@ import os
 import statistics
 import time
 from contextlib import closing
+from pathlib import Path
 from typing import Any, Final
 
 import gymnasium as gym
@@ -16,15 +17,21 @@ import gymnasium as gym
 from benchmarks.clones import blind, find_clone, sighted
 from benchmarks.row import Row
 from shapechanger.bodies.vehicles import VEHICLES
-from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.cli.train import Train
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
 from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.worlds.course import HELD_OUT
 
-__all__ = ["clone", "counted", "expert", "frames", "layouts"]
+__all__ = ["clone", "counted", "expert", "fast", "frames", "layouts", "students"]
 
 EXPERT_LAYOUTS: Final = 50
 CLONE_LAYOUTS: Final = 20
+STUDENT_LAYOUTS: Final = 17  # 510 m.
+STUDENT_SEEDS: Final = 3
+EXPERT_MPS: Final = 1.88  # In benchmarks/results/vehicles-expert.json.
 # A blind vehicle gets nowhere: it need not be waited for as long as for one that drives.
 BLIND_S: Final = 60.0
 
@@ -74,6 +81,44 @@ def _spent_s(env: gym.Env[Any, Any], act: Act, seen: Any) -> float:
         began = time.process_time()
         seen, *_ = env.step(action)
         spent += time.process_time() - began
+    return spent
+
+
+def fast() -> list[Row]:
+    """Steps of the env on distances for each step of the whole robot, both without pictures."""
+    rows: list[Row] = []
+    for vehicle in ("car", *sorted(set(VEHICLES) - {"car"})):
+        with (
+            closing(VehicleEnv(vehicle, image=False, put_back=True)) as robot,
+            closing(RangesEnv(vehicle, put_back=True)) as ranges,
+        ):
+            ratios: list[float] = []
+            for round_ in range(ROUNDS + 1):
+                spent = [_round_s(env, round_) for env in (robot, ranges)]
+                ratios.append(spent[0] / spent[1])
+        ratio = statistics.median(ratios[1:])  # The first round warms up.
+        rows.append(
+            Row(
+                f"{vehicle}: steps of {vehicle.capitalize()}Ranges-v1 for one of "
+                f"{vehicle.capitalize()}-v1 without pictures, one core",
+                f"{ratio:.1f}",
+                f"{min(ratios[1:]):.1f} to {max(ratios[1:]):.1f} in {ROUNDS} rounds of {STEPS}",
+                ">= 5",
+                ratio >= 5.0,
+            )
+        )
+    return rows
+
+
+def _round_s(env: VehicleEnv | RangesEnv, start: int) -> float:
+    env.reset(options={"course": HELD_OUT[0], "start": start})
+    pilot = ExpertDriver(env.world)
+    spent = 0.0
+    for _ in range(STEPS):
+        action = pilot(None)
+        began = time.thread_time()
+        env.step(action)
+        spent += time.thread_time() - began
     return spent
 
 
@@ -135,6 +180,45 @@ def clone() -> list[Row]:
     return rows
 
 
+def students() -> list[Row]:
+    """Cars that learned by trial on distances, and their students, which see pictures alone.
+
+    `SEEDS` of each are trained by the command line, from nothing.
+    """
+    rows: list[Row] = []
+    for seed in range(int(os.environ.get("SEEDS", STUDENT_SEEDS))):
+        out = Path("results", "students")
+        teacher, student = (out / f"{name}-{seed}.safetensors" for name in ("teacher", "student"))
+        began = time.monotonic()
+        Train("CarRanges", out=teacher, seed=seed).run()
+        Train("Car", teacher=teacher, out=student, seed=seed).run()
+        minutes = (time.monotonic() - began) / 60.0
+        with closing(RangesEnv("car", courses="held-out", put_back=True)) as env:
+            knows = _score(env, _alone(load_policy(teacher)), layouts(STUDENT_LAYOUTS))
+        with closing(_env("car", image=True)) as env:
+            score = _score(env, sighted(CameraPolicy.load(student)), layouts(STUDENT_LAYOUTS))
+        for name, one in (("teacher", knows), ("student", score)):
+            rows += [
+                Row(
+                    f"{name} of the car, seed {seed}: mean speed",
+                    f"{one.speed:.2f} m/s",
+                    f"drives from {one.slowest:.2f} to {one.fastest:.2f}; {one.drives} held-out "
+                    f"layouts, {100 * one.reached:.0f} % finished; both trained in "
+                    f"{minutes:.1f} minutes",
+                    "> 1.88 m/s, the expert's",
+                    one.speed > EXPERT_MPS,
+                ),
+                _collision_row(f"{name} of the car, seed {seed}", one, 1.0),
+            ]
+    return rows
+
+
+def _alone(policy: TrainedPolicy) -> Act:
+    """A policy for one observation at a time."""
+    many = policy.act
+    return lambda seen: many(seen[None])[0]
+
+
 def _env(vehicle: str, *, image: bool) -> VehicleEnv:
     return VehicleEnv(vehicle, courses="held-out", image=image, put_back=True)
 
@@ -144,7 +228,9 @@ def _expert_score(vehicle: str, courses: range) -> DriveScore:
         return _score(env, ExpertDriver(env.world), courses)
 
 
-def _score(env: VehicleEnv, act: Act, courses: range, limit_s: float = LIMIT_S) -> DriveScore:
+def _score(
+    env: VehicleEnv | RangesEnv, act: Act, courses: range, limit_s: float = LIMIT_S
+) -> DriveScore:
     return DriveScore.of([drive(env, act, course=course, limit_s=limit_s) for course in courses])
 
 

@@ -36,7 +36,8 @@ class ListEnvs:
         table = Table("id", "body", box=None, pad_edge=False)
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
-        for env_id, (vehicle, summary) in (VEHICLE_ENVS | RANGES_ENVS | WAYPOINT_ENVS).items():
+        vehicles = (VEHICLE_ENVS, RANGES_ENVS, WAYPOINT_ENVS)
+        for env_id, (vehicle, summary) in (one for envs in vehicles for one in envs.items()):
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -76,15 +76,22 @@ class OutputShaper:
             self._blocked_s -= ticks * self.tick_s
             for i in self._forward:
                 aims[i] = min(aims[i], actions[i].rest)
-        total = np.zeros(len(self._plan.outputs))
-        for _ in range(ticks):
-            total += output_values(self._plan, self.applied)
-            self.applied = tuple(
-                slewed(action, now, aim, self.tick_s)
-                for action, now, aim in zip(actions, self.applied, aims, strict=True)
-            )
-        means = (total / ticks).tolist()
-        return {out.part: mean for out, mean in zip(self._plan.outputs, means, strict=True)}
+        target = tuple(aims)
+        total = [0.0] * len(self._plan.outputs)
+        left = ticks
+        while left:
+            # Once at the target, the rest of the period is alike.
+            alike = left if self.applied == target else 1
+            left -= alike
+            values_now = output_values(self._plan, self.applied)
+            total = [one + alike * now for one, now in zip(total, values_now, strict=True)]
+            if alike == 1:
+                self.applied = tuple(
+                    slewed(action, now, aim, self.tick_s)
+                    for action, now, aim in zip(actions, self.applied, target, strict=True)
+                )
+        outputs = self._plan.outputs
+        return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
 
 
 class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
@@ -206,6 +213,7 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
                 f"{drawn.course}: choose another."
             )
         self._shaper.reset()
+        self._progress_m = 0.0
         self._needs_reset = False
         return self._observe(), self._info()
 
@@ -226,15 +234,17 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
                 f"An action of a vehicle is steering and throttle, got {np.asarray(action)}."
             )
         world, shaper = self._world, self._shaper
-        progress, collisions = world.progress_m, world.collisions
+        progress, collisions = self._progress_m, world.collisions
         command = tuple(values.tolist())
         world.advance(self._period_s, shaper.outputs(command, world.bumped, self._ticks))
         collided = world.collisions > collisions
-        speed = (world.progress_m - progress) / self._period_s
+        self._progress_m = world.progress_m
+        speed = (self._progress_m - progress) / self._period_s
         stands = abs(speed) < _STANDING_MPS
         terms = self._reward.terms(speed, collided, stands, self._period_s)
         if collided and self._puts_back:
             world.put_back()
+            self._progress_m = world.progress_m
         terminated = self._reward.ends(collided)
         info = self._info() | terms
         info["reward_terms"] = terms
@@ -253,14 +263,13 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         self._world.close()
 
     def _observe(self) -> NDArray[np.float32]:
-        layout = self.observation_layout
-        seen = np.clip(observe_ranges(self._world), layout.low, layout.high)
-        return seen.astype(np.float32)
+        space = cast("gym.spaces.Box", self.observation_space)
+        return np.clip(observe_ranges(self._world), space.low, space.high)
 
     def _info(self) -> dict[str, Any]:
         world, pose = self._world, self._world.pose
         return {
-            "progress": world.progress_m,
+            "progress": self._progress_m,
             "collisions": world.collisions,
             "pose": (pose.x, pose.y, pose.heading),
             "course": world.seed,

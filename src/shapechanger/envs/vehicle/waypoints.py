@@ -222,6 +222,10 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         )
         self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}
         self._speed = 0.0
+        places = self._env.observation_layout.slices
+        self._speed_at = places["speed"].start
+        if full_robot:
+            self._speed_at -= places["camera/image"].stop
 
     @property
     def world(self) -> MujocoWorld:
@@ -283,12 +287,10 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         return certify_vehicles(source, target, allow_empty=allow_empty)
 
     def _observe(self, seen: Any) -> NDArray[np.uint8]:
-        places = self._env.observation_layout.slices
         if isinstance(self._env, RangesEnv):
-            self._speed = float(seen[places["speed"].start])
+            self._speed = float(seen[self._speed_at])
             return self._rectifier(self.world.picture())
-        offset = places["speed"].start - places["camera/image"].stop
-        self._speed = float(np.nan_to_num(seen["state"][offset]))
+        self._speed = float(np.nan_to_num(seen["state"][self._speed_at]))
         return self._rectifier(seen["image"])
 
 
