@@ -172,7 +172,6 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-twin": vehicles_twin.twin,
     "vehicles-pairs": vehicles_studies.pairs,
     "vehicles-lenses": vehicles_studies.lenses,
-    "vehicles-tries": vehicles_studies.tries,
     "vehicles-waypoints": waypoints.pairs,
 }
 

@@ -14,12 +14,10 @@ import msgspec
 
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite
-from shapechanger.cli.transfer import Transfer
 from shapechanger.reports.numbers import estimate_text
-from shapechanger.transfer.study import STUDY_FILE, Study
-from shapechanger.transfer.suite import StudyOutcome, study_outcomes
+from shapechanger.transfer.suite import StudyOutcome
 
-__all__ = ["lenses", "pairs", "tries"]
+__all__ = ["lenses", "pairs"]
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
@@ -46,14 +44,6 @@ def pairs() -> list[Row]:
 def lenses() -> list[Row]:
     """A car, and the same car with something wrong with its camera."""
     return [_row(crossing) for crossing in _suite("lenses")]
-
-
-def tries() -> list[Row]:
-    """From car to tank by SAC from camera."""
-    out = Path("results", "Car-to-Tank-sac")
-    Transfer("Car", "Tank", learner="sac", seeds=_seeds(), out=out).run()
-    study = msgspec.json.decode((out / STUDY_FILE).read_bytes(), type=Study)
-    return [_row(crossing) for crossing in study_outcomes({"Car-to-Tank": study})]
 
 
 def _suite(name: Literal["vehicles", "lenses"]) -> list[StudyOutcome]:

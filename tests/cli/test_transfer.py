@@ -227,7 +227,7 @@ def test_play_makes_a_film_where_there_is_no_screen(
             ["transfer", "Ant", "ExtendedAnt", "--source-options", '{"ctrl_cost_weight": "x"}'],
             "ctrl_cost_weight must be a number",
         ),
-        (["train", "Ant", "--learner", "sac-camera"], "Ant-v1 has no camera and no demonstrator"),
+        (["train", "Ant", "--learner", "cloning"], "Ant-v1 has no camera and no demonstrator"),
         (["transfer", "Finger", "Finger", "--target-options", "{"], "must be JSON"),
         (["transfer", "Finger", "Finger", "--target-options", '{"gab": 1}'], "argument 'gab'"),
         (

@@ -26,7 +26,7 @@ from shapechanger.errors import MissingExtra, OutputError, StudyError
 if TYPE_CHECKING:
     from shapechanger.transfer.env_ref import EnvRef
     from shapechanger.transfer.learners.evaluation import Evaluation
-    from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
+    from shapechanger.transfer.learners.settings import CloningSettings
 
 __all__ = ["Train"]
 
@@ -153,7 +153,7 @@ class Train:
 
 def _learn_to_drive(
     env: EnvRef,
-    settings: CloningSettings | CameraSacSettings,
+    settings: CloningSettings,
     steps: int,
     seed: int,
     out: Path,
@@ -161,10 +161,9 @@ def _learn_to_drive(
     progress: StudyProgress,
 ) -> None:
     """Clone the demonstrator of an env, and write the policy and its demonstrations."""
-    from shapechanger.transfer.learners.camera import train_camera_policy
-    from shapechanger.transfer.learners.cloning import DemonstrationFile
+    from shapechanger.transfer.learners.cloning import DemonstrationFile, train_clones
 
-    policy = train_camera_policy(
+    policy = train_clones(
         env,
         settings,
         settings.whole_updates(steps),

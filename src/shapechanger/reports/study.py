@@ -31,7 +31,6 @@ from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.settings import (
-    CameraSacSettings,
     CloningSettings,
     Settings,
     tuning_text,
@@ -304,12 +303,6 @@ def _rhythm(settings: Settings) -> str:
         return (
             f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
             "cloned anew from the same start, and all arms use the same demonstrations."
-        )
-    if isinstance(settings, CameraSacSettings):
-        return (
-            f"every {count(settings.eval_every)} steps of SAC, which starts after "
-            f"{count(settings.demonstrated_steps)} demonstrated steps: these are cloned first, and "
-            "half of each batch of SAC is drawn from them. All arms use the same demonstrations."
         )
     normalised = (
         "Observations and rewards are normalised for the learner by running estimates of their "

@@ -12,9 +12,8 @@ import pytest
 from stable_baselines3 import PPO, SAC
 
 from shapechanger.demos.cloning.learn import Inputs, learn
-from shapechanger.demos.cloning.pictures import CloningError, PolicyError
+from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.replay import keep_demonstrations
 from shapechanger.demos.cloning.sb3 import ChosenActions, as_ppo, as_sac
 from shapechanger.layout import Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
@@ -113,25 +112,3 @@ def test_sac_cannot_choose() -> None:
     """And says what can."""
     with pytest.raises(PolicyError, match="use PPO"):
         as_sac(_policy(KEYS), _SIZE)
-
-
-def test_demonstrations_stay_in_the_replay() -> None:
-    """Half of each batch is of them, with what was done then."""
-    policy, data = _policy(STEERS), stripes(20, 1, STEERS)
-    model = as_sac(policy, _SIZE, batch_size=8, buffer_size=64)
-    assert data.pictures is not None
-    ends = np.zeros(20, np.bool_)
-    ends[-1] = True
-    rewards = np.full(20, 7.0, np.float32)
-    keep_demonstrations(model, data.pictures, data.actions, rewards, [8, 12], ends)
-    model.set_env(_World(STEERS, "picture"))
-    model.learn(12)
-    replay: Any = model.replay_buffer
-    batch = replay.sample(8)
-    assert (batch.rewards[4:] == 7.0).all()
-    assert (batch.rewards[:4] <= 1.0).all()
-    shown = replay.demonstrations
-    assert (shown.size(), int(shown.dones.sum())) == (19, 1)  # The last of the first leads nowhere.
-    np.testing.assert_array_equal(shown.observations[0, 0].transpose(1, 2, 0), data.pictures[0])
-    with pytest.raises(CloningError, match="an observation, an action and a finite reward"):
-        keep_demonstrations(model, data.pictures, data.actions, rewards[:3], [20])

@@ -30,7 +30,7 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["as_ppo", "as_sac", "from_sb3", "to_sb3"]
+__all__ = ["as_ppo", "as_sac"]
 
 _IMAGE: Final = "image"
 _STATE: Final = "state"
@@ -40,34 +40,6 @@ _LOG_STD: Final = -2.0
 _BRIGHTEST: Final = 255.0
 # Raw pictures are large: SAC's default of a million would take 50 GB and more.
 _BUFFER: Final = 10_000
-
-
-class SeenByPolicy(gym.ObservationWrapper[NDArray[np.float32], Any, NDArray[np.uint8]]):
-    """Env wrapper that replaces pictures by the features of a policy.
-
-    Args:
-        env: Its observations are pictures of shape (H, W, 3).
-        policy: The policy.
-
-    Raises:
-        PolicyError: If the observations are of another kind.
-        CloningError: If the pictures have an invalid size.
-    """
-
-    def __init__(self, env: gym.Env[NDArray[np.uint8], Any], policy: CameraPolicy) -> None:
-        space = cast("gym.Space[Any]", env.observation_space)
-        shape = space.shape or ()
-        dtype = cast("Any", space).dtype
-        if not isinstance(space, spaces.Box) or dtype != np.uint8 or len(shape) != 3:
-            raise PolicyError(f"The policy needs pictures, but the observations are {space}.")
-        super().__init__(env)
-        self._policy = policy
-        self.observation_space = spaces.Box(0.0, np.inf, (policy.n_features,), np.float32)
-        self.observation(np.zeros(shape, np.uint8))
-
-    def observation(self, observation: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return the features of a picture, shape (features,)."""
-        return self._policy.features(observation[np.newaxis])[0]
 
 
 class NormedReLU(nn.Module):
@@ -87,56 +59,6 @@ _SAC_NETWORKS: Final[dict[str, Any]] = {
     "net_arch": {"pi": [], "qf": [256, 256]},
     "activation_fn": NormedReLU,
 }
-
-
-def to_sb3(
-    policy: CameraPolicy,
-    env: gym.Env[Any, Any],
-    *,
-    seed: int = 0,
-    learner: type[SAC] = SAC,
-    **settings: Any,
-) -> SAC:
-    """Return a SAC learner on features, whose deterministic action is that of the policy.
-
-    Its critics are untrained: train them first, or they lead the actor astray. The first
-    `learning_starts` actions of SAC are random, unless that is 0.
-
-    Args:
-        policy: The policy to start from; it is not changed.
-        env: Env with pictures, and steering and throttle in [-1, 1] as actions. It is wrapped, so
-            that the learner observes features.
-        seed: Seed of the learner.
-        learner: Class of the learner.
-        **settings: Arguments of `stable_baselines3.SAC`, except the shape of the actor.
-
-    Raises:
-        PolicyError: If the policy does not fit the env.
-        CloningError: If the pictures have an invalid size.
-    """
-    actions = cast("Any", env).action_space
-    if not isinstance(actions, spaces.Box) or actions.shape != (2,):
-        raise PolicyError(f"The actions of the policy have 2 values, but the env takes {actions}.")
-    low, high = cast("Any", actions).low, cast("Any", actions).high
-    if not ((low == -1.0).all() and (high == 1.0).all()):
-        raise PolicyError(f"Steering and throttle are in [-1, 1], but the env takes {actions}.")
-    kwargs = _SAC_NETWORKS | settings.pop("policy_kwargs", {})
-    seen = SeenByPolicy(env, policy)
-    model = learner("MlpPolicy", seen, seed=seed, policy_kwargs=kwargs, **settings)
-    _begin_actor(model, policy)
-    return model
-
-
-def from_sb3(model: SAC, policy: CameraPolicy) -> CameraPolicy:
-    """Return the deterministic policy of a learner made by `to_sb3`.
-
-    Args:
-        model: The learner.
-        policy: The policy it started from; it is not changed.
-    """
-    learned = policy.copy()
-    learned.network.hands.load_state_dict(cast("nn.Linear", model.actor.mu).state_dict())
-    return learned
 
 
 def _begin_actor(model: SAC, policy: CameraPolicy) -> None:
@@ -243,9 +165,8 @@ def as_sac(
 ) -> SAC:
     """Return the policy as a SAC model on raw observations; its `save` writes a file.
 
-    Its deterministic action is that of the policy. Its critics are untrained: train them on
-    demonstrations first (`replay.keep_demonstrations`), or they lead the actor astray.
-    `learning_starts` is 0, and the replay buffer holds 10,000 raw observations.
+    Its deterministic action is that of the policy. Its critics are untrained, and lead the actor
+    astray at first. `learning_starts` is 0, and the replay buffer holds 10,000 raw observations.
 
     Args:
         policy: The policy.

@@ -19,7 +19,7 @@ from shapechanger.tensor_file import kind_of
 from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
-from shapechanger.transfer.learners.settings import CameraSacSettings, CloningSettings
+from shapechanger.transfer.learners.settings import CloningSettings
 
 __all__ = [
     "DemonstrationFile",
@@ -204,13 +204,11 @@ def train_clones(
         )
         on_evaluation(evaluate_clone(env, policy, settings, budget))
         on_steps(budget)
-    return policy.described(
-        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, tried_steps=0, seed=seed
-    )
+    return policy.described(env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed)
 
 
 def evaluate_clone(
-    env: EnvRef, policy: CameraPolicy, settings: CloningSettings | CameraSacSettings, steps: int = 0
+    env: EnvRef, policy: CameraPolicy, settings: CloningSettings, steps: int = 0
 ) -> Evaluation:
     """Evaluate a clone.
 

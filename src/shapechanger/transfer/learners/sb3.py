@@ -148,7 +148,7 @@ class Sb3Learner:
         if is_clone(path):
             raise StudyError(
                 f"{path} is a clone, and {self._name} does not learn from pictures: give "
-                f"--learner cloning or sac-camera, or a policy trained with {self._name}."
+                f"--learner cloning, or a policy trained with {self._name}."
             )
         card = self.load(path).card
         if card.settings.algorithm != self._settings.algorithm:

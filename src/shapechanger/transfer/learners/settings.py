@@ -16,7 +16,6 @@ from shapechanger.errors import StudyError, UnknownName
 __all__ = [
     "LEARNERS",
     "TUNED_ON",
-    "CameraSacSettings",
     "CloningSettings",
     "ImportedSettings",
     "OffPolicySettings",
@@ -295,86 +294,10 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-class CameraSacSettings(msgspec.Struct, frozen=True, kw_only=True, tag="sac-camera"):
-    """Settings of SAC from a camera, starting from a clone; those of SAC under SB3's names.
-
-    Attributes:
-        demonstrated_steps: Demonstrated steps, which are cloned and stay in the replay buffer.
-        steps: Default number of steps, demonstrated ones included.
-        episode_steps: Steps of an episode; the next begins on another course.
-        eval_every: Steps of SAC between two evaluations.
-        eval_episodes: Episodes of an evaluation, with the policy's mean actions.
-        eval_steps: Steps of each of them.
-        learning_rate: Learning rate of Adam, for actor and critics.
-        batch_size: Transitions in a batch; half of them are demonstrated.
-        gamma: Discount.
-        ent_coef: Weight of the entropy.
-        critic_warm_up: Updates of the critics before the first step of SAC.
-        anchor_rate: Learning rate of the cloning step after each SAC update; 0 for none.
-        clone: Settings of cloning.
-    """
-
-    demonstrated_steps: int
-    steps: int
-    episode_steps: int
-    eval_every: int
-    eval_episodes: int
-    eval_steps: int
-    learning_rate: float
-    batch_size: int
-    gamma: float
-    ent_coef: float
-    critic_warm_up: int
-    anchor_rate: float
-    clone: CloneSettings = CloneSettings()
-
-    def __post_init__(self) -> None:
-        counts = (self.demonstrated_steps, self.episode_steps, self.eval_every, self.eval_episodes)
-        if min(*counts, self.eval_steps) < 1 or self.batch_size < 2 or self.critic_warm_up < 0:
-            raise StudyError(
-                "SAC from camera needs at least one step of a demonstration, of an episode and "
-                "between two evaluations, one episode, and batches of 2."
-            )
-
-    def whole_updates(self, steps: int) -> int:
-        """Round `steps` up so that SAC ends with an evaluation."""
-        tried = max(1, -(-(steps - self.demonstrated_steps) // self.eval_every))
-        return self.demonstrated_steps + tried * self.eval_every
-
-    @property
-    def last_k(self) -> int:
-        """Number of final evaluations that count as the end of a run."""
-        return 3
-
-    @property
-    def episode_limit(self) -> int | None:
-        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
-        return self.eval_steps
-
-    @property
-    def source_steps(self) -> int:
-        """Default steps of a source policy: none of its own."""
-        return 0
-
-    def for_budget(self, steps: int) -> CameraSacSettings:
-        """Return the settings for a shorter budget: the same."""
-        return self
-
-    def cloning(self) -> CloningSettings:
-        """Return the settings of its cloning phase."""
-        return CloningSettings(
-            budgets=(self.demonstrated_steps,),
-            episode_steps=self.episode_steps,
-            eval_episodes=self.eval_episodes,
-            eval_steps=self.eval_steps,
-            clone=self.clone,
-        )
-
-
 Sb3Settings = PpoSettings | OffPolicySettings | ImportedSettings
 """The settings of any learner of Stable-Baselines3."""
 
-Settings = Sb3Settings | CloningSettings | CameraSacSettings
+Settings = Sb3Settings | CloningSettings
 """The settings of any learner."""
 
 _Kind = TypeVar("_Kind", bound=msgspec.Struct)
@@ -490,24 +413,6 @@ LEARNERS: Final[dict[str, Settings]] = {
     # The settings that the papers of SAC and TQC share, and Stable-Baselines3's defaults.
     "sac": OffPolicySettings(algorithm="SAC", steps=200_000, eval_every=20_000),
     "tqc": OffPolicySettings(algorithm="TQC", steps=200_000, eval_every=20_000),
-    # A minute of demonstrations and nine of SAC. Chosen on the tank that starts from the car's
-    # clone (seed 100, up to 8,400 steps): without the anchor, or with ten times the learning rate,
-    # it soon fell below the clone; near these settings it stayed as good as the clone, not better.
-    "sac-camera": CameraSacSettings(
-        demonstrated_steps=1200,
-        steps=12_000,
-        episode_steps=200,
-        eval_every=1800,
-        eval_episodes=4,
-        eval_steps=400,
-        learning_rate=1e-4,
-        batch_size=256,
-        gamma=0.95,
-        ent_coef=2e-4,
-        critic_warm_up=1000,
-        anchor_rate=1e-3,
-        clone=CloneSettings(held_out=0.0),
-    ),
 }
 
 
@@ -523,7 +428,6 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "waypoint": ("CarWaypoint", "TankWaypoint"),
     "sac": (),
     "tqc": (),
-    "sac-camera": ("Tank",),
 }
 """The envs that the settings of each learner were tuned on; all others inherit them."""
 
