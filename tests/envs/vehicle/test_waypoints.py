@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shapechanger.bodies.vehicles import vehicle_model
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
 from shapechanger.envs.vehicle import RangesEnv, WaypointEnv
 from shapechanger.envs.vehicle.waypoints import AHEAD_M, SteeringResponse, measure_response
-from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.worlds.course import HOME
 
 _COURSE = {"course": 2, "start": 2}
@@ -34,6 +37,25 @@ def test_a_body_that_does_not_turn_is_refused(numbers: tuple[float, float]) -> N
     """Such as one whose steering is not plugged in, or the wrong way round."""
     with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
         SteeringResponse(*numbers)
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_profiles_look_as_the_simulated_cameras_do(vehicle: str) -> None:
+    """A profile says how its camera is mounted, and the body mounts it so."""
+    camera = load_profile(find_profile(f"lab-{vehicle}")).camera
+    mount = vehicle_model(vehicle).camera
+    assert camera is not None
+    assert camera.pitch_deg == pytest.approx(math.degrees(mount.pitch_rad))
+    assert camera.fovy_deg == mount.fovy_deg
+
+
+def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
+    """With what is missing, and how to measure it."""
+    lines = find_profile("lab-car").read_text().splitlines()
+    path = tmp_path / "car.toml"
+    path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
+    with pytest.raises(ProfileError, match=r"\[camera\] needs pitch_deg for waypoints: .* mark"):
+        WaypointEnv("car", robot=path)
 
 
 def test_a_car_measures_its_own_circle() -> None:

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from shapechanger.bodies.vehicles import vehicle_model
-from shapechanger.envs.vehicle.arguments import Courses
+from shapechanger.envs.vehicle.arguments import Courses, resolve_profile
 from shapechanger.envs.vehicle.env import VehicleEnv
 from shapechanger.envs.vehicle.ranges import RangesEnv
 from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
-from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
@@ -122,6 +122,27 @@ def measure_response(
     return SteeringResponse(float(per_metre), float(per_second))
 
 
+def _geometry(robot: str | os.PathLike[str]) -> CameraGeometry:
+    """Return how the camera of a profile looks at the world.
+
+    Raises:
+        ProfileError: If the profile does not say it.
+    """
+    profile = resolve_profile(robot, None, _SIZE)
+    camera = profile.camera
+    pitch, fovy = (None, None) if camera is None else (camera.pitch_deg, camera.fovy_deg)
+    if pitch is None or fovy is None:
+        missing = " and ".join(
+            name for name, value in (("pitch_deg", pitch), ("fovy_deg", fovy)) if value is None
+        )
+        raise ProfileError(
+            f"{profile.path}: [camera] needs {missing} for waypoints: the field of view is in the "
+            "camera's data sheet, and docs/profiles.md tells how to measure the pitch with a mark "
+            "on a wall."
+        )
+    return CameraGeometry(pitch, fovy)
+
+
 @lru_cache(maxsize=32)
 def _response_of(
     vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
@@ -203,10 +224,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         self.parts = self._env.parts
         self.response = _response_of(vehicle, world, robot, full_robot)
         self._turns_on_the_spot = body.turning_radius_m == 0.0
-        mount = body.camera
-        self._rectifier = Rectifier(
-            CameraGeometry(math.degrees(mount.pitch_rad), mount.fovy_deg), _SIZE
-        )
+        self._rectifier = Rectifier(_geometry(f"lab-{vehicle}" if robot is None else robot), _SIZE)
         columns, rows = CANONICAL_SIZE
         self.observation_space = gym.spaces.Box(0, 255, (rows, columns, 3), np.uint8)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)

@@ -50,6 +50,8 @@ class CameraPlan:
         fps: Frames per second.
         jpeg_quality: 1 to 100.
         flip: Whether the camera is mounted upside down.
+        pitch_deg: Angle of the optical axis below the horizon, degrees; None if unknown.
+        fovy_deg: Vertical field of view, degrees; None if unknown.
         settings: Settings of the driver.
     """
 
@@ -58,6 +60,8 @@ class CameraPlan:
     fps: float = 20.0
     jpeg_quality: int = 80
     flip: bool = False
+    pitch_deg: float | None = None
+    fovy_deg: float | None = None
     settings: dict[str, int | str] = field(default_factory=dict[str, int | str])
 
 

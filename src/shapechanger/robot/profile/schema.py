@@ -95,6 +95,7 @@ def bcm(written: object) -> int:
 
 _UNITS: Final = {
     "_deg_per_s": "degrees a second",
+    "_deg": "degrees",
     "_per_s": "per second",
     "_hz": "hertz",
     "_ms": "milliseconds",
@@ -107,7 +108,7 @@ _UNITS: Final = {
 """Units by the suffix of a key, longest first."""
 
 # Common alternative spellings.
-_OTHER_ENDS: Final = ("_deg", "_rad", "_cm", "_mm", "_km", "_mv", "_f", "_sec", "_khz", "_min")
+_OTHER_ENDS: Final = ("_rad", "_cm", "_mm", "_km", "_mv", "_f", "_sec", "_khz", "_min")
 
 
 def unit_of(key: str) -> str:
@@ -472,6 +473,8 @@ CAMERA_KEYS: Final = (
     ProfileKey("fps", "number", 20.0, low=1.0, high=120.0),
     ProfileKey("jpeg_quality", "whole", 80, low=1, high=100),
     ProfileKey("flip", "truth", False),
+    ProfileKey("pitch_deg", "number", None, low=-45.0, high=45.0),
+    ProfileKey("fovy_deg", "number", None, low=10.0, high=170.0),
 )
 
 CAMERA_SETTINGS: Final = {
