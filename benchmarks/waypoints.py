@@ -23,7 +23,7 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle import WaypointEnv
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.cloning import record_demonstrations
+from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
 from shapechanger.worlds.course import HELD_OUT
@@ -105,5 +105,6 @@ def _source(vehicle: str, seed: int) -> CameraPolicy:
     policy, _ = clone(
         shown.pictures, shown.actions, settings=settings.clone, seed=seed, episodes=shown.episodes
     )
+    policy = state_actions(policy, env)
     policy.save(path)
     return policy

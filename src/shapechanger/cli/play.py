@@ -96,7 +96,10 @@ class Play:
             from shapechanger.transfer.learners.policy_file import load_policy
 
             if is_clone(file):
-                return env, load_clone(file).predict_many
+                clone = load_clone(file)
+                if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
+                    clone.card.require_layouts(layout, clone.card.state_layout)
+                return env, clone.predict_many
             policy = load_policy(file)
         observation, action = layouts_of(env)
         if (observation, action) == (policy.card.observation, policy.card.action):

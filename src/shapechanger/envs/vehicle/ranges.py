@@ -134,6 +134,7 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         put_back: Whether to put the vehicle back on the lane after a collision.
         camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
             for no camera.
+        render_mode: "rgb_array" for `render` to return the camera's picture.
 
     Raises:
         UnknownName: If there is no such vehicle, world, profile or weight.
@@ -141,7 +142,7 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         WorldError: If the vehicle cannot drive in the world.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 20}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(
         self,
@@ -153,6 +154,7 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         courses: Courses = _COURSES,
         put_back: bool = False,
         camera: tuple[int, int] | None = None,
+        render_mode: str | None = None,
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
@@ -161,7 +163,9 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         self.parts = frozenset(output.part for output in profile.outputs)
         require_fit(vehicle, self.parts)
         self._draw = CourseSampler(courses, randomise=False)
-        self._world = MujocoWorld(vehicle, world, self._draw.first, size=camera)
+        self.render_mode = render_mode
+        size = (160, 120) if camera is None and render_mode else camera
+        self._world = MujocoWorld(vehicle, world, self._draw.first, size=size)
         self._shaper = OutputShaper(profile.guard_plan())
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz
@@ -257,6 +261,10 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     def demonstrator(self, seed: int) -> VehicleDemonstrator:
         """Return an expert that knows the whole course; see `VehicleEnv.demonstrator`."""
         return VehicleDemonstrator(self._world, seed)
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the camera's picture, shape (height, width, 3); None without a render mode."""
+        return self._world.picture() if self.render_mode else None
 
     def close(self) -> None:
         """Release the renderer, if there is one."""

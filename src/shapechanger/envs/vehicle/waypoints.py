@@ -188,6 +188,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         put_back: Whether to put the vehicle back on the lane after a collision. A collision then
             does not end the episode.
+        render_mode: "rgb_array" for `render` to return the camera's picture as it is.
 
     Attributes:
         parts: The parts that the robot's outputs move.
@@ -199,7 +200,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         WorldError: If the vehicle cannot drive in the world.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 20}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(
         self,
@@ -210,6 +211,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         full_robot: bool = False,
         courses: Courses = "training",
         put_back: bool = False,
+        render_mode: str | None = None,
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
@@ -223,6 +225,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         )
         self.parts = self._env.parts
         self.response = _response_of(vehicle, world, robot, full_robot)
+        self.render_mode = render_mode
         self._turns_on_the_spot = body.turning_radius_m == 0.0
         self._rectifier = Rectifier(_geometry(f"lab-{vehicle}" if robot is None else robot), _SIZE)
         columns, rows = CANONICAL_SIZE
@@ -292,6 +295,10 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
             seed: Seed of the mistakes.
         """
         return WaypointDemonstrator(self.world, seed)
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the camera's picture, shape (120, 160, 3); None without a render mode."""
+        return self.world.picture() if self.render_mode else None
 
     def close(self) -> None:
         """Release the pins and the renderer."""

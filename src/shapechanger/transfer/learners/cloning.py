@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -204,7 +205,27 @@ def train_clones(
         )
         on_evaluation(evaluate_clone(env, policy, settings, budget))
         on_steps(budget)
-    return policy.described(env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed)
+    return state_actions(policy, env).described(
+        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed
+    )
+
+
+def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
+    """State in a clone's card what its actions mean, unless they are steering and throttle.
+
+    Args:
+        policy: A clone of the env's demonstrator.
+        env: The env.
+    """
+    made = env.make()
+    try:
+        layout = getattr(made.unwrapped, "action_layout", None)
+    finally:
+        made.close()
+    if layout is None or layout.names == ("steering", "throttle"):
+        return policy
+    card = msgspec.structs.replace(policy.card, action_layout=layout)
+    return CameraPolicy(policy.network, card)
 
 
 def evaluate_clone(
