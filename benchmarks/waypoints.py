@@ -20,7 +20,8 @@ from benchmarks.row import Row
 from benchmarks.vehicles import counted
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle import WaypointEnv
+from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
+from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
@@ -34,6 +35,9 @@ VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
 COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.
 OUT: Final = Path("results", "waypoints")
+# Both clones learned in the corridor.
+STEERED: Final = (("car", "tank"), ("tank", "car"))
+STEERED_COURSES: Final = COURSES[:6]
 # Collisions per 100 m, on so many of the six pairs.
 FEW: Final = 4.0
 GOOD: Final = 4
@@ -46,6 +50,7 @@ def pairs() -> list[Row]:
     jobs = [(vehicle, seed) for seed in seeds for vehicle in VEHICLES]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         found = dict(zip(jobs, pool.map(_driven, jobs), strict=True))
+        by_steering = dict(zip(STEERED, pool.map(_steered, STEERED), strict=True))
     rows: list[Row] = []
     good = 0
     own = [(vehicle, vehicle) for vehicle in VEHICLES]
@@ -72,7 +77,32 @@ def pairs() -> list[Row]:
             good >= GOOD,
         )
     )
+    for (source, target), drives in by_steering.items():
+        score = DriveScore.of(drives)
+        rows.append(
+            Row(
+                f"steering, {source} to {target}: collisions per 100 m, zero-shot",
+                f"{score.per_100_m:.1f}",
+                f"{counted(score)}; {score.speed:.2f} m/s; the shipped clone of ten minutes",
+                "none: what waypoints are compared with",
+                True,
+            )
+        )
     return rows
+
+
+def _steered(pair: tuple[str, str]) -> list[DriveResult]:
+    """Drive a vehicle with the shipped clone of another one, which predicts steering."""
+    source, target = pair
+    use_one_thread()
+    kept = OUT / f"steering-{source}-{target}.json"
+    if kept.exists():
+        return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
+    policy = CameraPolicy.load(CLONES[source])
+    with closing(VehicleEnv(target, courses="held-out", put_back=True)) as env:
+        drives = [drive(env, policy.predict, course=course) for course in STEERED_COURSES]
+    kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
+    return drives
 
 
 def _driven(job: tuple[str, int]) -> dict[str, list[DriveResult]]:
