@@ -246,6 +246,17 @@ def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
             np.testing.assert_array_equal(x, y)
 
 
+@pytest.mark.parametrize("factor", [0.3, 0.5, 0.75, 0.9])
+def test_small_ants_land_from_their_start(factor: float) -> None:
+    """They start as high as the others, and are healthy all the way down."""
+    with gym.make("shapechanger/Ant-v1", body=Stretch("shank_*", factor)) as env:
+        env.action_space.seed(0)
+        for seed in range(10):
+            env.reset(seed=seed)
+            for _ in range(20):
+                assert not env.step(np.zeros(8))[2]
+
+
 def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
     """What is derived from a body is derived again."""
     env = ant.unwrapped

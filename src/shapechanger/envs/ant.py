@@ -38,6 +38,8 @@ __all__ = ["AntEnv", "ExtendedAntEnv"]
 # An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
 # m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9
+# All start at 0.75 m, and small ants fall from there: they must not be unhealthy before they land.
+_HIGHEST_STARTS: Final = 1.3
 
 _sum: Final = np.add.reduce
 
@@ -81,7 +83,8 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
       limits, and the torso high enough for the feet. Noise is drawn as in `Ant-v5`; joints stay
       inside their limits and feet above the floor.
     - **Healthy range**: an ant is unhealthy when its torso's up axis points down, when it is higher
-      than 1.9 times its own standing height, or when its state is not finite. A lower limit could
+      than 1.9 times its own standing height and 1.3 times its start, or when its state is not
+      finite. A lower limit could
       not distinguish a flipped ant, which rests at 0.27 m, from one that lies down.
     - **Spaces**: an ant with more joints has larger spaces.
 
@@ -122,7 +125,10 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         super()._follow_body()
         if self._given_z_range is None:
             stands = self.standing_height
-            highest = math.inf if stands is None else _HIGHEST_STANDS * stands
+            highest = math.inf
+            if stands is not None:
+                start = float(self.model.qpos0[2])
+                highest = max(_HIGHEST_STANDS * stands, _HIGHEST_STARTS * start)
             self._healthy_z_range = (-math.inf, highest)
 
     @property
