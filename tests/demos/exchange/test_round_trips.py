@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -204,3 +206,43 @@ def test_steps_that_were_dropped_stay_at_home(tmp_path: Path) -> None:
     (after,) = all_of(tmp_path / "back")
     assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
     assert [after.jpeg(step) for step in after.kept] == [picture(0), picture(0), picture(3)]
+
+
+@pytest.mark.parametrize("clock", ["twin", "none"])
+def test_a_simulated_drive_comes_back_at_its_own_rate(tmp_path: Path, clock: Any) -> None:
+    """However fast the simulation ran, and though some steps have no time at all."""
+    steps = [
+        Step(
+            action=(0.0, 0.5),
+            driver="expert",
+            state=(0.0, 20.0),
+            captured_ns=None if clock == "none" else 7_000_000_000 + n * 50_000_000,
+            # A third of the real time, and then the clock of the computer is set back.
+            wall_ns=None if clock == "none" else 10**18 + n * 17_000_000 - (n > 8) * 10**9,
+        )
+        for n in range(16)
+    ]
+    made = [(step, picture(n)) for n, step in enumerate(steps)]
+    record(tmp_path / "data", header(clock=clock, control_hz=20.0), made)
+    export_recording(tmp_path / "data", tmp_path / "tub", "tub")
+    lines = (tmp_path / "tub" / "catalog_0.catalog").read_text().splitlines()
+    times = np.array([json.loads(line)["_timestamp_ms"] for line in lines])
+    assert (np.diff(times) == 50).all()
+    import_recording(tmp_path / "tub", tmp_path / "back")
+    (back,) = all_of(tmp_path / "back")
+    assert back.header.control_hz == pytest.approx(20.0)
+
+
+def test_times_of_a_tub_never_run_backwards(tmp_path: Path) -> None:
+    """A step without a time, or one before the last, follows at the rate of the episode."""
+    begun = 10**18
+    wall = [begun, begun + 50_000_000, None, begun + 60_000_000, begun + 200_000_000]
+    steps = [
+        (Step(action=(0.0, 0.5), driver="person", state=(0.0, 20.0), wall_ns=at), picture(n))
+        for n, at in enumerate(wall)
+    ]
+    record(tmp_path / "data", header(control_hz=20.0), steps)
+    export_recording(tmp_path / "data", tmp_path / "tub", "tub")
+    lines = (tmp_path / "tub" / "catalog_0.catalog").read_text().splitlines()
+    times = np.array([json.loads(line)["_timestamp_ms"] for line in lines])
+    assert np.diff(times).tolist() == [50, 50, 50, 50]

@@ -75,7 +75,6 @@ _MIN_RATE_RECORDS: Final = 10  # A shorter drive is not evidence of its rate.
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
-_MS_PER_S: Final = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +156,8 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     """Write episodes into an existing folder, as the sessions of one tub of version 2.
 
     Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
-    without a time get one from the rate of the episode.
+    of a simulated drive get the times of its own clock, since the recorder's tells how fast the
+    simulation ran; steps without a time follow the one before at the rate of the episode.
 
     Args:
         episodes: The episodes.
@@ -177,6 +177,7 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     sessions: list[str] = []
     for number, episode in enumerate(episodes):
         sessions.append(f"{_created(episode.header):%y-%m-%d}_{number}")
+        times = _Times(episode.header)
         for step, jpeg in kept_steps(episode.rows):
             if jpeg is None:
                 raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
@@ -186,7 +187,7 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
             records.append(
                 fields
                 | {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
-                | {"_timestamp_ms": _time_ms(step, episode.header, len(records))}
+                | {"_timestamp_ms": times.of(step)}
             )
     created_s = _created(episodes[0].header).timestamp()
     paths = _write_catalogs(folder, records, created_s)
@@ -433,11 +434,39 @@ def _fields(step: Step, state: Sequence[str], where: str) -> dict[str, Any]:
     return fields | {name: value for name, value in known if math.isfinite(value)}
 
 
-def _time_ms(step: Step, header: EpisodeHeader, number: int) -> int:
-    """Return the Unix time of a step, ms."""
-    if step.wall_ns is not None:
-        return step.wall_ns // _NS_PER_MS
-    return round((_created(header).timestamp() + number / header.control_hz) * _MS_PER_S)
+class _Times:
+    """Unix times of the steps of an episode, which always increase.
+
+    Args:
+        header: Header of the episode.
+    """
+
+    def __init__(self, header: EpisodeHeader) -> None:
+        self._simulated = header.clock == "twin"
+        self._period_ns = round(_NS_PER_S / header.control_hz)
+        self._created_ns = round(_created(header).timestamp() * _NS_PER_S)
+        self._began_ns: int | None = None
+        self._last_ns: int | None = None
+
+    def of(self, step: Step) -> int:
+        """Return the time of the next step, ms."""
+        last_ns = self._last_ns
+        at_ns = self._measured_ns(step)
+        if at_ns is None or (last_ns is not None and at_ns <= last_ns):
+            at_ns = self._created_ns if last_ns is None else last_ns + self._period_ns
+        self._last_ns = at_ns
+        return round(at_ns / _NS_PER_MS)
+
+    def _measured_ns(self, step: Step) -> int | None:
+        """Return the time of a step by its own clock; None if it has none."""
+        if not self._simulated:
+            return step.wall_ns
+        clock_ns = step.captured_ns if step.captured_ns is not None else step.decided_ns
+        if clock_ns is None:
+            return None
+        if self._began_ns is None:
+            self._began_ns = clock_ns
+        return self._created_ns + clock_ns - self._began_ns
 
 
 def _created(header: EpisodeHeader) -> datetime:
