@@ -127,6 +127,24 @@ def test_an_old_tub(tmp_path: Path) -> None:
     assert {step.wall_ns for step in first.steps} == {None}  # It only says when since the start.
 
 
+def test_minari_makes_the_env_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one that was recorded, with its arguments; none where several were."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    arguments = {"image": False, "world": "yard"}
+    drive(tmp_path / "one", env="shapechanger/Car-v1", env_kwargs=arguments)
+    export_recording(tmp_path / "one", tmp_path / "one-v0", "minari")
+    env = minari.load_dataset("one-v0").recover_environment()
+    try:
+        assert env.spec.id == "shapechanger/Car-v1"
+        assert env.unwrapped.world.course.world == "yard"
+    finally:
+        env.close()
+    drive(tmp_path / "two", env="shapechanger/Car-v1")
+    drive(tmp_path / "two", env="shapechanger/Tank-v1")
+    export_recording(tmp_path / "two", tmp_path / "two-v0", "minari")
+    assert minari.load_dataset("two-v0").env_spec is None
+
+
 def test_minari_reads_what_was_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Minari itself loads every pixel and every number, by the name of the dataset."""
     drive(tmp_path / "data", 5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import re
@@ -12,6 +13,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final, cast
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -155,10 +157,26 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
             "episodes": [e.header.to_json() | {"outcome": e.outcome} for e in episodes],
         },
     }
+    if (spec := _env_spec(episodes)) is not None:
+        found["env_spec"] = spec
     people = {episode.header.driver for episode in episodes if episode.header.driver}
     if people:
         found["author"] = people
     return found
+
+
+def _env_spec(episodes: Sequence[ExchangeEpisode]) -> str | None:
+    """Return the spec of the env of all episodes as JSON, for Minari's `recover_environment`.
+
+    None if they were recorded in several envs or without one, or if no env has this id here.
+    """
+    envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
+    env_id, arguments = envs[0]
+    if env_id not in gym.registry or any(env != envs[0] for env in envs):
+        return None
+    spec = copy.deepcopy(gym.spec(env_id))
+    spec.kwargs.update(arguments)
+    return spec.to_json()
 
 
 def _box(layout: Layout) -> spaces.Box:
