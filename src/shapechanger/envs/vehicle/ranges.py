@@ -98,9 +98,9 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     """Drive fast without collisions, seeing distances all around the front.
 
     The task, the vehicle and the courses of `shapechanger/Car-v1`, on the true state of the world:
-    a teacher that sees what no camera shows learns here in a minute, and a student that sees
+    a teacher that sees what no camera shows learns here in two minutes, and a student that sees
     pictures learns from it (`shapechanger train Car --teacher ...`). The robot is not emulated, but
-    the arithmetic of its guard is: a step takes a sixth of the time.
+    the arithmetic of its guard is: a step takes a third of the time or less.
 
     ## Action space
     That of `VehicleEnv`: `Box(-1, 1, (2,), float32)`, `[steering, throttle]`, for one control
@@ -131,7 +131,8 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         reward: Weights by name that replace the default ones; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
-        put_back: Whether to put the vehicle back on the lane after a collision.
+        put_back: Whether to put the vehicle back on the lane after a collision. It may then go on at
+            once, where the whole robot's bumper would hold it back for 0.75 s.
         camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
             for no camera.
         render_mode: "rgb_array" for `render` to return the camera's picture.
