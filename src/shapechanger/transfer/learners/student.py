@@ -1,10 +1,10 @@
 """A camera policy that learns from a teacher which sees what no camera shows.
 
-The teacher drives on distances, speed and rate of turn, where learning by trial takes two minutes. It
-shows its driving to the student, which sees pictures alone (D. Chen et al., "Learning by Cheating",
-CoRL 2019). Then the student drives, and the teacher says what it would have done (S. Ross et al.,
-"A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning", AISTATS
-2011).
+The teacher drives on distances, speed and rate of turn, where learning by trial takes two minutes.
+It shows its driving to the student, which sees pictures alone (D. Chen et al., "Learning by
+Cheating", CoRL 2019). Then the student drives, and the teacher says what it would have done (S.
+Ross et al., "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online
+Learning", AISTATS 2011).
 """
 
 from __future__ import annotations
