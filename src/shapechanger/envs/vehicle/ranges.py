@@ -131,8 +131,8 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         reward: Weights by name that replace the default ones; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
-        put_back: Whether to put the vehicle back on the lane after a collision. It may then go on at
-            once, where the whole robot's bumper would hold it back for 0.75 s.
+        put_back: Whether to put the vehicle back on the lane after a collision. It may then go on
+            at once, where the whole robot's bumper would hold it back for 0.75 s.
         camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
             for no camera.
         render_mode: "rgb_array" for `render` to return the camera's picture.
