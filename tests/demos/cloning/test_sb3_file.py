@@ -9,12 +9,13 @@ import gymnasium as gym
 import msgspec
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO, SAC
 
 from shapechanger.demos.cloning.learn import Inputs, learn
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.sb3 import ChosenActions, as_ppo, as_sac
+from shapechanger.demos.cloning.sb3 import ChosenActions, NormedReLU, as_ppo, as_sac
 from shapechanger.layout import Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 
@@ -112,3 +113,25 @@ def test_sac_cannot_choose() -> None:
     """And says what can."""
     with pytest.raises(PolicyError, match="use PPO"):
         as_sac(_policy(KEYS), _SIZE)
+
+
+def test_what_sac_tries_is_close_to_the_clone() -> None:
+    """A clone that began by driving at random would have been cloned for nothing."""
+    policy, data = _policy(STEERS), stripes(64, 1, STEERS)
+    tried = as_sac(policy, _SIZE, buffer_size=64).predict(data.pictures, deterministic=False)[0]
+    apart = np.abs(tried - _done(policy, "picture", data)).mean(axis=0)
+    reach = 0.5 * (STEERS.high - STEERS.low)
+    assert (apart > 0.01 * reach).all()
+    assert (apart < 0.2 * reach).all()
+
+
+def test_settings_reach_the_learner() -> None:
+    """Except for the shape of the actor, which is the clone's."""
+    model = as_sac(_policy(STEERS), _SIZE, gamma=0.9, buffer_size=64)
+    assert (model.gamma, model.buffer_size) == (0.9, 64)
+
+
+def test_a_critic_is_freed_of_mean_and_spread() -> None:
+    """However large its numbers grow, they come out alike."""
+    x = torch.tensor([[1.0, 2.0, 4.0, 9.0]])
+    torch.testing.assert_close(NormedReLU()(x), NormedReLU()(1000.0 * x + 5.0), atol=1e-3, rtol=0.0)

@@ -21,7 +21,7 @@ class PolicyOrigin(NamedTuple):
 
     Attributes:
         env: The env that it was trained in.
-        steps: Training steps, demonstrated ones included.
+        steps: Training steps; demonstrated steps for a clone.
     """
 
     env: EnvRef

@@ -1,10 +1,10 @@
-"""Cloning of demonstrations as a learner of studies."""
+"""Cloning as a learner: policies that drive by a camera."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NotRequired, Required, TypedDict, Unpack
+from typing import Any
 
 import msgspec
 
@@ -25,17 +25,7 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import CloningSettings
 
-__all__ = ["CameraLearner", "CameraTrainingOptions"]
-
-
-class CameraTrainingOptions(TypedDict):
-    """Keyword arguments of `train_clones`."""
-
-    demonstrations: Required[DemonstrationFile]
-    start: NotRequired[CameraPolicy | None]
-    only_last: NotRequired[bool]
-    on_evaluation: Required[Callable[[Evaluation], None]]
-    on_steps: NotRequired[Callable[[int], None]]
+__all__ = ["CameraLearner"]
 
 
 class _CardData(msgspec.Struct):
@@ -68,11 +58,15 @@ class CameraLearner:
         steps: int,
         seed: int,
         *,
+        demonstrations: DemonstrationFile,
+        start: CameraPolicy | None = None,
         body_map: BodyMap | None = None,
+        only_last: bool = False,
         callback: Any = None,
-        **options: Unpack[CameraTrainingOptions],
+        on_evaluation: Callable[[Evaluation], None],
+        on_steps: Callable[[int], None] = lambda steps: None,
     ) -> CameraPolicy:
-        """Train a policy; all vehicles share one camera and action, so the body map is unused.
+        """Clone a policy; all vehicles share one camera and action, so the body map is unused.
 
         Raises:
             StudyError: If a callback is given.
@@ -80,7 +74,17 @@ class CameraLearner:
         del body_map
         if callback is not None:
             raise StudyError(f"{self._name} takes no callback of Stable-Baselines3.")
-        return train_clones(env, self._settings, steps, seed, **options)
+        return train_clones(
+            env,
+            self._settings,
+            steps,
+            seed,
+            demonstrations=demonstrations,
+            start=start,
+            only_last=only_last,
+            on_evaluation=on_evaluation,
+            on_steps=on_steps,
+        )
 
     def evaluate(self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap) -> Evaluation:
         """Evaluate a policy; all vehicles share one camera and action."""
