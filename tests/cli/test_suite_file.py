@@ -29,7 +29,7 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
 
 
 def test_the_shipped_suites_are_those_of_the_docs() -> None:
-    """All ordered pairs, the car with each lens alone, and nine lengths of an ant's shanks."""
+    """All ordered pairs, the car with each lens alone, nine shanks, and pairs of waypoints."""
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
     assert counts == {
         "ants": 12,
@@ -38,6 +38,7 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
         "pendulums": 6,
         "shank": 9,
         "vehicles": 12,
+        "waypoints": 6,
     }
     for _, task in suite_tasks(load_suite("vehicles")):
         assert task.source.kwargs == task.target.kwargs == {"put_back": True}

@@ -215,7 +215,7 @@ def test_upside_down_is_turned(tmp_path: Path) -> None:
     image = np.zeros((24, 32, 3), np.uint8)
     image[:12] = 255
     (tmp_path / "a.jpg").write_bytes(simplejpeg.encode_jpeg(image, 95))
-    plan = CameraPlan("file", (32, 24), 1000.0, 95, True, {"path": str(tmp_path)})
+    plan = CameraPlan("file", (32, 24), 1000.0, 95, flip=True, settings={"path": str(tmp_path)})
     turned = simplejpeg.decode_jpeg(open_camera(plan).read().jpeg)
     assert (turned[2].mean(), turned[-3].mean()) == pytest.approx((0, 255), abs=5)
 
@@ -392,7 +392,7 @@ def picamera2(monkeypatch: pytest.MonkeyPatch) -> type[_Picamera2]:
 
 def test_pi_camera_gives_jpeg_with_the_sensors_time(picamera2: type[_Picamera2]) -> None:
     """Over a recording fake; no camera was at hand."""
-    plan = CameraPlan("picamera2", (32, 24), 25.0, 80, True, {"number": 0})
+    plan = CameraPlan("picamera2", (32, 24), 25.0, 80, flip=True, settings={"number": 0})
     camera = open_camera(plan)
     fake = picamera2.made[0]
     configuration = fake.calls[0][1]
