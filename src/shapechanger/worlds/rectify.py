@@ -14,9 +14,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import WorldError
+from shapechanger.errors import MissingExtra, WorldError
 
-__all__ = ["CANONICAL_SIZE", "CameraGeometry", "Rectifier"]
+__all__ = [
+    "CANONICAL_SIZE",
+    "CameraGeometry",
+    "MeasuredCamera",
+    "Rectifier",
+    "draw_view",
+    "measure_camera",
+    "pitch_of_horizon",
+]
 
 CANONICAL_SIZE: Final = (80, 48)
 """Width and height of a rectified picture, pixels."""
@@ -27,6 +35,14 @@ _FOCAL: Final = 66.0
 _HORIZON: Final = 22.0
 _SAMPLES: Final = 3  # In each direction of a pixel.
 _MOST_MISSING: Final = 0.15  # Share of the pixels.
+
+# Vertical fields of view from which the search for the camera's own begins, degrees.
+_FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
+# Standard deviations beyond which a picture of a board does not tell the camera's geometry.
+_PITCH_SD_DEG: Final = 1.0
+_FOVY_SD_DEG: Final = 2.5
+_MOST_TILT_DEG: Final = 45.0
+_YELLOW: Final = (255, 220, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +76,11 @@ class Rectifier:
     def __init__(self, geometry: CameraGeometry, size: tuple[int, int]) -> None:
         wide, high = size
         columns, rows = CANONICAL_SIZE
-        focal = 0.5 * high / math.tan(0.5 * math.radians(geometry.fovy_deg))
-        down = math.radians(geometry.pitch_deg)
         # Samples within each pixel; the mean of them is the pixel.
         part = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-        u = (np.arange(columns)[:, None] + part).ravel() - 0.5 * columns
-        v = (np.arange(rows)[:, None] + part).ravel() - _HORIZON
-        x, y = np.meshgrid(u / _FOCAL, v / _FOCAL)  # Right and down, at a depth of 1.
-        depth = y * math.sin(down) + math.cos(down)
-        column = np.floor(focal * x / depth + 0.5 * wide).astype(np.intp)
-        row = np.floor(focal * (y * math.cos(down) - math.sin(down)) / depth + 0.5 * high)
-        row = row.astype(np.intp)
+        u = (np.arange(columns)[:, None] + part).ravel()
+        v = (np.arange(rows)[:, None] + part).ravel()
+        column, row = _seen_at(geometry, size, *np.meshgrid(u, v))
         missing = np.mean((column < 0) | (column >= wide) | (row < 0) | (row >= high))
         if missing > _MOST_MISSING:
             raise WorldError(
@@ -106,3 +116,228 @@ class Rectifier:
             total += pixels[places]
         mean = (total + self._places.shape[0] // 2) // self._places.shape[0]
         return mean.astype(np.uint8).reshape(CANONICAL_SIZE[1], CANONICAL_SIZE[0], 3)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredCamera:
+    """A camera's geometry from a picture of a checkerboard.
+
+    Attributes:
+        geometry: The geometry.
+        roll_deg: Turn of the camera about its optical axis, degrees, clockwise as it looks.
+        pitch_sd_deg: Standard deviation of the pitch, degrees.
+        fovy_sd_deg: Standard deviation of the field of view, degrees; 0 where it was given.
+        error_px: Root mean square distance of the corners from where they should be, pixels.
+    """
+
+    geometry: CameraGeometry
+    roll_deg: float
+    pitch_sd_deg: float
+    fovy_sd_deg: float
+    error_px: float
+
+
+def pitch_of_horizon(row: float, height: int, fovy_deg: float) -> float:
+    """Return the angle of the optical axis below the horizon, degrees.
+
+    Args:
+        row: Row of the horizon, pixels from the top.
+        height: Height of the picture, pixels.
+        fovy_deg: Vertical field of view, degrees.
+
+    Raises:
+        WorldError: If the row is not in the picture.
+    """
+    if not 0.0 <= row <= height:
+        raise WorldError(f"The horizon must be in a row from 0 to {height}, got {row:g}.")
+    half = 0.5 * height
+    return math.degrees(math.atan((half - row) / half * math.tan(0.5 * math.radians(fovy_deg))))
+
+
+def measure_camera(
+    picture: NDArray[np.uint8], corners: tuple[int, int], fovy_deg: float | None = None
+) -> MeasuredCamera:
+    """Measure a camera's geometry from one picture of a checkerboard that stands upright.
+
+    Corners are found by OpenCV; focal length and pose of a camera without distortion, with square
+    pixels and its axis in the middle, are fitted to them by least squares.
+
+    Args:
+        picture: Shape (height, width, 3), of the camera's whole field of view. Without `fovy_deg`
+            the board must be turned by some 30 to 45 degrees: seen straight on, a near board in a
+            wide field of view looks like a far board in a narrow one.
+        corners: Inner corners of the board along its two sides, each at least 3.
+        fovy_deg: Vertical field of view where it is known, degrees.
+
+    Raises:
+        MissingExtra: If OpenCV is not installed.
+        WorldError: If there is no such board in the picture, or it does not tell the geometry.
+    """
+    points = _find_corners(picture, corners)
+    height, width = picture.shape[:2]
+    pixels = points - 0.5 * np.array((width, height))
+    board = np.stack(np.meshgrid(np.arange(corners[0]), np.arange(corners[1])), axis=-1).reshape(
+        -1, 2
+    )
+    board = board - board.mean(axis=0)
+    fits = [
+        _fit(board, pixels, height, first, free=fovy_deg is None)
+        for first in (_FIRST_FOVY_DEG if fovy_deg is None else (fovy_deg,))
+    ]
+    solution, covariance, error = min(fits, key=lambda fit: fit[2])
+    fovy = math.degrees(2.0 * math.atan(0.5 * height / math.exp(solution[6])))
+    # The side of the board that is nearer to the vertical of the picture points down.
+    sides = _turn(solution[:3])[:, :2]
+    side = int(np.argmax(np.abs(sides[1])))
+    sign = math.copysign(1.0, sides[1, side])
+
+    def pitch_of(turn: NDArray[np.float64]) -> float:
+        return math.degrees(math.asin(sign * _turn(turn)[2, side]))
+
+    pitch = pitch_of(solution[:3])
+    slope = np.array([(pitch_of(solution[:3] + 1e-6 * axis) - pitch) / 1e-6 for axis in np.eye(3)])
+    pitch_sd = math.sqrt(slope @ covariance[:3, :3] @ slope)
+    # d fovy / d log f = -sin(fovy).
+    fovy_sd = math.sqrt(covariance[6, 6]) * math.degrees(math.sin(math.radians(fovy)))
+    if abs(pitch) > _MOST_TILT_DEG:
+        raise WorldError(
+            f"The board seems to be tilted by {abs(pitch):.0f} degrees against the camera: it must "
+            "stand upright."
+        )
+    if pitch_sd > _PITCH_SD_DEG or fovy_sd > _FOVY_SD_DEG:
+        raise WorldError(
+            f"This picture leaves the pitch uncertain by {pitch_sd:.1f} degrees and the field of "
+            f"view by {fovy_sd:.1f}: bring the board nearer, turn it by 30 to 45 degrees to one "
+            "side, or give the field of view of the camera's data sheet."
+        )
+    roll = math.degrees(math.atan2(sign * sides[0, side], sign * sides[1, side]))
+    return MeasuredCamera(CameraGeometry(pitch, fovy), roll, pitch_sd, fovy_sd, error)
+
+
+def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
+    """Draw the horizon and the edge of what the virtual camera sees, in yellow.
+
+    Args:
+        picture: Shape (height, width, 3); not changed.
+        geometry: The camera that took it.
+
+    Returns:
+        Shape (height, width, 3).
+
+    Raises:
+        WorldError: If the camera does not see what the virtual camera sees.
+    """
+    height, width = picture.shape[:2]
+    Rectifier(geometry, (width, height))
+    columns, rows = CANONICAL_SIZE
+    along, none = np.linspace(0.0, 1.0, 2 * (width + height)), np.zeros(2 * (width + height))
+    edges = ((along, none), (along, none + 1.0), (none, along), (none + 1.0, along))
+    lines = [(columns * x, rows * y) for x, y in edges]
+    # A dotted line for the horizon.
+    lines.append((columns * along[::8], none[::8] + _HORIZON))
+    drawn = picture.copy()
+    for x, y in lines:
+        column, row = _seen_at(geometry, (width, height), x, y)
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        drawn[row[inside], column[inside]] = _YELLOW
+    return drawn
+
+
+def _seen_at(
+    geometry: CameraGeometry, size: tuple[int, int], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return columns and rows of a camera's pixels at places of the virtual camera's picture.
+
+    Args:
+        geometry: The camera.
+        size: Width and height of its pictures, pixels.
+        x: Places from the left of the virtual picture, pixels.
+        y: Places from its top, pixels.
+    """
+    wide, high = size
+    focal = 0.5 * high / math.tan(0.5 * math.radians(geometry.fovy_deg))
+    down = math.radians(geometry.pitch_deg)
+    right, below = (x - 0.5 * CANONICAL_SIZE[0]) / _FOCAL, (y - _HORIZON) / _FOCAL  # At depth 1.
+    depth = below * math.sin(down) + math.cos(down)
+    column = focal * right / depth + 0.5 * wide
+    row = focal * (below * math.cos(down) - math.sin(down)) / depth + 0.5 * high
+    return np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
+
+
+def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArray[np.float64]:
+    """Find the inner corners of a board, shape (n, 2), pixels from the top left."""
+    try:
+        import cv2
+    except ImportError as error:
+        raise MissingExtra("cv2", "camera") from error
+    if min(corners) < 3:
+        raise WorldError(
+            f"A board needs at least 3 inner corners along each side, got {corners[0]} x "
+            f"{corners[1]}."
+        )
+    grey = np.ascontiguousarray(picture.mean(axis=2).astype(np.uint8))
+    found, points = cv2.findChessboardCornersSB(
+        grey, corners, flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+    )
+    if not found:
+        raise WorldError(
+            f"There is no checkerboard of {corners[0]} x {corners[1]} inner corners in this "
+            f"picture of {grey.shape[1]} x {grey.shape[0]} pixels: show all of it with a white "
+            "margin, near and in even light."
+        )
+    # OpenCV's pixels have their middles at whole numbers, ours at halves.
+    return np.asarray(points, np.float64).reshape(-1, 2) + 0.5
+
+
+def _fit(
+    board: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+    height: int,
+    fovy_deg: float,
+    *,
+    free: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Fit pose and focal length to corners.
+
+    Args:
+        board: Places on the board, shape (n, 2), in squares.
+        pixels: Places in the picture from its middle, shape (n, 2).
+        height: Height of the picture, pixels.
+        fovy_deg: Vertical field of view to begin with, degrees.
+        free: Whether the focal length is fitted too.
+
+    Returns:
+        Rotation vector, place in squares and log of the focal length, (7,); their covariance, (7,
+        7); and the root mean square error, pixels.
+    """
+    import cv2
+    from scipy.optimize import least_squares
+
+    focal = 0.5 * height / math.tan(0.5 * math.radians(fovy_deg))
+    flat = np.column_stack((board, np.zeros(len(board))))
+    lens = np.diag((focal, focal, 1.0))
+    _, turn, place = cv2.solvePnP(flat, pixels, lens, None, flags=cv2.SOLVEPNP_IPPE)
+
+    def errors(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        seen = board @ _turn(x[:3])[:, :2].T + x[3:6]
+        scale = math.exp(x[6]) if free else focal
+        return (scale * seen[:, :2] / np.maximum(seen[:, 2:], 1e-3) - pixels).ravel()
+
+    start = np.array((*turn.ravel(), *place.ravel(), math.log(focal)))
+    best = least_squares(errors, start, x_scale=(*(3 * [0.1]), *(3 * [1.0]), 0.1))
+    solution = best.x
+    error = math.sqrt(2.0 * best.cost / len(pixels))
+    used = slice(0, 7 if free else 6)
+    # Corners are read to a tenth of a pixel at best, however well a model fits.
+    variance = max(2.0 * best.cost / (pixels.size - used.stop), 0.1**2)
+    covariance = np.zeros((7, 7))
+    slopes = np.asarray(best.jac, np.float64)[:, used]
+    covariance[used, used] = variance * np.linalg.pinv(slopes.T @ slopes)
+    return solution, covariance, error
+
+
+def _turn(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation matrix, shape (3, 3), of a rotation vector, rad."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix()

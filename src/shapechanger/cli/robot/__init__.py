@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from shapechanger.cli.robot.calibrate import Calibrate
+from shapechanger.cli.robot.camera import CameraView
 from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.fetch import FetchEpisodes
@@ -30,6 +31,7 @@ class Robot:
         Annotated[Init, tyro.conf.subcommand("init")]
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+        | Annotated[CameraView, tyro.conf.subcommand("camera")]
         | Annotated[Home, tyro.conf.subcommand("home")]
         | Annotated[Serve, tyro.conf.subcommand("serve")]
         | Annotated[Key, tyro.conf.subcommand("key")]

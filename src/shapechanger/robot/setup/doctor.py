@@ -77,6 +77,7 @@ def examine_robot(
     yield from _packages(guard, camera)
     if camera is not None:
         yield _camera(camera, look)
+        yield _geometry(camera)
     free = _port(port)
     yield from _encoders(guard, root, encoders or _real_encoders, served=free.level != "good")
     yield free
@@ -270,6 +271,23 @@ def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> Finding:
         finally:
             camera.close()  # Also ends a `read` that still waits.
     return Finding("camera", "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes.")
+
+
+def _geometry(plan: CameraPlan) -> Finding:
+    """Whether policies that drive by waypoints can use the camera."""
+    if plan.pitch_deg is None or plan.fovy_deg is None:
+        return Finding(
+            "camera's geometry",
+            "unknown",
+            "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
+            "`shapechanger robot camera` measures them.",
+        )
+    return Finding(
+        "camera's geometry",
+        "good",
+        f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from top to "
+        "bottom; `shapechanger robot camera` draws it.",
+    )
 
 
 def _encoders(

@@ -1,0 +1,186 @@
+"""`shapechanger robot camera`: measure how a robot's camera looks at the world, and draw it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from shapechanger.cli.console import plain_console
+from shapechanger.errors import OutputError, RobotError
+
+if TYPE_CHECKING:
+    from shapechanger.robot.cameras.camera import CameraPlan
+    from shapechanger.robot.profile.profile import Profile
+    from shapechanger.worlds.rectify import CameraGeometry
+
+__all__ = ["CameraView"]
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """Measure pitch and field of view of the camera, write them into the profile, and draw them.
+
+    With neither --board nor --horizon it draws what the profile says.
+    """
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile."""
+    picture: Path | None = None
+    """JPEG of the whole field of view; taken by the robot's camera where it is left out."""
+    board: str = ""
+    """Inner corners of a checkerboard that stands upright before the robot, such as 9x6."""
+    horizon: float | None = None
+    """Row of the horizon in the picture, pixels from the top: of a mark at the lens's height."""
+    fovy: float | None = None
+    """Vertical field of view, degrees, where the data sheet says it."""
+    out: Path = Path("camera.jpg")
+    """The drawing: the horizon and what policies with waypoints look at, and what they see."""
+
+    def run(self) -> None:
+        """Measure, write and draw.
+
+        Raises:
+            RobotError: If the options contradict each other, or something is missing.
+        """
+        from shapechanger.robot.profile.edit import rewrite
+        from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
+
+        if self.board and self.horizon is not None:
+            raise RobotError("Give --board or --horizon, not both.")
+        corners = _corners(self.board) if self.board else None
+        path = find_profile(self.profile)
+        profile = load_profile(path)
+        if profile.camera is None:
+            raise RobotError(f"{path} has no [camera].")
+        measures = corners is not None or self.horizon is not None or self.fovy is not None
+        if measures and path in shipped_profiles().values():
+            raise RobotError(
+                f"{path.stem} comes with Shapechanger and is not changed: "
+                f"`shapechanger robot init {path.stem}` writes one of your own."
+            )
+        picture = _picture(profile.camera, self.picture)
+        console = plain_console()
+        if measures:
+            found = self._measured(picture, corners, profile.camera)
+            changes: dict[str, Any] = {
+                "camera.pitch_deg": round(found.pitch_deg, 1),
+                "camera.fovy_deg": round(found.fovy_deg, 1),
+            }
+            profile = rewrite(path, changes)
+            for name, value in changes.items():
+                console.print(f"{name} = {value}")
+            console.print(f"wrote {path}", soft_wrap=True)
+        geometry = _stated(profile)
+        _write(_drawing(picture, geometry), self.out)
+        console.print(f"wrote {self.out}", soft_wrap=True)
+
+    def _measured(
+        self, picture: NDArray[np.uint8], corners: tuple[int, int] | None, stated: CameraPlan
+    ) -> CameraGeometry:
+        """Measure the geometry, and print how certain it is."""
+        from shapechanger.worlds.rectify import CameraGeometry, measure_camera, pitch_of_horizon
+
+        if corners is not None:
+            found = measure_camera(picture, corners, self.fovy)
+            plain_console().print(
+                f"The corners fit to {found.error_px:.2f} pixels: pitch "
+                f"{found.geometry.pitch_deg:.1f} ± {2 * found.pitch_sd_deg:.1f}, field of view "
+                f"{found.geometry.fovy_deg:.1f} ± {2 * found.fovy_sd_deg:.1f}, roll "
+                f"{found.roll_deg:.1f} degrees.",
+                soft_wrap=True,
+            )
+            return found.geometry
+        fovy = stated.fovy_deg if self.fovy is None else self.fovy
+        if fovy is None:
+            raise RobotError("A horizon tells the pitch where the field of view is known: --fovy.")
+        if self.horizon is not None:
+            return CameraGeometry(pitch_of_horizon(self.horizon, picture.shape[0], fovy), fovy)
+        if stated.pitch_deg is None:
+            raise RobotError("The pitch is unknown: give --board or --horizon as well.")
+        return CameraGeometry(stated.pitch_deg, fovy)
+
+
+def _corners(board: str) -> tuple[int, int]:
+    """Parse the corners of a board, such as "9x6".
+
+    Raises:
+        RobotError: If it is not such a text.
+    """
+    match = re.fullmatch(r"(\d+)x(\d+)", board)
+    if not match:
+        raise RobotError(
+            f"--board is the number of inner corners along both sides, such as 9x6, got {board!r}."
+        )
+    return int(match[1]), int(match[2])
+
+
+def _stated(profile: Profile) -> CameraGeometry:
+    """Return the geometry that a profile states.
+
+    Raises:
+        RobotError: If it does not.
+    """
+    from shapechanger.worlds.rectify import CameraGeometry
+
+    camera = profile.camera
+    if camera is None or camera.pitch_deg is None or camera.fovy_deg is None:
+        raise RobotError(
+            f"{profile.path} does not say pitch_deg and fovy_deg of its camera: measure them with "
+            "--board or --horizon."
+        )
+    return CameraGeometry(camera.pitch_deg, camera.fovy_deg)
+
+
+def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
+    """Read a picture from a file, or take one, shape (height, width, 3).
+
+    Raises:
+        RobotError: If there is none, or it is not a JPEG.
+    """
+    import simplejpeg
+
+    from shapechanger.robot.cameras.camera import open_camera
+
+    if path is None:
+        camera = open_camera(plan)
+        try:
+            jpeg = camera.read().jpeg
+        finally:
+            camera.close()
+    else:
+        try:
+            jpeg = path.read_bytes()
+        except OSError as error:
+            raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
+    try:
+        return simplejpeg.decode_jpeg(jpeg)
+    except ValueError as error:
+        raise RobotError(f"{path or 'The picture'} is not a JPEG: {error}.") from error
+
+
+def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
+    """Return the picture with the virtual camera's view drawn in, and that view beside it."""
+    from shapechanger.worlds.rectify import CANONICAL_SIZE, Rectifier, draw_view
+
+    height, width = (int(n) for n in picture.shape[:2])
+    seen = Rectifier(geometry, (width, height))(picture)
+    drawn = draw_view(picture, geometry)
+    across, down = CANONICAL_SIZE
+    rows = np.arange(height) * down // height
+    columns = np.arange(height * across // down) * down // height
+    return np.hstack((drawn, seen[rows][:, columns]))
+
+
+def _write(picture: NDArray[np.uint8], path: Path) -> None:
+    import simplejpeg
+
+    try:
+        path.write_bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(picture), 92))
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
