@@ -84,6 +84,30 @@ def test_a_collision_costs_and_ends_the_episode() -> None:
         assert costs == -3.0 * info["collisions"]
 
 
+def test_after_a_collision_it_waits_as_the_whole_robot_does() -> None:
+    """The bumper's reflex holds it for 0.75 s, though it was put back on the free lane."""
+    ahead = np.array([0.0, 0.8], np.float32)
+    waits: list[int] = []
+    for env in (
+        VehicleEnv("car", image=False, put_back=True),
+        RangesEnv("car", put_back=True),
+    ):
+        with closing(env):
+            env.reset(options=_COURSE)
+            steps = 0
+            while env.step(ahead)[-1]["collisions"] == 0:
+                steps += 1
+                assert steps < 200
+            before = env.step(ahead)[-1]["progress"]
+            wait = 1
+            while env.step(ahead)[-1]["progress"] - before < 0.02:
+                wait += 1
+                assert wait < 60
+            waits.append(wait)
+    assert min(waits) >= 14
+    assert abs(waits[0] - waits[1]) <= 2
+
+
 def test_standing_costs() -> None:
     """Who stops in front of a wall must not think that it is worth it."""
     with closing(RangesEnv("tank")) as env:

@@ -131,8 +131,8 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         reward: Weights by name that replace the default ones; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
-        put_back: Whether to put the vehicle back on the lane after a collision. It may then go on
-            at once, where the whole robot's bumper would hold it back for 0.75 s.
+        put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
+            reflex keeps it from going forward for 0.75 s.
         camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
             for no camera.
         render_mode: "rgb_array" for `render` to return the camera's picture.
@@ -218,6 +218,7 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
                 f"{drawn.course}: choose another."
             )
         self._shaper.reset()
+        self._bumped = False
         self._progress_m = 0.0
         self._needs_reset = False
         return self._observe(), self._info()
@@ -241,8 +242,9 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         world, shaper = self._world, self._shaper
         progress, collisions = self._progress_m, world.collisions
         command = tuple(values.tolist())
-        world.advance(self._period_s, shaper.outputs(command, world.bumped, self._ticks))
+        world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
         collided = world.collisions > collisions
+        self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
         self._progress_m = world.progress_m
         speed = (self._progress_m - progress) / self._period_s
         stands = abs(speed) < _STANDING_MPS
