@@ -44,12 +44,12 @@ def test_another_seed_gives_another_picture(change: Lens) -> None:
     assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
 
 
-def test_night_leaves_a_quarter_of_the_light_and_its_noise_moves() -> None:
-    """A white wall is a quarter as bright; the next picture has other noise."""
+def test_night_leaves_half_of_the_brightness_and_its_noise_moves() -> None:
+    """A white wall is half as bright; the next picture has other noise."""
     white = np.full((120, 160, 3), 255, np.uint8)
     dark = night(white, 0)
-    assert dark.mean(axis=(0, 1)) == pytest.approx([61.2, 63.75, 86.7], abs=0.5)
-    assert dark.std(axis=(0, 1)) == pytest.approx(5.0, abs=0.3)
+    assert dark.mean(axis=(0, 1)) == pytest.approx([117.3, 127.5, 168.3], abs=0.5)
+    assert dark.std(axis=(0, 1)) == pytest.approx(9.0, abs=0.3)
     other = white.copy()
     other[0, 0] = 254
     assert not np.array_equal(night(other, 0)[1:], dark[1:])
