@@ -31,6 +31,11 @@ __all__ = ["OutputShaper", "RangesEnv"]
 # Slower than this it stands. Without a price for it, two of four teachers learned to stop in front
 # of a wall and stay there.
 _STANDING_MPS: Final = 0.1
+# Nearer to something than this costs, up to the second number for each second. Teachers keep this
+# distance without a price for it, but once nearer they squeezed through where a camera that sees 31
+# degrees to each side must guess; with it they brake and back out, and a student learns that too.
+_NEAR_M: Final = 0.35
+_NEAR_COST: Final = 3.0
 _FASTEST_MPS: Final = 5.0
 _FASTEST_TURN: Final = 15.0  # rad/s
 # Courses to train on. The models of this many stay compiled (`worlds.simulation`).
@@ -113,7 +118,8 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
 
     ## Reward
     `DriveReward` with a metre of progress along the course for a metre forward, minus 3 for each
-    collision by default, and minus 1 for each second of standing.
+    collision by default, and minus 1 for each second of standing. `reward_near` is minus up to 3
+    for each second nearer than 0.35 m to something, in proportion to what is missing of that.
 
     ## Start
     At a random place of a course that the seed draws, looking along it, at rest.
@@ -252,10 +258,13 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if collided and self._puts_back:
             world.put_back()
             self._progress_m = world.progress_m
+        seen = self._observe()
+        nearest = float(seen[: len(BEARINGS_DEG)].min())
+        terms["reward_near"] = -_NEAR_COST * self._period_s * max(0.0, 1.0 - nearest / _NEAR_M)
         terminated = self._reward.ends(collided)
         info = self._info() | terms
         info["reward_terms"] = terms
-        return self._observe(), sum(terms.values()), terminated, False, info
+        return seen, sum(terms.values()), terminated, False, info
 
     def hold_out(self) -> None:
         """Sample held-out courses from the next reset on."""
