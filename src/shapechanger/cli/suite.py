@@ -70,7 +70,7 @@ _Env = str | _Body
 
 
 class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
-    """What a suite runs; one of `envs`, `pairs`, or `sources` with `targets` or `sweep`.
+    """Contents of a suite's file; one of `envs`, `pairs`, or `sources` with `targets` or `sweep`.
 
     Attributes:
         envs: All ordered pairs of different ones of these.

@@ -34,7 +34,7 @@ _STRONGEST: Final = 0.55
 
 
 class FilmStrip(NamedTuple):
-    """What one policy does, as a row of pictures.
+    """One policy's behaviour as a row of pictures.
 
     Attributes:
         caption: Whose it is, and how well it did.
@@ -285,7 +285,7 @@ def _method_rows(
 
 
 def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
-    """What the studies have in common, and what they cost."""
+    """Return the settings that the studies have in common, and their cost."""
     plans = [study.plan for study in studies.values()]
     first = next(iter(studies.values()))
     hours = sum(run.wall_s for study in studies.values() for run in study.runs) / 3600.0

@@ -172,7 +172,7 @@ def _method_run(
     on_evaluation: OnEvaluation,
     on_steps: ReportSteps,
 ) -> MethodRun:
-    """What a method is given for one of its runs."""
+    """Return the arguments of a method for one of its runs."""
     learner = learner_of(plan.learner, plan.settings)
     target = plan.target_of(run)
     done = 0

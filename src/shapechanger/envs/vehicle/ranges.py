@@ -43,7 +43,7 @@ _COURSES: Final = range(48)
 
 
 class OutputShaper:
-    """What a robot's guard makes of a command: caps, levels, slew, and the bumper's reflex.
+    """Turns commands into outputs as a robot's guard does: caps, levels, slew, bumper's reflex.
 
     It calls the guard's own functions, at the guard's own rate. What it leaves out: deadlines,
     which a simulated command never misses, stalls, and the resolution of pulses and sensors.

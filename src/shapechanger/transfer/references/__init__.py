@@ -1,4 +1,4 @@
-"""What each env is worth: its floor, what learning from scratch reaches, and a policy that does it.
+"""References of each env: its floor, the result of learning from scratch, and a policy with it.
 
 `references.json` and the policies beside it are written by `python -m benchmarks.run references`;
 `README.md` is their card.
