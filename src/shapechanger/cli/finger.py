@@ -55,7 +55,7 @@ class Identify:
             write_atomic(self.out, found.parameters.to_json().encode())
         console.print(_table(found))
         for name, why in found.undetermined:
-            console.print(f"{name} cannot be told: {why}", soft_wrap=True)
+            console.print(f"{name} cannot be determined: {why}", soft_wrap=True)
         console.print(f"wrote {' and '.join(str(path) for path in files)}", soft_wrap=True)
         console.print(summary_line(found), soft_wrap=True)
 

@@ -68,13 +68,13 @@ def test_what_cannot_be_identified_is_refused(
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A line for each parameter, what cannot be told, and a last line that sums it up."""
+    """A line for each parameter, what cannot be determined, and a last line that sums it up."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
     said(capsys, "record", "Finger", "--out", log, "--seconds", 6, *gap)
     lines = said(capsys, "identify", log, "--out", out).splitlines()
     assert sum(line.startswith("moment arm ") for line in lines) == 25
-    assert any(line.startswith("backlash cannot be told: ") for line in lines)
+    assert any(line.startswith("backlash cannot be determined: ") for line in lines)
     assert lines[-1].startswith("arms: 25 intervals, ")
     assert FingerParameters.from_json(out.read_text()).gives
     assert "Parameters that this log cannot determine" in (tmp_path / "log.html").read_text()

@@ -108,7 +108,7 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
     console.print(f"played {played} of {len(kept)} steps in {env_id}{ended}", soft_wrap=True)
     for line in _caveats(episode):
         console.print(line, soft_wrap=True)
-    for line in apart.told(states if compares else None):
+    for line in apart.lines(states if compares else None):
         console.print(line, soft_wrap=True)
 
 
@@ -123,15 +123,15 @@ def _ref(episode: Episode, env_id: str) -> EnvRef:
 
 def _caveats(episode: Episode) -> list[str]:
     """Return reasons why a replay cannot be identical."""
-    told: list[str] = []
+    caveats: list[str] = []
     if episode.header.seed is None:
-        told.append("it was recorded without a seed, so it began somewhere else")
+        caveats.append("it was recorded without a seed, so it began somewhere else")
     kept = episode.kept
     if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
-        told.append("steps of it do not count and were not played, so it went on from elsewhere")
+        caveats.append("steps of it do not count and were not played, so it went on from elsewhere")
     if any(step.applied is None for step in kept):
-        told.append("what its outputs did is not known, so what was decided was played")
-    return told
+        caveats.append("what its outputs did is not known, so what was decided was played")
+    return caveats
 
 
 class _Apart:
@@ -158,7 +158,7 @@ class _Apart:
         if step.reward is not None:
             self._rewards.append((step.reward, reward))
 
-    def told(self, layout: Layout | None) -> list[str]:
+    def lines(self, layout: Layout | None) -> list[str]:
         """Describe the differences, one per line."""
         lines: list[str] = []
         if self._pictures and not any(self._pictures):

@@ -95,19 +95,19 @@ class TrainClone:
             learned=n,
             steps=len(data),
         )
-        told = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
+        note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
         if not judged.any():
             judged = learned
-            told = "These are the steps that it learned from, so others will come out worse."
+            note = "These are the steps that it learned from, so others will come out worse."
         judgement = judge(policy, data, judged)
         policy.save(self.out)
         for path in self._write_for_sb3(policy, shrinking.size):
             console.print(f"wrote {path}", soft_wrap=True)
         page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
-        write_clone_report(page, self.out.name, policy, data, judgement, training, told)
+        write_clone_report(page, self.out.name, policy, data, judgement, training, note)
         write_numbers(numbers, policy, judgement, training)
         console.print(f"wrote {self.out}, {page} and {numbers}", soft_wrap=True)
-        console.print(told, soft_wrap=True)
+        console.print(note, soft_wrap=True)
         _print_judgement(console, judgement)
 
     def _require_files(self) -> None:
@@ -242,21 +242,21 @@ class Evaluate:
         data = load_dataset(self.data, shrink=shrinking)
         console = plain_console()
         judgement = judge(policy, data)
-        told = f"These are the {len(data)} steps of {self.data}."
+        note = f"These are the {len(data)} steps of {self.data}."
         learned = policy.card.data.get("learned", 0)
         if policy.card.data.get("digest") == shrinking.digest(data.actions):
-            told = f"The policy learned from the first {learned} of these {len(data)} steps."
+            note = f"The policy learned from the first {learned} of these {len(data)} steps."
             if learned < len(data):
                 unseen = judge(policy, data, np.arange(len(data)) >= learned)
-                told += f" On the others its accuracy is {unseen.accuracy:.3f}."
-            console.print(told, soft_wrap=True)
+                note += f" On the others its accuracy is {unseen.accuracy:.3f}."
+            console.print(note, soft_wrap=True)
         if self.report is not None:
             from shapechanger.reports.clone import write_clone_report, write_numbers
             from shapechanger.transfer.files import make_folder
 
             make_folder(self.report.parent)
             name = self.policy.name
-            write_clone_report(self.report, name, policy, data, judgement, None, told)
+            write_clone_report(self.report, name, policy, data, judgement, None, note)
             numbers = self.report.with_suffix(".json")
             write_numbers(numbers, policy, judgement, None)
             console.print(f"wrote {self.report} and {numbers}", soft_wrap=True)

@@ -195,11 +195,11 @@ class Jogger:
             live.update(Text(f"  {reading(self._output, self._is_at(seen.action_applied))}"))
             values = list(self._rests)
             values[self._place] = value
-            told = self._robot.command(values, answers=seq)
+            sent = self._robot.command(values, answers=seq)
             if accepted is None:
                 for key in self._keys.keys(0.0):
                     if key == "enter":
-                        accepted, accepted_s = told + 1, time.monotonic()
+                        accepted, accepted_s = sent + 1, time.monotonic()
                         break
                     _end_if_asked(key, self._robot)
                     if key == "n":

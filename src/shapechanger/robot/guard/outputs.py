@@ -82,7 +82,7 @@ class Switches:
 
 
 # Pulses and duties have steps: those of a PCA9685 at 50 Hz are 1 % of a servo's range and 5 % of
-# that of a controller which is told to use a fifth of it.
+# that of a controller whose profile uses a fifth of it.
 _STEP: Final = 0.06
 
 _WHY: Final = {
@@ -120,15 +120,19 @@ class Truth:
             for action in plan.actions
         ]
 
-    def done(self, actions: Sequence[float], told: Sequence[float], has: Sequence[float]) -> Done:
+    def done(
+        self, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
+    ) -> Done:
         """Return the applied outputs.
 
         Args:
             actions: Decided value of each action.
-            told: Requested value of each output.
+            requested: Requested value of each output.
             has: Actual value of each output.
         """
-        others = {i for i, (a, b) in enumerate(zip(told, has, strict=True)) if abs(a - b) > _STEP}
+        others = {
+            i for i, (a, b) in enumerate(zip(requested, has, strict=True)) if abs(a - b) > _STEP
+        }
         if not others:
             return Done(tuple(actions), "")
         outputs = self._plan.outputs

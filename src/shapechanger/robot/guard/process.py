@@ -265,13 +265,13 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
     after_failure = list(arguments[:1]) == [AFTER_FAILURE]
     names = ("--plan-fd", "--daemon-fd", "--heartbeat-fd")
     fds = descriptors(arguments[1:] if after_failure else arguments, names)
-    told: list[str] = []
+    endings: list[str] = []
     guard: Guard | None = None
 
     def end(number: int, _: object) -> None:
-        told.append(f"ended by {signal.Signals(number).name}")
+        endings.append(f"ended by {signal.Signals(number).name}")
         if guard is not None:
-            guard.ended = told[0]
+            guard.ended = endings[0]
 
     signal.signal(signal.SIGTERM, end)
     signal.signal(signal.SIGINT, end)
@@ -285,8 +285,8 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         opened.callback(hardware.close)
         guard = Guard(plan.guard, hardware, daemon, log, after_failure=after_failure)
         opened.callback(guard.close)
-        if told:  # During set-up.
-            guard.ended = told[0]
+        if endings:  # During set-up.
+            guard.ended = endings[0]
         run_promptly(GUARD)
         log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))
         guard.run(heartbeat)
