@@ -135,7 +135,12 @@ _LARGEST: Final = 8192
 
 
 def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
-    """Return the distance from the middle of the body to its farthest point at `pose` (nq,), m."""
+    """Return the distance from the middle of a body to its farthest point, m.
+
+    Args:
+        model: The model.
+        pose: Its pose, shape (nq,).
+    """
     middle, places, sizes = _geoms(model, _posed(model, pose))
     return float((np.linalg.norm(places - middle, axis=1) + sizes).max())
 

@@ -47,7 +47,12 @@ class Lift(NamedTuple):
     at_zero_m: float
 
     def raise_by(self, pose: _Array, distance_m: float) -> None:
-        """Move the trunk of a pose (nq,) up, in place."""
+        """Move the trunk of a pose up, in place.
+
+        Args:
+            pose: Shape (nq,).
+            distance_m: Distance, m.
+        """
         pose[self.place] += self.up * distance_m
 
     def height(self, pose: _Array) -> float:
@@ -100,10 +105,14 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
 
 
 def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
-    """The pose to start from, shape (nq,): the model's own, made possible.
+    """Return the model's own pose, shape (nq,), moved to where it is possible.
 
     Each joint is as near to the model's pose as the part `inside` of its range inside its limits
     allows, and a trunk that can be raised stands no lower than its feet need.
+
+    Args:
+        model: The model.
+        inside: Share of each joint's range to keep from its limits.
     """
     pose = model.qpos0.copy()
     places, lower, upper = _limits(model)
@@ -116,7 +125,12 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
 
 def keep_within_limits(model: mujoco.MjModel, pose: _Array) -> _Array:
-    """The pose, shape (nq,), with every hinge and slide moved inside its limits."""
+    """Return a pose, shape (nq,), with every hinge and slide moved inside its limits.
+
+    Args:
+        model: The model.
+        pose: Shape (nq,).
+    """
     return _within(pose, *_limits(model))
 
 
@@ -176,7 +190,7 @@ class StartRules:
         return _within(pose, *self._limits)
 
     def floor_gap(self, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """As the function of this name."""
+        """Return the clearance above the floor; see the function of this name."""
         return _gap(model, data, self._pairs)
 
 

@@ -15,7 +15,11 @@ __all__ = ["compile_body", "reshape"]
 
 
 def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
-    """A copy of `spec` with `edits` applied in order; `spec` is untouched.
+    """Return a copy of a specification with edits applied in order.
+
+    Args:
+        spec: The specification; not changed.
+        edits: The edits.
 
     Raises:
         UnknownName: If an edit names an element that the model lacks.
@@ -31,7 +35,11 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
 
 
 def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
-    """The compiled model of `spec` with `edits` applied; all that is derived is computed anew.
+    """Compile a specification with edits applied; derived constants are computed anew.
+
+    Args:
+        spec: The specification; not changed.
+        edits: The edits, applied in order.
 
     Raises:
         UnknownName: If an edit names an element that the model lacks.

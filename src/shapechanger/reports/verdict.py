@@ -240,7 +240,12 @@ def arm_rows(study: Study) -> tuple[ArmRow, ...]:
 
 
 def successes(study: Study, kind: str) -> NDArray[np.float64]:
-    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
+    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown.
+
+    Args:
+        study: The study.
+        kind: Kind of the runs, such as "scratch".
+    """
     ends = [[e.success for e in _end(study, result)] for result in study.of(kind)]
     if any(share is None for end in ends for share in end):
         return np.empty(0)

@@ -204,5 +204,10 @@ def features_of_senses(
 
 
 def place_features(name: str, element: Element) -> list[Feature]:
-    """Return three features, `name/x` to `name/z`, m."""
+    """Return the three features of a place, `name/x` to `name/z`, m.
+
+    Args:
+        name: Name of the place.
+        element: The element that it belongs to.
+    """
     return [Feature(f"{name}/{axis}", "m", element=element) for axis in "xyz"]

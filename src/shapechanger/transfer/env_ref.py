@@ -107,7 +107,12 @@ class CanBeTaught(Protocol):
     teacher_env: str
 
     def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> TaskDemonstrator:
-        """Return the policy as a demonstrator; `seed` determines its mistakes."""
+        """Return a teacher as a demonstrator of this env.
+
+        Args:
+            act: The teacher: maps observations of the teacher's env, (n, k), to actions, (n, m).
+            seed: Seed of the mistakes that it makes on purpose.
+        """
         ...
 
 
@@ -250,6 +255,10 @@ def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
 
 def certify_shift(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
     """Return the certificate of the change between two envs; empty if the source issues none.
+
+    Args:
+        source: The env before the change.
+        target: The env after it.
 
     Raises:
         EmptyShift: If nothing changes.

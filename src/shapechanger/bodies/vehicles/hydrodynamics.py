@@ -290,7 +290,12 @@ class Floating:
         return sum(drive.current_a() for _, _, _, drive, _ in self._shafts)
 
     def set_current(self, vx: float, vy: float) -> None:
-        """Set the flow of the water, m/s."""
+        """Set the flow of the water, m/s.
+
+        Args:
+            vx: Along the world's x axis.
+            vy: Along its y axis.
+        """
         self._flow = (vx, vy)
 
     def _motion(self) -> tuple[float, float, float, float, float]:

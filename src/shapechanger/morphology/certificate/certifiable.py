@@ -53,7 +53,11 @@ class Wrapped(Protocol):
 
 
 def attribute(env: Certifiable | Wrapped, name: str) -> Any:
-    """An attribute of an environment, or of the one inside its wrappers.
+    """Return an attribute of an environment, or of the one inside its wrappers.
+
+    Args:
+        env: The environment.
+        name: Name of the attribute.
 
     Raises:
         AttributeError: If neither has it.

@@ -68,7 +68,15 @@ def change(
     after: Sequence[float | str] | None,
     unit: str = "",
 ) -> Change:
-    """A change with its sentence; a value of one number stands for the number."""
+    """Describe a change in a sentence.
+
+    Args:
+        quantity: What changes, such as "length".
+        element: Its element, such as "shank_4"; "" for the whole model.
+        before: Values before; None if the element was missing.
+        after: Values after; None if the element is missing.
+        unit: Unit of the values; "" for none.
+    """
     old, new = _plain(before), _plain(after)
     return Change(
         quantity, element, old, new, unit, f"{element}: {_words(quantity, old, new, unit)}"

@@ -72,7 +72,12 @@ def inconsistencies(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def lone_masses(source: mujoco.MjModel, target: mujoco.MjModel) -> tuple[str, ...]:
-    """Bodies whose mass differs between two models while their inertia does not."""
+    """Find bodies whose mass differs between two models while their inertia does not.
+
+    Args:
+        source: Model before.
+        target: Model after, with the same bodies.
+    """
     before = dict(zip(names_of(source).bodies, range(source.nbody), strict=True))
     found: list[str] = []
     for body, i in zip(names_of(target).bodies, range(target.nbody), strict=True):

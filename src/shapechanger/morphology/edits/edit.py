@@ -88,12 +88,22 @@ def _as_python(value: Any) -> Any:
 
 
 def part_of_the_way(old: float, new: float, amount: float) -> float:
-    """`old` moved towards `new`; exactly `new` when all of the way."""
+    """Interpolate between two values; exactly `new` at the end.
+
+    Args:
+        old: Value at an amount of 0.
+        new: Value at an amount of 1.
+        amount: 0 to 1.
+    """
     return new if amount == 1.0 else old + amount * (new - old)
 
 
 def require_factor(name: str, value: float) -> None:
     """Refuse a ratio that is zero, negative, NaN or absurd.
+
+    Args:
+        name: Name of the ratio, for the message.
+        value: The ratio.
 
     Raises:
         MorphologyError: Unless `value` lies between 0.01 and 100.
@@ -106,7 +116,12 @@ def require_factor(name: str, value: float) -> None:
 
 
 def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
-    """Refuse what is not three finite numbers or, if `nonzero`, has no direction.
+    """Refuse anything but three finite numbers.
+
+    Args:
+        name: Name of the vector, for the message.
+        value: The vector.
+        nonzero: Whether to refuse a vector of zeros, which has no direction.
 
     Raises:
         MorphologyError: If so.

@@ -138,7 +138,13 @@ def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
 
 
 def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Limit a hinge or slide to `lower` ... `upper`, rad or m."""
+    """Limit the range of a hinge or slide.
+
+    Args:
+        joint: The joint.
+        lower: Lower limit, rad or m.
+        upper: Upper limit, rad or m.
+    """
     joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     in_degrees = _in_degrees(joint)
     joint.range = [_degrees(x) if in_degrees else x for x in (lower, upper)]

@@ -120,7 +120,13 @@ _SIZE_COUNT: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, 
 
 
 def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
-    """Return pose, mass and inertia of the bodies that matter."""
+    """Return pose, mass and inertia of bodies.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+        kept: Mask of the bodies to return, shape (nbody,).
+    """
     rows = Rows(names.bodies)
     moving = model.body_treeid >= 0
     free = np.zeros(model.nbody, np.bool_)
@@ -162,7 +168,12 @@ def bodies_that_matter(model: mujoco.MjModel, carrying: _Bools) -> _Bools:
 
 
 def joints(model: mujoco.MjModel, names: Names) -> Section:
-    """Return type, axis, limits and resistance of the joints; angles in rad."""
+    """Return type, axis, limits and resistance of the joints; angles in rad.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+    """
     rows = Rows(names.joints)
     kinds = [word(mujoco.mjtJoint(kind)) for kind in model.jnt_type.tolist()]
     kind = np.asarray(kinds, np.str_)
@@ -198,7 +209,13 @@ def joints(model: mujoco.MjModel, names: Names) -> Section:
 
 
 def geoms(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
-    """The shapes that touch, push a fluid or guide a tendon."""
+    """Return the shapes that touch, displace a fluid or guide a tendon.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+        relevant: Mask of these geoms, shape (ngeom,).
+    """
     rows = Rows(names.geoms)
     kinds = [word(mujoco.mjtGeom(kind)) for kind in model.geom_type.tolist()]
     rows.words("type", kinds)
@@ -227,7 +244,13 @@ def geoms(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
 
 
 def sites(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
-    """The points to which tendons, actuators and constraints are fixed."""
+    """Return the points to which tendons, actuators and constraints are attached.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+        relevant: Mask of these sites, shape (nsite,).
+    """
     rows = Rows(names.sites)
     rows.words("body", named(names.bodies, model.site_bodyid))
     frames = site_frames(model)

@@ -99,7 +99,12 @@ def _not_listed(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
 
 
 def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
-    """The geoms of explicit pairs, shape (n, 2)."""
+    """Return the geoms of explicit contact pairs, shape (n, 2).
+
+    Args:
+        model: The model.
+        explicit: Indices of the pairs, shape (n,).
+    """
     both = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
     return both[explicit].astype(np.int64)
 
@@ -210,6 +215,10 @@ def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
 
     A positive time constant is raised to two time steps, unless `refsafe` is off or the integrator
     is `discrete`, which is stable at any.
+
+    Args:
+        model: The model.
+        solref: Reference parameters as stated, shape (n, 2).
     """
     off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
     if off or model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:

@@ -40,7 +40,12 @@ _GAINS_WITH_INPUTS: Final = (_GAIN.mjGAIN_SO3, _GAIN.mjGAIN_PID, _GAIN.mjGAIN_DC
 
 
 def actuators(model: mujoco.MjModel, names: Names) -> Section:
-    """Return transmissions, gains, biases and dynamics of the actuators."""
+    """Return transmissions, gains, biases and dynamics of the actuators.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+    """
     rows = Rows(names.actuators)
     transmissions = [_TRN(kind) for kind in model.actuator_trntype.tolist()]
     gains = [_GAIN(kind) for kind in model.actuator_gaintype.tolist()]
@@ -82,7 +87,12 @@ def actuators(model: mujoco.MjModel, names: Names) -> Section:
 
 
 def tendons(model: mujoco.MjModel, names: Names) -> Section:
-    """The way of each tendon, its limits and what resists it."""
+    """Return the path of each tendon, its limits and its resistance.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+    """
     rows = Rows(names.tendons)
     rows.words("path", _paths(model, names))
     limited = model.tendon_limited
@@ -107,7 +117,12 @@ def tendons(model: mujoco.MjModel, names: Names) -> Section:
 
 
 def equalities(model: mujoco.MjModel, names: Names) -> Section:
-    """Return the equality constraints."""
+    """Return the equality constraints.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+    """
     rows = Rows(names.equalities)
     kinds = [mujoco.mjtEq(kind) for kind in model.eq_type.tolist()]
     rows.words("type", map(word, kinds))

@@ -160,7 +160,12 @@ def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.boo
 
 
 def named(names: tuple[str, ...], indices: NDArray[np.integer]) -> list[str]:
-    """The names that stand at the indices, shape (n,)."""
+    """Return the names at some indices.
+
+    Args:
+        names: Names of all elements.
+        indices: Shape (n,).
+    """
     return [names[int(index)] for index in indices.tolist()]
 
 
@@ -202,7 +207,12 @@ class Rows:
                 row[field] = tuple(numbers)
 
     def words(self, field: str, words: Iterable[str | tuple[Value, ...]]) -> None:
-        """Give each element its word, or its words; an empty word is left out."""
+        """Set a field of each element to one or several words.
+
+        Args:
+            field: Name of the field.
+            words: Words of each element; an empty word is left out.
+        """
         for row, word in zip(self._rows, words, strict=True):
             if word:
                 row[field] = (word,) if isinstance(word, str) else word
@@ -210,7 +220,14 @@ class Rows:
     def parts(
         self, field: str, values: ArrayLike, starts: Sequence[int], counts: Sequence[int]
     ) -> None:
-        """Give each element `counts` rows of `values` from `starts` on; none where it has none."""
+        """Set a field of each element to some rows of an array.
+
+        Args:
+            field: Name of the field.
+            values: The array; its rows belong to elements.
+            starts: First row of each element.
+            counts: Number of rows of each element; without any, the field is left out.
+        """
         flat = np.asarray(values, np.float64) + 0.0
         for row, start, count in zip(self._rows, starts, counts, strict=True):
             if count > 0:

@@ -134,7 +134,12 @@ def sizes(model: mujoco.MjModel) -> Section:
 
 
 def flexes(model: mujoco.MjModel, names: Names) -> Section:
-    """The soft bodies; contact parameters as they stand, not as they combine."""
+    """Return the soft bodies, with their own contact parameters rather than the combined ones.
+
+    Args:
+        model: The model.
+        names: Names of its elements.
+    """
     rows = Rows(names.flexes)
     for name in _FLEX_FIELDS:
         rows.numbers(name, getattr(model, f"flex_{name}"))

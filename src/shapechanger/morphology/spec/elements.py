@@ -56,7 +56,11 @@ def limbs_and_trunks(spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
 
 
 def require_limb(body: mujoco.MjsBody, what: str) -> None:
-    """Refuse to cut a trunk: a body that hangs on the world, with the whole robot on it.
+    """Refuse to cut a trunk: a body attached to the world that carries the whole robot.
+
+    Args:
+        body: The body to cut.
+        what: The edit, for the message.
 
     Raises:
         MorphologyError: If `body` is a trunk.
@@ -69,7 +73,12 @@ def require_limb(body: mujoco.MjsBody, what: str) -> None:
 
 
 def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
-    """Refuse a name that another element of the kind already bears.
+    """Refuse a name that another element of the kind already has.
+
+    Args:
+        spec: The specification.
+        kind: Kind of element, such as "body".
+        name: The name.
 
     Raises:
         MorphologyError: If `name` is empty or taken.
@@ -143,6 +152,10 @@ def delete_joint(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> None:
     """Delete a joint, its motors and couplings, the sensors of these, and all keyframes.
 
     A keyframe lists every joint, so none would fit any more.
+
+    Args:
+        spec: Specification that contains it.
+        joint: The joint.
 
     Raises:
         MorphologyError: If a tendon ties the joint to others.

@@ -54,7 +54,12 @@ def rotation(quaternion: Array) -> Array:
 
 
 def orientation(spec: mujoco.MjSpec, element: _Oriented) -> Array:
-    """The element's quaternion (w, x, y, z), whichever way its orientation was written."""
+    """Return an element's quaternion (w, x, y, z), however its orientation was written.
+
+    Args:
+        spec: Specification that contains it, which says how angles are written.
+        element: A body, geom or site.
+    """
     if element.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
         quaternion = np.array(element.quat, dtype=np.float64)
         return quaternion / np.linalg.norm(quaternion)
@@ -73,7 +78,12 @@ def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
 
 
 def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
-    """Both ends of a capsule's or cylinder's axis in the body's frame, m; None for other shapes."""
+    """Return both ends of a capsule's or cylinder's axis in its body's frame, m.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom; the result is None for other shapes.
+    """
     if geom.type not in _LONG:
         return None
     if has_ends(geom):
@@ -88,7 +98,12 @@ def place_of(element: mujoco.MjsGeom | mujoco.MjsSite) -> Array:
 
 
 def move_by(element: mujoco.MjsGeom | mujoco.MjsSite, shift: Array) -> None:
-    """Move an element within its body by `shift`, m."""
+    """Move an element within its body.
+
+    Args:
+        element: The geom or site.
+        shift: Shift in the body's frame, shape (3,), m.
+    """
     if has_ends(element):
         element.fromto = element.fromto + np.tile(shift, 2)
     else:
@@ -96,7 +111,12 @@ def move_by(element: mujoco.MjsGeom | mujoco.MjsSite, shift: Array) -> None:
 
 
 def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
-    """The volume of a primitive geom, m³."""
+    """Return the volume of a primitive geom, m³.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom.
+    """
     a, b, c = (float(x) for x in geom.size)
     if has_ends(geom):
         b, c = a, 0.5 * float(np.linalg.norm(geom.fromto[3:] - geom.fromto[:3]))
@@ -115,7 +135,14 @@ def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
 
 
 def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
-    """Return a point of a segment after stretching around `held`, m."""
+    """Return a point of a segment after stretching the segment.
+
+    Args:
+        point: Position in the body's frame, shape (3,), m.
+        held: The point that stays, shape (3,), m.
+        factor: New length over the old one.
+        axis: The only direction to stretch, "x", "y" or "z"; None for all.
+    """
     scale = np.full(3, factor)
     if axis is not None:
         scale = np.ones(3)
@@ -157,7 +184,14 @@ def stretch_geom(
 
 
 def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
-    """Make a geom `factor` times as large in every direction, as seen from `held`."""
+    """Scale a geom in every direction.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom.
+        held: The point of its body that stays, shape (3,), m.
+        factor: New size over the old one.
+    """
     before = volume(spec, geom)
     geom.size = geom.size * factor
     _move_outwards(geom, held, factor)
@@ -204,7 +238,12 @@ def _keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: floa
 
 
 def scale_geom_mass(geom: mujoco.MjsGeom, factor: float) -> None:
-    """Scale a geom's mass, whether it is given as a mass or as a density."""
+    """Scale a geom's mass, whether it is given as a mass or as a density.
+
+    Args:
+        geom: The geom.
+        factor: New mass over the old one.
+    """
     if math.isnan(geom.mass):
         geom.density *= factor
     else:
@@ -220,12 +259,21 @@ def anchor(body: mujoco.MjsBody) -> Array:
 
 
 def held_at(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
-    """Return the anchor of the segment in its parent's frame, m."""
+    """Return the anchor of a segment in its parent's frame, m.
+
+    Args:
+        spec: Specification that contains it.
+        body: Body of the segment.
+    """
     return body.pos + rotation(orientation(spec, body)) @ anchor(body)
 
 
 def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
-    """The point of the segment's axis farthest from its anchor, in the body's frame, m.
+    """Return the point of a segment's axis farthest from its anchor, in the body's frame, m.
+
+    Args:
+        spec: Specification that contains it.
+        body: Body of the segment.
 
     Raises:
         MorphologyError: If the body has no capsule or cylinder.
@@ -240,13 +288,22 @@ def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
 
 
 def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
-    """Return whether mass and inertia are the body's own numbers instead of those of its geoms."""
+    """Return whether a body states its own mass and inertia instead of using those of its geoms.
+
+    Args:
+        spec: Specification that contains it.
+        body: The body.
+    """
     from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     return bool(body.explicitinertial) and not from_geoms
 
 
 def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     """Refuse a body whose mass does not follow from its geoms, or whose geoms are meshes.
+
+    Args:
+        spec: Specification that contains it.
+        body: The body.
 
     Raises:
         MorphologyError: If so: an edit of its shape would leave mass and inertia behind.
@@ -299,13 +356,24 @@ def _carry_outwards(
 
 
 def thicken_segment(spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float) -> None:
-    """Make every geom of the body `factor` times as thick, at the same length."""
+    """Scale the thickness of every geom of a body, at the same length.
+
+    Args:
+        spec: Specification that contains it.
+        body: The body.
+        factor: New thickness over the old one.
+    """
     for geom in body.geoms:
         _thicken_geom(spec, geom, factor)
 
 
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
-    """Make a limb and all that hangs on it `factor` times as large and as strong, in place.
+    """Scale a limb in size and strength, in place, with everything attached to it.
+
+    Args:
+        spec: Specification that contains it.
+        limb: First body of the limb.
+        factor: New size over the old one.
 
     Raises:
         MorphologyError: If a body of it cannot be reshaped.
@@ -329,7 +397,12 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
 
 
 def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
-    """Scale a body's mass and inertia alike, whichever way they are given."""
+    """Scale a body's mass and inertia, however they are given.
+
+    Args:
+        body: The body.
+        factor: New mass over the old one.
+    """
     if body.explicitinertial:
         body.mass *= factor
         body.inertia = body.inertia * factor

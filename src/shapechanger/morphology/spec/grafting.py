@@ -34,7 +34,13 @@ _GEOM_FIELDS: Final = (
 def graft_copy(
     spec: mujoco.MjSpec, limb: mujoco.MjsBody, suffix: str, angle: float
 ) -> mujoco.MjsBody:
-    """Add a copy of `limb` with its motors, turned by `angle` (rad) about its parent's z axis.
+    """Add a turned copy of a limb with its motors.
+
+    Args:
+        spec: Specification that contains it.
+        limb: First body of the limb.
+        suffix: Appended to the names of all copied elements.
+        angle: Turn about the z axis of the limb's parent, rad.
 
     Returns:
         The first body of the copy; each of its elements is called as the original's plus `suffix`.
@@ -51,7 +57,12 @@ def graft_copy(
 
 
 def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody) -> mujoco.MjsBody:
-    """Hang `limb` on another body at the same pose in its frame; its motors keep their places.
+    """Attach a limb to another body, at the same pose in its frame; its motors keep their order.
+
+    Args:
+        spec: Specification that contains it.
+        limb: First body of the limb.
+        parent: The body to attach it to.
 
     Returns:
         The limb, which is another object now.
@@ -67,7 +78,13 @@ def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody)
 def copy_geom(
     spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str
 ) -> mujoco.MjsGeom:
-    """A geom like `geom`, at the same pose in the frame of another body.
+    """Add a copy of a geom to another body, at the same pose in its frame.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom to copy.
+        body: Body of the copy.
+        name: Name of the copy.
 
     Raises:
         MorphologyError: If the name is taken.
@@ -83,6 +100,11 @@ def move_point(
     spec: mujoco.MjSpec, point: mujoco.MjsSite | mujoco.MjsGeom, body: mujoco.MjsBody
 ) -> mujoco.MjsSite | mujoco.MjsGeom:
     """Move a site or geom to another body, to the same pose in its frame.
+
+    Args:
+        spec: Specification that contains it.
+        point: The site or geom.
+        body: Its new body.
 
     Returns:
         The site or geom, which is another object now.

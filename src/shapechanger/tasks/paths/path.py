@@ -225,12 +225,22 @@ A faster path is a jump, or has wrong units.
 
 
 def jumps(distance_m: float, seconds: float) -> bool:
-    """Return whether a distance, m, is too far for a time, s."""
+    """Return whether a path would jump.
+
+    Args:
+        distance_m: Distance between two points, m.
+        seconds: Time between them, s.
+    """
     return distance_m > FASTEST_MPS * seconds
 
 
 def too_fast(distance_m: float, seconds: float) -> str:
-    """Return the end of a sentence about a distance, m, that is too far for a time, s."""
+    """Return the end of a sentence about a path that is too fast.
+
+    Args:
+        distance_m: Distance between two points, m.
+        seconds: Time between them, s.
+    """
     return (
         f"the point moves {distance_m:.3g} m in {seconds:.3g} s, and no fingertip is faster than "
         f"{FASTEST_MPS:g} m/s"

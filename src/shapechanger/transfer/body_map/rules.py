@@ -261,6 +261,10 @@ def same_meaning(left: Layout, right: Layout) -> str:
 
     Ranges may differ, because a longer leg only widens them; names, order, units, shapes and gains
     may not.
+
+    Args:
+        left: One layout.
+        right: The other.
     """
     for place, (a, b) in enumerate(zip(left, right, strict=False)):
         for aspect in ("name", "unit", "shape", "gain", "gain_unit"):
@@ -296,7 +300,12 @@ class Gather:
 
     @classmethod
     def of(cls, side: Side, entries: Sequence[MapEntry]) -> Gather:
-        """Compile one half of a map."""
+        """Compile one half of a map.
+
+        Args:
+            side: The source's or the target's side.
+            entries: Entries of the map, in order of the target's features.
+        """
         into, over = side.into.slices, side.over.slices
         rows: list[int] = []
         columns: list[int] = []
