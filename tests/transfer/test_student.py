@@ -45,18 +45,19 @@ def teacher() -> TrainedPolicy:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -> None:
-    """It tells which teacher it had, and acts like it: this one hardly moves."""
+    """It says which teacher it had, and acts like it: this one hardly moves, so it just rolls."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
-    assert done == [12, 24]
+    assert done == [8, 16, 24]
     assert policy.card.data["teacher"] == "shapechanger/CarRanges-v1"
     assert policy.card.data["demonstrated_steps"] == 24
     policy.save(tmp_path / "student.safetensors")
     again = CameraPolicy.load(tmp_path / "student.safetensors")
     action = again.predict(np.zeros((120, 160, 3), np.uint8))
     assert action.shape == (2,)
-    assert np.abs(action).max() < 0.5
+    assert abs(action[0]) < 0.5
+    assert 0.25 <= action[1] < 0.5
 
 
 def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
@@ -65,8 +66,8 @@ def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
         train_student(_CAR, _teacher("Tank"), 10, 0)
     with pytest.raises(StudyError, match=r"CarRanges-v1 has no teachers"):
         train_student(EnvRef("shapechanger/CarRanges-v1"), teacher, 10, 0)
-    with pytest.raises(StudyError, match="at least one step each, got 1"):
-        train_student(_CAR, teacher, 1, 0)
+    with pytest.raises(StudyError, match="at least one step and the student 2, got 2"):
+        train_student(_CAR, teacher, 2, 0)
 
 
 def test_the_command_line_refuses_in_sentences(
