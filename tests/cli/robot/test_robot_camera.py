@@ -61,6 +61,7 @@ def test_a_mark_at_the_height_of_the_lens_is_enough(profile: Path, tmp_path: Pat
         (["--board", "7x5"], "no checkerboard of 7 x 5"),
         (["--board", "7x5", "--horizon", "3"], "not both"),
         (["--horizon", "50"], "--fovy"),
+        (["--fovy", "0"], "10 to 170, got 0"),
         (["--fovy", "48.8"], "give --board or --horizon"),
         (["--horizon", "121", "--fovy", "48.8"], "from 0 to 120"),
         ([], "does not say pitch_deg and fovy_deg"),

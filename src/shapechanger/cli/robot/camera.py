@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 import tyro
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from shapechanger.worlds.rectify import CameraGeometry
 
 __all__ = ["CameraView"]
+
+# As in a profile.
+_LEAST_FOVY_DEG: Final = 10.0
+_MOST_FOVY_DEG: Final = 170.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,11 @@ class CameraView:
 
         if self.board and self.horizon is not None:
             raise RobotError("Give --board or --horizon, not both.")
+        if self.fovy is not None and not _LEAST_FOVY_DEG <= self.fovy <= _MOST_FOVY_DEG:
+            raise RobotError(
+                f"--fovy is in degrees, {_LEAST_FOVY_DEG:g} to {_MOST_FOVY_DEG:g}, got "
+                f"{self.fovy:g}."
+            )
         corners = _corners(self.board) if self.board else None
         path = find_profile(self.profile)
         profile = load_profile(path)

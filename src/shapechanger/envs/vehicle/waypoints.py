@@ -136,9 +136,8 @@ def _geometry(robot: str | os.PathLike[str]) -> CameraGeometry:
             name for name, value in (("pitch_deg", pitch), ("fovy_deg", fovy)) if value is None
         )
         raise ProfileError(
-            f"{profile.path}: [camera] needs {missing} for waypoints: the field of view is in the "
-            "camera's data sheet, and docs/profiles.md tells how to measure the pitch with a mark "
-            "on a wall."
+            f"{profile.path}: [camera] needs {missing} for waypoints: `shapechanger robot camera` "
+            "measures them from one picture of a checkerboard."
         )
     return CameraGeometry(pitch, fovy)
 
