@@ -67,6 +67,10 @@ class HeldKeys:
     def press(self, key: str, now_s: float) -> bool:
         """Register a key press.
 
+        Args:
+            key: Name of the key.
+            now_s: Time of the press, s.
+
         Returns:
             Whether it is a direction key.
         """
@@ -86,7 +90,12 @@ class HeldKeys:
         return True
 
     def value(self, action: str, now_s: float) -> float:
-        """Return the held value of an action: -1, 0 or 1."""
+        """Return the held value of an action: -1, 0 or 1.
+
+        Args:
+            action: Name of the action, such as "steering".
+            now_s: Present time, s.
+        """
         held = self._held.get(action)
         return held.value if held is not None and now_s <= held.until_s else 0.0
 

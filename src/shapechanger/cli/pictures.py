@@ -35,7 +35,11 @@ def require_film(path: Path) -> None:
 
 
 def write_picture(picture: NDArray[Any], path: Path) -> None:
-    """Write an image, shape (height, width, 3), in the format of the file's suffix.
+    """Write an image in the format of the file's suffix.
+
+    Args:
+        picture: Shape (height, width, 3).
+        path: The file.
 
     Raises:
         OutputError: If it cannot be written.
@@ -45,6 +49,11 @@ def write_picture(picture: NDArray[Any], path: Path) -> None:
 
 def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
     """Write frames as a video.
+
+    Args:
+        frames: Pictures, each of shape (height, width, 3).
+        path: The file.
+        fps: Frames per second.
 
     Raises:
         OutputError: If it cannot be written.

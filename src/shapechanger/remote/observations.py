@@ -174,12 +174,22 @@ class RobotSpaces:
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
     def quantity(self, message: Observation, name: str) -> float | None:
-        """Return a quantity of the state by name, or None if no sensor measures it."""
+        """Return a quantity of the state by name, or None if no sensor measures it.
+
+        Args:
+            message: An observation.
+            name: Name of the quantity, such as "speed".
+        """
         value = self._number(message, name)
         return None if math.isnan(value) or self.source(message, name) == _ABSENT else value
 
     def source(self, message: Observation, name: str) -> str:
-        """Return the source of a quantity: name of the sensor, "estimated" or "absent"."""
+        """Return the source of a quantity: name of the sensor, "estimated" or "absent".
+
+        Args:
+            message: An observation.
+            name: Name of the quantity, such as "speed".
+        """
         if math.isnan(self._number(message, name)):
             return _ABSENT
         return message.sources.get(name, _ABSENT)

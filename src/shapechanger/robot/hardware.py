@@ -71,23 +71,51 @@ class I2cBus(Protocol):
     """Methods of `smbus2.SMBus` that the drivers use."""
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte to a chip without registers."""
+        """Send one byte to a chip without registers.
+
+        Args:
+            i2c_addr: Address of the chip.
+            value: The byte.
+        """
         ...
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """Read one register."""
+        """Read one register.
+
+        Args:
+            i2c_addr: Address of the chip.
+            register: Number of the register.
+        """
         ...
 
     def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Write one register."""
+        """Write one register.
+
+        Args:
+            i2c_addr: Address of the chip.
+            register: Number of the register.
+            value: The byte.
+        """
         ...
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Read consecutive registers."""
+        """Read consecutive registers.
+
+        Args:
+            i2c_addr: Address of the chip.
+            register: Number of the first register.
+            length: Number of bytes.
+        """
         ...
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
-        """Write consecutive registers."""
+        """Write consecutive registers.
+
+        Args:
+            i2c_addr: Address of the chip.
+            register: Number of the first register.
+            data: The bytes.
+        """
         ...
 
     def close(self) -> None:
@@ -99,7 +127,13 @@ class ServoPins(Protocol):
     """Servo pulses on pins, as of `lgpio.tx_servo`."""
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses on a BCM pin, `width_us` wide; 0 ends them."""
+        """Send pulses on a pin.
+
+        Args:
+            pin: BCM number.
+            width_us: Width of a pulse, us; 0 ends them.
+            frequency_hz: Pulses per second.
+        """
         ...
 
     def close(self) -> None:

@@ -46,7 +46,12 @@ _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """Half of the brightness, bluish, with a raised gain's noise of 9 levels."""
+    """Darken a picture to half of its brightness, bluish, with a raised gain's noise of 9 levels.
+
+    Args:
+        picture: Shape (H, W, 3).
+        seed: Seed of the fault, at least 0.
+    """
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -55,13 +60,23 @@ def night(picture: Picture, seed: int) -> Picture:
 
 
 def glare(picture: Picture, seed: int) -> Picture:
-    """Light shining into the lens from the upper half of the picture: up to 230 levels more."""
+    """Add light shining into the lens from the upper half of a picture: up to 230 levels.
+
+    Args:
+        picture: Shape (H, W, 3).
+        seed: Seed of the fault, at least 0.
+    """
     added = _glare(seed, *picture.shape[:2])
     return _bytes(picture + added)
 
 
 def blur(picture: Picture, seed: int) -> Picture:
-    """Defocus by 1.25 % of the width; the seed has no effect."""
+    """Defocus a picture by 1.25 % of its width.
+
+    Args:
+        picture: Shape (H, W, 3).
+        seed: Has no effect.
+    """
     del seed
     variance = (_BLUR * picture.shape[1]) ** 2
     # Two box filters over w = 2 r + 1 pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
@@ -74,7 +89,12 @@ def blur(picture: Picture, seed: int) -> Picture:
 
 
 def dirt(picture: Picture, seed: int) -> Picture:
-    """8 to 14 spots of mud that absorb 45 to 85 % of the light, at places given by the seed."""
+    """Add 8 to 14 spots of mud that absorb 45 to 85 % of the light.
+
+    Args:
+        picture: Shape (H, W, 3).
+        seed: Seed of their places, at least 0.
+    """
     keeps, mud = _dirt(seed, *picture.shape[:2])
     return _bytes(picture * keeps + mud)
 

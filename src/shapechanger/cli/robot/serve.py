@@ -294,6 +294,11 @@ def recordings_folder(name: str) -> Path:
 def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials:
     """Return the credentials of a robot, creating them if permitted.
 
+    Args:
+        name: Name of the robot.
+        folder: Folder of the credentials; None for the robot's own.
+        make: Whether missing ones are created.
+
     Raises:
         RobotError: If they are missing or readable by others.
         OutputError: If they cannot be written.

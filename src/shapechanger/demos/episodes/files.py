@@ -63,7 +63,11 @@ def lock(path: Path, busy: str) -> int:
 
 
 def write_all(fd: int, data: bytes) -> None:
-    """Append `data` to a file completely, or leave the file as it was.
+    """Append to a file completely, or leave the file as it was.
+
+    Args:
+        fd: Descriptor of the file.
+        data: The bytes to append.
 
     Raises:
         OSError: If the data cannot be written.
@@ -102,5 +106,10 @@ def write_header(folder: Path, content: dict[str, Any]) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:
-    """Return the error to raise when a file cannot be written."""
+    """Return the error to raise when a file cannot be written.
+
+    Args:
+        path: The file.
+        error: What the system said.
+    """
     return OutputError(f"Cannot write {path}: {error.strerror or error}.")

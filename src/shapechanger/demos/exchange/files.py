@@ -150,7 +150,12 @@ def parse_json_object(text: str, where: str) -> dict[str, Any]:
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:
-    """Return the error to raise when a file cannot be read."""
+    """Return the error to raise when a file cannot be read.
+
+    Args:
+        path: The file.
+        error: What the system said.
+    """
     return DemosError(f"{path} cannot be read: {error.strerror or error}.")
 
 

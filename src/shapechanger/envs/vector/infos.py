@@ -37,7 +37,12 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group the infos of the envs `numbers` by their keys, and by those of nested infos."""
+    """Group the infos of some envs by their keys, and by those of nested infos.
+
+    Args:
+        numbers: Numbers of the envs.
+        infos: The info of each.
+    """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, info in enumerate(infos):
         groups.setdefault(_keys(info), []).append(place)

@@ -103,6 +103,10 @@ class Interruption:
     def wait(self, fd: int, at_most_s: float | None = None) -> bool:
         """Wait until a descriptor is readable.
 
+        Args:
+            fd: The descriptor.
+            at_most_s: Longest wait, s; None for no limit.
+
         Returns:
             Whether it is; False after `at_most_s` seconds.
 

@@ -199,7 +199,12 @@ class SessionHub:
         self._order(replace(order, issued_ns=self.now_ns()))
 
     def suggest(self, client: ClientIdentity, values: tuple[float, ...]) -> None:
-        """Store the suggestion of a client without the lease."""
+        """Store the suggestion of a client without the lease.
+
+        Args:
+            client: Who suggests.
+            values: What it would command, one value for each action.
+        """
         self._pending.suggest(client, values, self.now_ns())
 
     def commanded(self) -> tuple[float, ...]:

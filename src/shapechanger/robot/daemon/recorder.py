@@ -415,11 +415,21 @@ class Recorder:
         return ""
 
     def mark(self, text: str, post: _Post) -> str:
-        """Mark the newest step. Return the reason for a refusal, or ""."""
+        """Mark the newest step. Return the reason for a refusal, or "".
+
+        Args:
+            text: The mark's text.
+            post: Called with the message that reports the outcome.
+        """
         return self._edit(lambda thread: thread.mark(text, self._then(post)))
 
     def undo(self, seconds: float, post: _Post) -> str:
-        """Drop the newest steps. Return the reason for a refusal, or ""."""
+        """Drop the newest steps. Return the reason for a refusal, or "".
+
+        Args:
+            seconds: Time to drop, s.
+            post: Called with the message that reports the outcome.
+        """
         return self._edit(lambda thread: thread.undo(seconds, self._then(post)))
 
     def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:

@@ -96,7 +96,12 @@ class Authenticator:
         return not self._key
 
     def accepts(self, hello: Hello, nonce: bytes) -> bool:
-        """Return True if the proof in `hello` answers `nonce` with the right key."""
+        """Return True if the proof in `hello` answers `nonce` with the right key.
+
+        Args:
+            hello: The client's first message.
+            nonce: The challenge that it answers.
+        """
         if self.is_open:
             return True
         return is_proof(hello.proof, self._key, nonce, self._certificate, hello.role)
@@ -189,7 +194,12 @@ class SentObservations:
         self._sent: deque[tuple[int, int]] = deque(maxlen=window)
 
     def add(self, seq: int, now_ns: int) -> None:
-        """Remember that observation `seq` is sent now; `seq` increases from call to call."""
+        """Remember that an observation is sent now.
+
+        Args:
+            seq: Its number, which increases from call to call.
+            now_ns: Robot's time, ns.
+        """
         self._sent.append((seq, now_ns))
 
     def refusal(self, answers: int, now_ns: int) -> str:

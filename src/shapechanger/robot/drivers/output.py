@@ -84,6 +84,10 @@ class SharedDevice(Protocol):
 def open_output(plan: OutputPlan, hardware: Hardware) -> OutputDriver:
     """Open an output at rest.
 
+    Args:
+        plan: The output.
+        hardware: The pins and buses of this robot.
+
     Raises:
         UnknownName: If there is no such driver.
         RobotError: If the device does not respond.

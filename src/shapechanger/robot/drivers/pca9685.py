@@ -91,7 +91,12 @@ class Pca9685:
         return (self._prescale + 1) / _OSCILLATOR_MHZ
 
     def send(self, channel: int, steps: int) -> None:
-        """Send pulses of `steps` steps."""
+        """Send pulses.
+
+        Args:
+            channel: Channel of the chip, 0 to 15.
+            steps: Width of a pulse, steps of 1/4096 of the period.
+        """
         if self._steps.get(channel) != steps:
             self._write(channel, steps)
             return
@@ -216,6 +221,10 @@ _OPEN: Final[dict[tuple[int, int, int], tuple[Hardware, Pca9685]]] = {}
 
 def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685Channel:
     """Open a channel without pulses.
+
+    Args:
+        settings: Settings of the plan: bus, address, channel, frequency and enable pin.
+        hardware: The pins and buses of this robot.
 
     Raises:
         RobotError: If the chip does not respond, the channel is used twice, or another channel of

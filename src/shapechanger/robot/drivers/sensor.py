@@ -47,6 +47,10 @@ class SensorDriver(Protocol):
 def open_sensor(plan: SensorPlan, hardware: Hardware) -> SensorDriver:
     """Open a sensor.
 
+    Args:
+        plan: The sensor.
+        hardware: The pins and buses of this robot.
+
     Raises:
         UnknownName: If there is no such driver.
         RobotError: If the device does not respond.

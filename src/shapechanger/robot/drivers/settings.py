@@ -15,36 +15,66 @@ _T = TypeVar("_T")
 
 
 def whole(settings: Mapping[str, object], key: str) -> int:
-    """Return an integer setting, such as a pin."""
+    """Return an integer setting, such as a pin.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     return _of_type(settings, key, int, "a whole number")
 
 
 def number(settings: Mapping[str, object], key: str) -> float:
-    """Return a number, such as a length."""
+    """Return a number, such as a length.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     if isinstance(value := settings.get(key), int) and not isinstance(value, bool):
         return float(value)
     return _of_type(settings, key, float, "a number")
 
 
 def text(settings: Mapping[str, object], key: str) -> str:
-    """Return a string."""
+    """Return a string.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     return _of_type(settings, key, str, "a word")
 
 
 def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
-    """Return a tuple of integers, such as pins."""
+    """Return a tuple of integers, such as pins.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     values = cast("list[object]", _of_type(settings, key, list, "a list of whole numbers"))
     return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
 def numbers(settings: Mapping[str, object], key: str) -> tuple[float, ...]:
-    """Return a tuple of numbers, such as tensions."""
+    """Return a tuple of numbers, such as tensions.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     values = cast("list[object]", _of_type(settings, key, list, "a list of numbers"))
     return tuple(number({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
 def texts(settings: Mapping[str, object], key: str) -> tuple[str, ...]:
-    """Return a tuple of strings, such as names of tendons."""
+    """Return a tuple of strings, such as names of tendons.
+
+    Args:
+        settings: Settings of the plan.
+        key: Name of the setting.
+    """
     values = cast("list[object]", _of_type(settings, key, list, "a list of words"))
     return tuple(text({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 

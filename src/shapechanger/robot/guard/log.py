@@ -66,7 +66,12 @@ def log_to_stderr(program: str) -> logging.Logger:
 
 
 def shortened(text: str, most_bytes: int = 200) -> str:
-    """Return the longest prefix of `text` that fits into `most_bytes` bytes of UTF-8."""
+    """Return the longest prefix of a text that fits.
+
+    Args:
+        text: The text.
+        most_bytes: Largest size in UTF-8, bytes.
+    """
     data = text.encode(errors="replace")
     if len(data) <= most_bytes:
         return data.decode()

@@ -32,7 +32,12 @@ __all__ = [
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
-    """Open the pin that triggers the one-shot, low."""
+    """Open the pin that triggers the one-shot, low.
+
+    Args:
+        pin: BCM number.
+        hardware: The pins and buses of this robot.
+    """
     from gpiozero import OutputDevice  # Robots without such pins do not need gpiozero.
 
     return OutputDevice(pin, initial_value=False, pin_factory=hardware.pin_factory())
@@ -201,6 +206,10 @@ class OutputBank:
     def write(self, actions: Sequence[float], now_ns: int) -> Done:
         """Write all outputs, including unchanged ones: some controllers need several writes.
 
+        Args:
+            actions: Value of each action.
+            now_ns: Robot's time, ns.
+
         Returns:
             The applied outputs.
         """
@@ -300,6 +309,10 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     """Put every output to rest by opening and closing it, independently of the others.
 
     No other process may have the outputs open.
+
+    Args:
+        plan: The robot.
+        hardware: The pins and buses of this robot.
 
     Returns:
         Description of the failures.

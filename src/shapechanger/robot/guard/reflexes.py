@@ -29,7 +29,12 @@ class Persistence:
         self._since_ns: int | None = None
 
     def holds(self, condition: bool, now_ns: int) -> bool:
-        """Update with the current condition and return whether it has held for long enough."""
+        """Update with the current condition and return whether it has held for long enough.
+
+        Args:
+            condition: Whether it holds now.
+            now_ns: Robot's time, ns.
+        """
         if not condition:
             self._since_ns = None
             return False
@@ -64,7 +69,12 @@ class Bump:
         """When the robot may go forward again; None if it never bumped."""
 
     def sense(self, quantities: Mapping[str, float], now_ns: int) -> None:
-        """Update with a new sensing."""
+        """Update with a new sensing.
+
+        Args:
+            quantities: Readings by name.
+            now_ns: Robot's time, ns.
+        """
         touches = quantities.get("bump", 0.0) > 0.0
         if touches:
             self.count += not self._touches
@@ -99,7 +109,13 @@ class Stall:
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
-        """Update with a new sensing and the push, -1 to 1."""
+        """Update with a new sensing.
+
+        Args:
+            quantities: Readings by name.
+            push: Applied push, -1 to 1.
+            now_ns: Robot's time, ns.
+        """
         self.watches = self._after_s > 0.0 and "speed" in quantities
         stands = self.watches and abs(quantities["speed"]) < _STANDS_M_PER_S
         if self._forward.holds(stands and push > self._threshold, now_ns):
@@ -147,7 +163,12 @@ class RobotHealth:
         return " ".join(filter(None, (*self._others, self._battery)))
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Update with a new sensing."""
+        """Update with a new sensing.
+
+        Args:
+            sensing: Readings of all sensors.
+            now_ns: Robot's time, ns.
+        """
         failing = [
             f"Sensor {name} fails, and can protect no longer: {sensing.failures[name]}"
             for name in self._protecting

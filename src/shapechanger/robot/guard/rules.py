@@ -294,6 +294,10 @@ class Rules:
     def offer(self, order: Order, now_ns: int) -> str:
         """Process an order.
 
+        Args:
+            order: The order.
+            now_ns: Robot's time, ns.
+
         Returns:
             Why it is refused; empty if it is not.
         """
@@ -328,7 +332,12 @@ class Rules:
         self.arming.stop(reason)
 
     def fail(self, reason: str, now_ns: int) -> None:
-        """Latch an emergency stop without hold or ramp, after an output failed."""
+        """Latch an emergency stop without hold or ramp, after an output failed.
+
+        Args:
+            reason: Which output failed, and how.
+            now_ns: Robot's time, ns.
+        """
         self.stop(reason)
         self._stopping = self._rest_at_once(now_ns)
 
@@ -339,7 +348,12 @@ class Rules:
         self._is_pressed = pressed
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Update with new sensor readings."""
+        """Update with new sensor readings.
+
+        Args:
+            sensing: Readings of all sensors.
+            now_ns: Robot's time, ns.
+        """
         quantities = sensing.quantities
         limit_m = self._plan.limits.stop_distance_m
         self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m

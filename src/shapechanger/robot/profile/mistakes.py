@@ -126,7 +126,12 @@ class Source:
         return self._lines.get(place, 1)
 
     def mistake(self, place: Place, words: str) -> ProfileError:
-        """Return an error with file, line and message."""
+        """Return an error with file, line and message.
+
+        Args:
+            place: Table and key.
+            words: The message.
+        """
         return ProfileError(f"{self.path}, line {self.line(place)}: {words}.")
 
 
@@ -138,13 +143,23 @@ def called(table: Place) -> str:
 
 
 def choice(name: str, known: Iterable[str]) -> str:
-    """Describe an unknown name: the nearest spelling and the known names."""
+    """Describe an unknown name: the nearest spelling and the known names.
+
+    Args:
+        name: The unknown name.
+        known: The known names.
+    """
     names = sorted(known)
     return f"{name!r}{nearest(name, names)}; there are: {', '.join(names) or 'none'}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return " Did you mean ...?", or an empty string if nothing is similar."""
+    """Return " Did you mean ...?", or an empty string if nothing is similar.
+
+    Args:
+        name: The unknown name.
+        known: The known names.
+    """
     close = difflib.get_close_matches(name, list(known), n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 

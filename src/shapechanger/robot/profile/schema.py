@@ -122,7 +122,12 @@ def _stem_of(key: str) -> str:
 
 
 def with_unit(key: str, known: Iterable[str]) -> str | None:
-    """Return the known key with the same stem and another unit; None if there is none."""
+    """Return the known key with the same stem and another unit; None if there is none.
+
+    Args:
+        key: A key, such as "bump_hold_s".
+        known: The known keys.
+    """
     return next((k for k in known if unit_of(k) and _stem_of(k) == _stem_of(key)), None)
 
 

@@ -122,7 +122,12 @@ class Section:
 
 
 def read_action(name: str, section: Section) -> ActionPlan:
-    """Read one number of a command, which must be able to rest within its caps."""
+    """Read one number of a command, which must be able to rest within its caps.
+
+    Args:
+        name: Name of the action.
+        section: Its table.
+    """
     values = section.read(ACTION_KEYS)
     lowest = 0.0 if values["one_sided"] else -1.0
     low: float = lowest if values["low"] is None else values["low"]
@@ -178,7 +183,12 @@ def _split(
 
 
 def read_output(name: str, section: Section) -> OutputPlan:
-    """Read one motor, servo or controller."""
+    """Read one motor, servo or controller.
+
+    Args:
+        name: Name of the output.
+        section: Its table.
+    """
     for key in (_DRIVER, _OVER):
         written = section.table.get(key.name)
         if isinstance(written, str) and "gpiozero" in written.lower():
@@ -195,7 +205,12 @@ def read_output(name: str, section: Section) -> OutputPlan:
 
 
 def read_sensor(name: str, section: Section) -> SensorPlan:
-    """Read one sensor."""
+    """Read one sensor.
+
+    Args:
+        name: Name of the sensor.
+        section: Its table.
+    """
     driver: str = section.value(SENSOR_KEYS[0])
     is_joint = {
         name: driver == "as5600" and isinstance(v, dict) for name, v in section.table.items()
@@ -334,6 +349,11 @@ def check_mix(
 ) -> None:
     """Refuse unconnected outputs and actions, and a rest that drives.
 
+    Args:
+        source: The profile's text, for messages.
+        actions: Actions by name.
+        outputs: The outputs.
+
     Raises:
         ProfileError: If a mix has no action or an unknown one, an action moves nothing, or a
             propelling part has no propelling action or is not at 0 at rest.
@@ -367,6 +387,12 @@ def check_stop(
     outputs: Iterable[OutputPlan],
 ) -> None:
     """Refuse a stop that would keep driving.
+
+    Args:
+        source: The profile's text, for messages.
+        stop: The stop.
+        actions: Actions by name.
+        outputs: The outputs.
 
     Raises:
         ProfileError: If the stop holds or ramps an action that contributes to a propelling part.

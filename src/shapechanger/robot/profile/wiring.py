@@ -55,6 +55,10 @@ class PinAllocation:
     def take_pin(self, pin: int, place: Place) -> None:
         """Allocate a pin.
 
+        Args:
+            pin: BCM number.
+            place: Where the profile names it.
+
         Raises:
             ProfileError: If it is in use.
         """

@@ -186,7 +186,12 @@ def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episo
 
 
 def random_actions(space: gym.Space[Any], seed: int) -> Act:
-    """Return a policy that draws actions uniformly from `space`."""
+    """Return a policy that draws actions uniformly.
+
+    Args:
+        space: Bounded space of the actions.
+        seed: Seed of the draws.
+    """
     space.seed(seed)
     return lambda observations: np.stack([space.sample() for _ in observations])
 

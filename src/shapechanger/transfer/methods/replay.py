@@ -210,13 +210,25 @@ class DomainClassifiers(nn.Module):
         self._optimiser = torch.optim.Adam(self.parameters(), lr=learning_rate)
 
     def forward(self, seen: Tensor, acted: Tensor, then: Tensor) -> tuple[Tensor, Tensor]:
-        """Return log p(target) - log p(source) by each classifier, each of shape (n,)."""
+        """Return log p(target) - log p(source) by each classifier, each of shape (n,).
+
+        Args:
+            seen: Observations, shape (n, k).
+            acted: Actions, shape (n, m).
+            then: Next observations, shape (n, k).
+        """
         of_action = torch.cat([seen, acted], dim=1).float()
         of_step = torch.cat([of_action, then.float()], dim=1)
         return self._of_step(of_step).squeeze(1), self._of_action(of_action).squeeze(1)
 
     def correction(self, seen: Tensor, acted: Tensor, then: Tensor) -> Tensor:
-        """Estimate log p_target(s' | s, a) - log p_source(s' | s, a), shape (n,)."""
+        """Estimate log p_target(s' | s, a) - log p_source(s' | s, a), shape (n,).
+
+        Args:
+            seen: Observations, shape (n, k).
+            acted: Actions, shape (n, m).
+            then: Next observations, shape (n, k).
+        """
         with torch.no_grad():
             of_step, of_action = self(seen, acted, then)
         return (of_step - of_action).clamp(-_LARGEST_CORRECTION, _LARGEST_CORRECTION)

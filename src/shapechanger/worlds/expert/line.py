@@ -128,12 +128,22 @@ class CourseProgress:
         return self._metres
 
     def reset(self, x: float, y: float) -> None:
-        """Start at a point, m."""
+        """Start at a point.
+
+        Args:
+            x: x coordinate, m.
+            y: y coordinate, m.
+        """
         self._spot = self._line.nearest(x, y)
         self._metres = 0.0
 
     def update(self, x: float, y: float) -> float:
-        """Move the vehicle to a point, m, and return the net distance since the last reset, m."""
+        """Move the vehicle to a point, and return the net distance since the last reset, m.
+
+        Args:
+            x: x coordinate, m.
+            y: y coordinate, m.
+        """
         spot = self._line.nearest(x, y, self._spot.station)
         self._metres += self._line.ahead_by(self._spot.station, spot.station)
         self._spot = spot

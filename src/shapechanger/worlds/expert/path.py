@@ -139,7 +139,12 @@ class CoursePath:
         return self._line.nearest(x, y, hint)
 
     def ahead(self, station: float, distance: float) -> tuple[float, float]:
-        """Point at a distance beyond a station, m."""
+        """Return the point at a distance beyond a station.
+
+        Args:
+            station: Place along the path, m.
+            distance: Distance, m.
+        """
         return self._line.at(station + distance)
 
     def index(self, station: float) -> int:
@@ -147,7 +152,12 @@ class CoursePath:
         return self._line.index(station)
 
     def way(self, start: float, end: float) -> float:
-        """Shorter way from one station to another, m; backward is negative."""
+        """Return the shorter way between two stations, m; backward is negative.
+
+        Args:
+            start: Place along the path, m.
+            end: Place along the path, m.
+        """
         return self._line.ahead_by(start, end)
 
 

@@ -301,12 +301,22 @@ _HARBOUR: Final = _OpenWorld(
 
 
 def yard(rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a yard: hedges, fences, sheds and brick walls; None if it does not fit."""
+    """Try to lay out a yard: hedges, fences, sheds and brick walls; None if it does not fit.
+
+    Args:
+        rng: Source of all that is drawn.
+        seed: Seed of the course.
+    """
     return _lay_out(_YARD, rng, seed)
 
 
 def harbour(rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a harbour: quays, rocks and a current; None if it does not fit."""
+    """Try to lay out a harbour: quays, rocks and a current; None if it does not fit.
+
+    Args:
+        rng: Source of all that is drawn.
+        seed: Seed of the course.
+    """
     return _lay_out(_HARBOUR, rng, seed)
 
 

@@ -269,7 +269,12 @@ def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.
 
 
 def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
-    """Distance between two obstacles, m; 0 or less where they overlap."""
+    """Return the distance between two obstacles, m; 0 or less where they overlap.
+
+    Args:
+        one: An obstacle.
+        other: Another one.
+    """
     if other.is_round:
         return _from_point(one, other.x, other.y) - other.length / 2.0
     if one.is_round:

@@ -318,6 +318,10 @@ class RegisterBus:
     def read(self, servo_id: int, register: Register) -> int:
         """Read a register of one servo.
 
+        Args:
+            servo_id: Number of the servo on the bus.
+            register: The register.
+
         Raises:
             RobotError: If it does not answer or refuses.
         """
@@ -334,6 +338,11 @@ class RegisterBus:
 
     def write(self, servo_id: int, register: Register, value: int) -> None:
         """Write a register of one servo and wait for its confirmation.
+
+        Args:
+            servo_id: Number of the servo on the bus.
+            register: The register.
+            value: The new value, in the register's unit.
 
         Raises:
             RobotError: If it does not answer or refuses.
@@ -364,6 +373,10 @@ class RegisterBus:
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
         """Write a register of several servos in one packet, which has no answer.
 
+        Args:
+            register: The register.
+            values: New values by the servo's number.
+
         Raises:
             RobotError: If the bus is gone.
         """
@@ -380,6 +393,10 @@ class RegisterBus:
 
     def sync_read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read a register of several servos with one packet.
+
+        Args:
+            register: The register.
+            ids: Numbers of the servos.
 
         Returns:
             The answers by id, without servos that did not answer.
