@@ -28,7 +28,12 @@ from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
 from shapechanger.reports.verdict import direction, finals
 from shapechanger.transfer.files import read_json, write_json
-from shapechanger.transfer.metrics import estimate_difference, jumpstart, total_reward_gain
+from shapechanger.transfer.metrics import (
+    estimate_difference,
+    jumpstart,
+    probability_of_improvement,
+    total_reward_gain,
+)
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import RunResult, learner_of, policy_path
 from shapechanger.transfer.study import STUDY_FILE, Study
@@ -37,8 +42,9 @@ __all__ = ["ants", "claims", "controls", "methods", "pendulums", "shank"]
 
 RESULTS: Final = Path(__file__).parent / "results"
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
-# The study whose films stand in the README.
+# The study whose films stand in the README, and the arms that they show.
 SHOWN: Final = "Ant-to-BigAnt"
+SHOWN_ARMS: Final = ("source", "zero-shot", "fine-tune", "scratch")
 # Index of the Amputated Ant's cut limb, number 4.
 _DAMAGED: Final = 3
 
@@ -50,7 +56,7 @@ def ants() -> list[Row]:
         _matrix_picture(studies, PICTURES / "ants-matrix.png")
     if SHOWN in studies:
         _strip_picture(studies[SHOWN], Path("results", "ants", SHOWN), PICTURES / "ants-strip.jpg")
-    return _rows(studies)
+    return _rows(studies) + _method_rows(studies)
 
 
 def pendulums() -> list[Row]:
@@ -264,6 +270,28 @@ def _rows(studies: dict[str, Study]) -> list[Row]:
     return rows
 
 
+def _method_rows(studies: dict[str, Study]) -> list[Row]:
+    """How often each method ends above fine-tuning, over all pairs."""
+    baseline = [finals(study, "fine-tune") for study in studies.values()]
+    rows: list[Row] = []
+    for arm in next(iter(studies.values())).plan.arms:
+        if arm in {"scratch", "zero-shot", "fine-tune"}:
+            continue
+        ends = [finals(study, arm) for study in studies.values()]
+        chance = probability_of_improvement(ends, baseline, rng=np.random.default_rng(0))
+        above = sum(end.mean() > base.mean() for end, base in zip(ends, baseline, strict=True))
+        rows.append(
+            Row(
+                f"probability that {arm} ends above fine-tune, over all pairs",
+                estimate_text(chance),
+                f"its mean is above in {above} of {len(studies)}; 0.5 means no difference",
+                "none: whatever comes out",
+                True,
+            )
+        )
+    return rows
+
+
 def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
     """Draw the gains as a heat map, sources in rows and targets in columns."""
     names = [str(env) for env in load_suite("ants").envs]
@@ -304,7 +332,7 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
 
 def _strip_picture(study: Study, folder: Path, path: Path) -> None:
     """Put the film strips of a study below one another, with their captions."""
-    strips = film_study(study, folder)
+    strips = [s for s in film_study(study, folder) if s.caption.startswith(SHOWN_ARMS)]
     figure = Figure(figsize=(9.0, 1.25 * len(strips)), layout="constrained")
     for axes, strip in zip(np.ravel(figure.subplots(len(strips), 1)), strips, strict=True):
         picture: NDArray[np.uint8] = np.asarray(iio.imread(io.BytesIO(strip.jpeg)))
