@@ -38,8 +38,6 @@ from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import RunResult, learner_of, policy_path
 from shapechanger.transfer.study import STUDY_FILE, Study
 
-__all__ = ["ants", "claims", "controls", "methods", "pendulums", "shank"]
-
 RESULTS: Final = Path(__file__).parent / "results"
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
 # The study whose films stand in the README, and the arms that they show.

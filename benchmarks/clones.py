@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle.drivers import CLONES
 
-__all__ = ["blind", "find_clone", "sighted"]
-
 _SIZE: Final = (120, 160, 3)
 
 

@@ -53,8 +53,6 @@ from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations
 
-__all__ = ["Scores", "forward_chain", "paired_interval", "plain", "real"]
-
 SPLITS: Final = 5
 SEEDS: Final = int(os.environ.get("SEEDS", "5"))
 

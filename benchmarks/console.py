@@ -25,8 +25,6 @@ from shapechanger.robot.profile.load import load_profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.robots import CAR, IN_A_ROOM
 
-__all__ = ["console"]
-
 SECONDS: Final = 35.0
 _MOST_MS: Final = 100.0
 

@@ -28,8 +28,6 @@ from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 
-__all__ = ["corrections"]
-
 LAYOUTS: Final = 100
 MINUTES: Final = 10
 # A clone of ten minutes collides so rarely that it takes a long way to tell two of them apart.

@@ -32,8 +32,6 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.twin.camera import with_capture_time
 
-__all__ = ["EchoRobot", "main"]
-
 _HZ = 100.0
 # A robot takes 500 messages a second from a client, and ends the connection of one that says more.
 _PAUSE_S = 0.0025

@@ -25,8 +25,6 @@ from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 
-__all__ = ["gap", "rig"]
-
 SEEDS: Final = 3
 # What a finger on a bench moves for ten minutes.
 STEPS: Final = 30_720

@@ -20,8 +20,6 @@ from shapechanger.identify.kinematics import fit_kinematics
 from shapechanger.identify.motion import fit_dynamics
 from shapechanger.identify.motors import fit_motors
 
-__all__ = ["identified", "with_arms"]
-
 _SECONDS = 10.0
 _SMALL_M = 2e-3
 

@@ -27,8 +27,6 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_polic
 from shapechanger.transfer.learners.sb3 import train, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
 
-__all__ = ["FOLDER", "TASKS", "learned", "trained"]
-
 SEEDS: Final = 5
 TARGETS: Final = 200
 TRACKS: Final = 5

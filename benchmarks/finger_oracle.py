@@ -12,8 +12,6 @@ from benchmarks.row import Row
 from shapechanger.bodies.finger import DRIVES
 from shapechanger.envs.finger.oracle import FingerOracle
 
-__all__ = ["oracle", "reached", "tracked_mm"]
-
 TARGETS: Final = 1000
 # Far from the seeds that anything was tried on.
 FIRST_SEED: Final = 1_000_000

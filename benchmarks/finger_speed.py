@@ -14,8 +14,6 @@ from typing import Final
 from benchmarks.peer import Peer
 from benchmarks.row import Row
 
-__all__ = ["against_myosuite"]
-
 ROUNDS: Final = 15
 # Of simulated time in a round.
 SECONDS: Final = 20.0

@@ -43,8 +43,6 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
 from shapechanger.robot.guard.messages import Order
 
-__all__ = ["fuzz", "main", "mutated", "resident_kb"]
-
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 PLAN = DaemonPlan(
     robot="fuzzed", body="car", action_layout=ACTIONS.to_json(), state_layout=ACTIONS.to_json()

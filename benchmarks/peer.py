@@ -5,8 +5,6 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Sequence
 
-__all__ = ["Peer"]
-
 
 class Peer:
     """A process that says that it is ready, and then how long what it is asked for took.

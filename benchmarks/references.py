@@ -37,8 +37,6 @@ from shapechanger.transfer.learners.settings import Sb3Settings, learner_setting
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
 from shapechanger.transfer.runs import RunResult
 
-__all__ = ["references"]
-
 RESULTS: Final = Path("results", "references")
 COMMAND: Final = "python -m benchmarks.run references"
 # Evaluations at the end of a training that count, and episodes of the floor and of the policy.

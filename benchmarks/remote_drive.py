@@ -8,8 +8,6 @@ from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.twin.robot import Operator
 
-__all__ = ["drive_remote"]
-
 
 def drive_remote(
     env: RemoteVehicleEnv,

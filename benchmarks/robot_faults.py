@@ -26,8 +26,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
 from tests.robots import CAR
 
-__all__ = ["faults"]
-
 TRIALS: Final = 100
 KEPT: Final = Path("results", "robot-faults")
 BARE: Final = "guard and supervisor killed"

@@ -27,8 +27,6 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.robots import CAR
 
-__all__ = ["fuzz", "hold", "link"]
-
 ROUND_TRIPS: Final = 3_000
 HOLD_S: Final = 600.0
 COST_S: Final = 20.0

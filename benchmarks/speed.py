@@ -20,8 +20,6 @@ from benchmarks.row import Row
 from shapechanger.envs.stepping import fast_model
 from shapechanger.envs.stepping.tuned import paused_timer
 
-__all__ = ["single"]
-
 ROUNDS: Final = 41
 # Env steps in a round: about 30 ms of either.
 ANT_STEPS: Final = 100

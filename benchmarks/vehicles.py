@@ -25,8 +25,6 @@ from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveScor
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.worlds.course import HELD_OUT
 
-__all__ = ["clone", "counted", "expert", "fast", "frames", "layouts", "students"]
-
 EXPERT_LAYOUTS: Final = 50
 CLONE_LAYOUTS: Final = 20
 STUDENT_LAYOUTS: Final = 17  # 510 m.

@@ -17,8 +17,6 @@ from shapechanger.cli.suite import RunSuite
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.suite import StudyOutcome
 
-__all__ = ["lenses", "pairs"]
-
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
 # Of twelve.

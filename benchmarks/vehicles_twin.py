@@ -20,8 +20,6 @@ from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import run_robot
 
-__all__ = ["twin"]
-
 LAYOUTS: Final = 10
 _CLOCKS: Final[dict[Literal["twin", "real"], Literal["lockstep", "realtime"]]] = {
     "twin": "lockstep",

@@ -29,8 +29,6 @@ from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
 from shapechanger.worlds.course import HELD_OUT
 
-__all__ = ["pairs"]
-
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
 COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.

@@ -23,8 +23,6 @@ from typing import Final
 
 import mujoco
 
-__all__ = ["main"]
-
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _MODULES: Final = (
     "_callbacks",

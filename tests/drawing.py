@@ -10,8 +10,6 @@ from typing import Final, NoReturn
 
 import pytest
 
-__all__ = ["CHOICE", "draws", "missing", "run_python"]
-
 # The variables that decide what draws.
 CHOICE: Final = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
 

@@ -7,17 +7,6 @@ from pathlib import Path
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 
-__all__ = [
-    "BLIND_CAR",
-    "CAR",
-    "IN_A_ROOM",
-    "PATIENT_CAR",
-    "SWAPPED_ROLES",
-    "SWAPPED_WAYS",
-    "changed",
-    "write_profile",
-]
-
 IN_A_ROOM = ("--world", "room")
 """For who serves a twin and does not care where it is: the room is there at once."""
 

@@ -15,8 +15,6 @@ from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import until
 
-__all__ = ["Clock", "Served", "driving"]
-
 Clock = Literal["twin", "real"]
 
 

@@ -41,38 +41,6 @@ import difflib
 from collections.abc import Iterable
 from typing import Final
 
-__all__ = [
-    "BadAction",
-    "BrokenEpisode",
-    "BrokenModel",
-    "CorruptStudy",
-    "DemosError",
-    "EmptyShift",
-    "EnvArgumentError",
-    "FailedRuns",
-    "FingerError",
-    "ForeignStudy",
-    "LayoutError",
-    "LinkError",
-    "MapError",
-    "MissingExtra",
-    "MorphologyError",
-    "OutputError",
-    "PathError",
-    "ProfileError",
-    "RenderError",
-    "RobotError",
-    "RobotRefused",
-    "ShapechangerError",
-    "SpaceMismatch",
-    "StaleObservation",
-    "StudyError",
-    "TransplantError",
-    "UnknownName",
-    "VectorEnvError",
-    "WorldError",
-]
-
 # A humanoid has some forty names; a longer list would hide the sentence.
 _MOST_NAMES_LISTED: Final = 40
 

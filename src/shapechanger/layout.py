@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import LayoutError, UnknownName
 
-__all__ = ["Element", "ElementKind", "Feature", "Layout"]
-
 ElementKind = Literal["body", "joint", "actuator", "tendon", "sensor", "camera", "task"]
 
 _GLOB_CHARACTERS: Final = frozenset("*?[")

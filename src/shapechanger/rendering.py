@@ -12,15 +12,6 @@ from typing import Any, Final
 
 from shapechanger.errors import RenderError
 
-__all__ = [
-    "choose_gl",
-    "has_screen",
-    "open_context",
-    "require_context",
-    "require_known_gl",
-    "require_screen",
-]
-
 _LIBRARIES: Final = ("egl", "osmesa", "glfw")
 # What else MuJoCo takes for MUJOCO_GL, to draw with GLFW or not at all; else it does not load.
 _OTHER_VALUES: Final = (

@@ -12,17 +12,6 @@ from typing import Final, Self
 
 from shapechanger.errors import ShapechangerError
 
-__all__ = [
-    "DIRECTIONS",
-    "FIRST_HOLD_S",
-    "REPEAT_HOLD_S",
-    "HeldKeys",
-    "NoTerminal",
-    "Terminal",
-    "keys_in",
-]
-
-
 FIRST_HOLD_S: Final = 0.6
 """Hold time of a first press, s: terminals start repeating after up to 0.5 s. No press holds
 longer."""

@@ -23,8 +23,6 @@ try:
 except ImportError as error:
     raise MissingExtra("safetensors", "learn") from error
 
-__all__ = ["UNREADABLE", "kind_of", "read_tensors", "tensor_bytes"]
-
 _CARD: Final = "card"
 _HASH: Final = "sha256"
 _KIND: Final = "kind"

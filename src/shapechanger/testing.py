@@ -22,8 +22,6 @@ from shapechanger.errors import LayoutError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
-__all__ = ["PROMISES", "BrokenPromise", "MakeEnv", "examine"]
-
 # Makes a fresh env.
 MakeEnv = Callable[[], gym.Env[Any, Any]]
 

@@ -13,8 +13,6 @@ from shapechanger.bodies.finger import FingerParameters
 from shapechanger.envs.finger.identification import record_babble
 from shapechanger.identify import FingerLog
 
-__all__ = ["changed", "made_up", "recorded", "swings", "synthetic"]
-
 
 def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog, FingerParameters]:
     """A log of a simulated finger, and its true parameters."""

@@ -44,7 +44,6 @@ def test_every_message_is_tried() -> None:
     for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
         tried = {kind.__name__ for kind in get_args(union)}
         assert all(f"{name}" in repr(strategy) for name in tried)
-        assert tried <= set(messages.__all__)
 
 
 @pytest.mark.parametrize("side", DECODERS)

@@ -15,8 +15,6 @@ from shapechanger.layout import Element, Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import CloningSettings
 
-__all__ = ["DRY", "ICY", "LANE", "QUICK_CLONING", "SLIPPERY", "TINY_CLONING", "WET", "Lane"]
-
 _ROWS, _COLUMNS = 12, 20
 HELD_OUT: Final = 1_000
 

@@ -13,8 +13,6 @@ from typing import Final
 from shapechanger.bodies.families import Family
 from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeight, Stretch
 
-__all__ = ["ANT", "LEGS"]
-
 # Legs in the order of the model's motors, with the signs of x and y of their directions. The ankles
 # of legs 2 and 3 turn in the opposite direction.
 LEGS: Final = {4: (1, -1), 1: (1, 1), 2: (-1, 1), 3: (-1, -1)}

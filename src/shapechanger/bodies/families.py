@@ -17,18 +17,6 @@ import mujoco
 from shapechanger.errors import UnknownName
 from shapechanger.morphology import Body, Edit, Stretch, as_body, name_elements
 
-__all__ = [
-    "DOUBLE_PENDULUM",
-    "HALF_CHEETAH",
-    "HOPPER",
-    "HUMANOID",
-    "PENDULUM",
-    "SWIMMER",
-    "WALKER2D",
-    "BodyLike",
-    "Family",
-]
-
 BodyLike = str | Edit | Iterable[Edit]
 """A body as users give it: its name, edits as JSON, one edit, or several."""
 

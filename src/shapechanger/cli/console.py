@@ -16,8 +16,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-__all__ = ["Interrupted", "StudyProgress", "plain_console"]
-
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
     """Return a console without markup or emoji, so that `a[b]` and `:a:` print verbatim.

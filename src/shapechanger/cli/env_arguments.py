@@ -28,19 +28,6 @@ from shapechanger.transfer.env_ref import EnvRef
 if TYPE_CHECKING:
     from shapechanger.transfer.executor import Executor
 
-__all__ = [
-    "asked",
-    "default_learner",
-    "driven",
-    "env_ref",
-    "executor_of",
-    "opened",
-    "options_of",
-    "policy_file",
-    "require_seed",
-    "settings_of",
-]
-
 _REFERENCE: Final = "reference"
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1

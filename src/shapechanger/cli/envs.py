@@ -22,8 +22,6 @@ from shapechanger.envs.catalogue import (
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
-__all__ = ["Envs"]
-
 _EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 
 

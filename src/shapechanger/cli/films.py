@@ -22,8 +22,6 @@ from shapechanger.transfer.runs import learner_of, policy_path
 if TYPE_CHECKING:
     from shapechanger.transfer.study import Study
 
-__all__ = ["film_study"]
-
 _WIDTH, _HEIGHT = 240, 180
 _FILM_S: Final = 10.0
 _PICTURES: Final = 6

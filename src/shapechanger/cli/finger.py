@@ -17,8 +17,6 @@ from shapechanger.errors import FingerError, OutputError, UnknownName
 if TYPE_CHECKING:
     from shapechanger.identify import IdentifiedFinger
 
-__all__ = ["Finger", "Identify", "RecordFinger"]
-
 
 @dataclass(frozen=True)
 class Identify:

@@ -41,8 +41,6 @@ except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
     print("Stopped.", file=sys.stderr)
     sys.exit(_INTERRUPTED)
 
-__all__ = ["main"]
-
 _Command = (
     Annotated[Envs, tyro.conf.subcommand("envs")]
     | Annotated[Train, tyro.conf.subcommand("train")]

@@ -8,8 +8,6 @@ from rich.table import Table
 
 from shapechanger.cli.console import plain_console
 
-__all__ = ["Methods"]
-
 
 @dataclass(frozen=True)
 class Methods:

@@ -15,8 +15,6 @@ try:
 except ImportError as error:
     raise MissingExtra("imageio", "sim") from error
 
-__all__ = ["require_film", "write_film", "write_picture"]
-
 _FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4")
 
 

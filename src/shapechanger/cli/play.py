@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners.policy_file import TrainedPolicy
     from shapechanger.transfer.onnx_policy import OnnxPolicy
 
-__all__ = ["Play"]
-
 
 @dataclass(frozen=True)
 class Play:

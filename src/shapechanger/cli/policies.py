@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.settings import CloneSettings
     from shapechanger.transfer.learners.settings import PpoSettings
 
-__all__ = ["Policies"]
-
 _FILE_WIDTH: Final = 160
 
 

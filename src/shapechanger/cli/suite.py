@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
-__all__ = ["SuiteFile", "load_suite", "shipped_suites", "suite_tasks"]
-
 _SHIPPED: Final = Path(__file__).parent / "suites"
 _SUMMARY: Final = "suite.json"
 _FILM: Final = "film.mp4"

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation
     from shapechanger.transfer.learners.settings import CloningSettings
 
-__all__ = ["Train"]
-
 
 @dataclass(frozen=True)
 class Train:

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.plan import Plan, Run, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
 
-__all__ = ["Transfer", "run_steps", "write_study_report"]
-
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
 _QUICK_SEEDS: Final = 2

@@ -12,7 +12,3 @@ exchange/      import and export: csv, minari, tub, 2017
 cloning/       behaviour cloning
 ```
 """
-
-from __future__ import annotations
-
-__all__: list[str] = []

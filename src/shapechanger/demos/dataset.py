@@ -22,8 +22,6 @@ from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
-__all__ = ["Dataset", "count_steps", "decode_picture", "load_dataset"]
-
 _NS_PER_S: Final = 1e9
 # Two recorders at 20 Hz may write 20 and 20.000001.
 _RATE_TOLERANCE: Final = 0.01

@@ -19,19 +19,6 @@ from shapechanger.demos.episodes import Driver
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.errors import DemosError
 
-__all__ = [
-    "Act",
-    "CorrectedPilot",
-    "DriverDecision",
-    "EpisodeDriver",
-    "ExpertPilot",
-    "Gate",
-    "GateRule",
-    "PolicyPilot",
-    "TaskExpert",
-    "record_steps",
-]
-
 _ROUNDING: Final = 1e-9
 
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import DemosError, MissingExtra
 
-__all__ = ["MAX_PIXELS", "decode_picture", "encode_picture", "is_grey", "picture_size"]
-
 MAX_PIXELS: Final = 1 << 24
 """Limit of decoded pixels, about sixteen million. The header of a JPEG of a few hundred bytes can
 claim four thousand million."""

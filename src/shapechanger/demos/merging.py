@@ -12,8 +12,6 @@ from typing import Final
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = ["Merged", "merge"]
-
 _MAX_EPISODES: Final = 10_000
 
 

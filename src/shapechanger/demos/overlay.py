@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes import Driver, Step
 from shapechanger.layout import Layout
 
-__all__ = ["COLOURS", "blank", "overlay"]
-
 COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
     "person": (0, 114, 178),
     "expert": (0, 158, 115),

@@ -26,8 +26,6 @@ from shapechanger.demos.jpeg import encode_picture, picture_size
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
 
-__all__ = ["QUALITY", "RecordEpisodes", "Seen", "Sight"]
-
 _PICTURE_DIMENSIONS: Final = 3
 _CHANNELS: Final = 3
 

@@ -12,8 +12,6 @@ import numpy as np
 
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
 
-__all__ = ["Distribution", "EpisodeStatistics", "gaps_s", "spread", "summary"]
-
 _NS_PER_S: Final = 1e9
 _COLLISION: Final = "reward_collision"
 

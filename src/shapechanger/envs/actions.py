@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import BadAction
 from shapechanger.layout import Layout
 
-__all__ = ["check_action", "check_actions"]
-
 # Kinds of NumPy dtypes: booleans, integers and floats; a batch refuses booleans, as Gymnasium.
 _NUMBERS: Final = "biuf"
 _BATCH_NUMBERS: Final = "iufc"

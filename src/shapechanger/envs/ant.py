@@ -33,8 +33,6 @@ from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
 from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 
-__all__ = ["AntEnv", "ExtendedAntEnv"]
-
 # An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
 # m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.
 _HIGHEST_STANDS: Final = 1.9

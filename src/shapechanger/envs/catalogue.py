@@ -11,21 +11,6 @@ import msgspec
 
 from shapechanger.errors import UnknownName
 
-__all__ = [
-    "CATALOGUE",
-    "FINGER_ENVS",
-    "RANGES_ENVS",
-    "REMOTE_FINGER",
-    "REMOTE_VEHICLE",
-    "VEHICLE_ENVS",
-    "WAYPOINT_ENVS",
-    "CatalogueEntry",
-    "TaskEntry",
-    "find",
-    "find_task",
-    "register_all",
-]
-
 NAMESPACE: Final = "shapechanger"
 
 REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"

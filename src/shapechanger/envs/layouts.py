@@ -10,16 +10,6 @@ import mujoco
 
 from shapechanger.layout import Element, Feature, Layout
 
-__all__ = [
-    "action_layout",
-    "contact_features",
-    "drive_features",
-    "inertia_features",
-    "position_features",
-    "twist_features",
-    "velocity_features",
-]
-
 _J = mujoco.mjtJoint
 _POSITION_UNIT: Final = {_J.mjJNT_SLIDE: "m", _J.mjJNT_HINGE: "rad"}
 _FORCE_UNIT: Final = {_J.mjJNT_SLIDE: "N", _J.mjJNT_HINGE: "N·m"}

@@ -31,8 +31,6 @@ from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Element, Feature
 from shapechanger.morphology import compile_body
 
-__all__ = ["InvertedDoublePendulumEnv", "InvertedPendulumEnv"]
-
 _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 _CART_AND_POLES: Final = (*_CART_AND_POLE, int(mujoco.mjtJoint.mjJNT_HINGE))
 

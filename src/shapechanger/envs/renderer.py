@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import RenderError
 from shapechanger.rendering import choose_gl, require_context
 
-__all__ = ["Renderer", "body_reach", "draw", "halve_textures"]
-
 # Frames of at most this many pixels are camera observations rather than films.
 _MOST_CAMERA_PIXELS: Final = 256 * 256
 # Effects that render the scene again for each light and each mirror.

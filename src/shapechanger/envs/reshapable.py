@@ -38,8 +38,6 @@ from shapechanger.morphology.pose import (
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
-__all__ = ["Reshapable"]
-
 # Distance of the camera from a body that it follows, in multiples of its reach; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
 # MuJoCo's warnings of a position, velocity or acceleration that is huge or not finite.

@@ -37,8 +37,6 @@ from shapechanger.morphology import compile_body
 from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
 from shapechanger.tasks.measure import FORWARD_SPEED, RETURN, Measure
 
-__all__ = ["HalfCheetahEnv", "HopperEnv", "HumanoidEnv", "SwimmerEnv", "Walker2dEnv"]
-
 # Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0
 # The joints that move a trunk in the world.

@@ -26,8 +26,6 @@ from shapechanger.bodies.finger import TENDONS
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.identify.log import FingerLog
 
-__all__ = ["ARMS", "Kinematics", "fit_kinematics", "interval_quantile", "robust_covariance"]
-
 ARMS: Final[NDArray[np.bool_]] = MOMENT_ARMS != 0.0
 """Mask of the tendons that pass each joint, (7, 4)."""
 

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import DRIVES, JOINTS, TENDONS
 from shapechanger.errors import FingerError, OutputError, UnknownName
 
-__all__ = ["SIGNALS", "FingerLog", "load_log", "require_informative", "save_log"]
-
 SIGNALS: Final = {
     "t": 0,
     "commands": len(TENDONS),

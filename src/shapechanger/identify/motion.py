@@ -33,17 +33,6 @@ from shapechanger.identify.kinematics import ARMS, Kinematics
 from shapechanger.identify.log import FingerLog
 from shapechanger.identify.motors import FINE_S, CommandSignal, Motors
 
-__all__ = [
-    "FACTORS",
-    "MOTOR_KG",
-    "Dynamics",
-    "Window",
-    "cut_windows",
-    "fit_dynamics",
-    "steps_per_period",
-    "with_motors",
-]
-
 MOTOR_KG: Final = 0.02
 """Assumed mass of a motor at the tendon, kg, between a bare spool and a motor with gears. Chosen:
 fitted values were two to eight times too large, because they absorb the stretch."""

@@ -14,8 +14,6 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
 from shapechanger.identify.kinematics import robust_covariance
 from shapechanger.identify.log import FingerLog
 
-__all__ = ["FINE_S", "CommandSignal", "Motors", "fit_motors"]
-
 FINE_S: Final = 0.001
 """Step at which motors are simulated on their own, s."""
 

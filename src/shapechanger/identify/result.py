@@ -35,8 +35,6 @@ from shapechanger.identify.motion import (
 )
 from shapechanger.identify.motors import CommandSignal, Motors, fit_motors
 
-__all__ = ["HeldOut", "IdentifiedFinger", "ParameterEstimate", "identify", "replay"]
-
 # Share of the log that the motion is fitted to; the rest is for validation.
 _FITTED: Final = 0.8
 _NORMAL: Final = 1.96

@@ -9,8 +9,6 @@ from typing import Final
 
 from shapechanger.errors import LinkError
 
-__all__ = ["DEFAULT_PORT", "SERVICE", "Address", "is_loopback", "parse_address"]
-
 DEFAULT_PORT: Final = 5000
 """Port of a robot unless another is given, as in 2017."""
 

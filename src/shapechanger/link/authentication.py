@@ -16,19 +16,6 @@ from typing import Final
 
 from shapechanger.errors import LinkError
 
-__all__ = [
-    "NONCE_BYTES",
-    "fingerprint_hex",
-    "fingerprint_of",
-    "fingerprint_short",
-    "is_proof",
-    "make_proof",
-    "new_key",
-    "new_nonce",
-    "parse_fingerprint",
-    "parse_key",
-]
-
 NONCE_BYTES: Final = 32
 """Bytes of a nonce."""
 

@@ -33,47 +33,6 @@ from msgspec import Meta
 
 from shapechanger.errors import LinkError
 
-__all__ = [
-    "MAX_CLIENT_MESSAGE",
-    "MAX_EPISODES",
-    "MAX_PIECE",
-    "MAX_ROBOT_MESSAGE",
-    "VERSION",
-    "Acknowledge",
-    "Arm",
-    "Browse",
-    "Challenge",
-    "ClientMessage",
-    "Command",
-    "Disarm",
-    "EmergencyStop",
-    "EpisodeSummary",
-    "Event",
-    "Fetch",
-    "Hello",
-    "Judge",
-    "Lease",
-    "Mark",
-    "Observation",
-    "Piece",
-    "Ping",
-    "Pong",
-    "Record",
-    "RecorderState",
-    "Recordings",
-    "Refused",
-    "Release",
-    "RobotMessage",
-    "Role",
-    "Suggest",
-    "Take",
-    "Undo",
-    "Welcome",
-    "decode_client_message",
-    "decode_robot_message",
-    "encode",
-]
-
 VERSION: Final = 1
 """Version of the messages, which must be the same on both sides."""
 

@@ -31,8 +31,6 @@ from shapechanger.morphology.edits.values import (
     Stretch,
 )
 
-__all__ = ["EDITS", "Body", "as_body", "from_json", "interpolate", "to_json"]
-
 # The edits, in order, that make a body from the first body of its family.
 Body = tuple[Edit, ...]
 

@@ -8,18 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Lift",
-    "StartRules",
-    "floor_gap",
-    "keep_within_limits",
-    "standing_height",
-    "start_pose",
-    "travelling_body",
-    "trunk_joint",
-    "trunk_lift",
-]
-
 _Array = NDArray[np.float64]
 _J = mujoco.mjtJoint
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))

@@ -11,8 +11,6 @@ from shapechanger.morphology.body import to_json
 from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.spec.explicit import make_explicit
 
-__all__ = ["compile_body", "reshape"]
-
 
 def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     """Return a copy of a specification with edits applied in order.

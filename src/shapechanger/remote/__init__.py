@@ -4,9 +4,3 @@
 `discovery` finds robots on the local network, and `observations` turns their messages into
 observations and rewards of Gymnasium envs.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

@@ -31,8 +31,6 @@ from shapechanger.remote.connection import Access, RobotConnection, open_connect
 from shapechanger.remote.inbox import Inbox, Received, Request, Requests
 from shapechanger.remote.known_robots import KnownRobot, parse_trust, untrusted
 
-__all__ = ["RobotClient"]
-
 _MAX_EVENTS: Final = 256
 _MARGIN_S: Final = 2.0  # Of a call beyond the link's own time limit, s.
 _DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.

@@ -21,8 +21,6 @@ try:
 except ImportError as error:
     raise MissingExtra("aiohttp", "remote") from error
 
-__all__ = ["PATH", "Access", "RobotConnection", "open_connection"]
-
 PATH: Final = "/link"
 """Path of the WebSocket on the robot's server."""
 

@@ -14,8 +14,6 @@ try:
 except ImportError as error:
     raise MissingExtra("zeroconf", "remote") from error
 
-__all__ = ["FoundRobot", "find"]
-
 
 @dataclass(frozen=True, slots=True)
 class FoundRobot:

@@ -11,8 +11,6 @@ from typing import Any
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
 from shapechanger.link.messages import Observation, Refused, RobotMessage
 
-__all__ = ["Inbox", "Received", "Request", "Requests"]
-
 
 @dataclass(frozen=True, slots=True)
 class Received:

@@ -28,19 +28,6 @@ from shapechanger.link.authentication import (
     parse_key,
 )
 
-__all__ = [
-    "INSECURE",
-    "KnownRobot",
-    "check_name",
-    "forget",
-    "known_folder",
-    "known_names",
-    "parse_trust",
-    "recall",
-    "remember",
-    "untrusted",
-]
-
 INSECURE: Final = "insecure"
 """In place of a fingerprint: no encryption, and no proof of the robot's identity."""
 

@@ -16,8 +16,6 @@ from shapechanger.link.messages import Observation, Welcome
 from shapechanger.remote.inbox import Received
 from shapechanger.tasks.drive import DriveReward
 
-__all__ = ["BUMP", "IMAGE", "RobotSpaces", "StepScorer", "View", "decode_picture", "resize_picture"]
-
 try:
     import simplejpeg  # pyright: ignore[reportMissingTypeStubs]  # Typed, but for its arrays.
 except ImportError as error:

@@ -30,16 +30,6 @@ if TYPE_CHECKING:
     from shapechanger.identify.result import IdentifiedFinger
     from shapechanger.transfer.study import Study
 
-__all__ = [
-    "Counting",
-    "calibration_chart",
-    "joint_chart",
-    "learning_curves",
-    "scatter_chart",
-    "sweep_chart",
-    "training_chart",
-]
-
 # Okabe & Ito (2008), distinguishable with any colour vision; the green is darker than theirs, so
 # that a thin line of it is visible on white. Purple, the dark yellow and grey are not theirs.
 _BLUE: Final = "#0072B2"

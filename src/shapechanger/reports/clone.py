@@ -14,8 +14,6 @@ from shapechanger.transfer.files import write_atomic, write_json
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-__all__ = ["write_clone_report", "write_numbers"]
-
 _MAX_SCATTERS: Final = 4
 _MAGNIFICATION: Final = 3
 

@@ -20,8 +20,6 @@ from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 from shapechanger.reports.page import jpeg_uri, render
 
-__all__ = ["distributions", "recording_html"]
-
 # Pictures on a page, so that the page of a hundred episodes still opens.
 _MAX_PICTURES: Final = 600
 _MIN_PER_EPISODE, _MAX_PER_EPISODE = 6, 24

@@ -9,8 +9,6 @@ from shapechanger.bodies.finger import JOINTS
 from shapechanger.identify.result import IdentifiedFinger, ParameterEstimate
 from shapechanger.reports.page import render, svg_uri
 
-__all__ = ["finger_html", "interval", "label", "number", "summary_line"]
-
 # For each SI unit the unit that is shown, and the factor between them.
 _SHOWN: Final = {
     "m": ("mm", 1e3),

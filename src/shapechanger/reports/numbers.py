@@ -12,20 +12,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from shapechanger.transfer.metrics import Estimate
 
-__all__ = [
-    "UNDEFINED",
-    "count",
-    "duration_text",
-    "estimate_text",
-    "interval_text",
-    "list_text",
-    "number",
-    "share_text",
-    "shares_text",
-    "spread_text",
-    "t_interval",
-]
-
 UNDEFINED: Final = "undefined"
 CONFIDENCE: Final = 0.95
 

@@ -17,8 +17,6 @@ from shapechanger.reports.numbers import count
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["jpeg_uri", "png", "png_uri", "render", "svg_uri"]
-
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 # Bits per channel; RGB; the only compression and filter methods there are; no interlacing.
 # Source: ISO/IEC 15948.

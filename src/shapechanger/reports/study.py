@@ -38,8 +38,6 @@ from shapechanger.transfer.learners.settings import (
 from shapechanger.transfer.metrics import Reference, Summary
 from shapechanger.transfer.study import Study
 
-__all__ = ["Pictures", "report_html", "write_report"]
-
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 

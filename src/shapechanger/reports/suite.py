@@ -24,8 +24,6 @@ from shapechanger.transfer.metrics import (
 )
 from shapechanger.transfer.study import Study
 
-__all__ = ["FilmStrip", "Sweep", "gain_over_scratch", "suite_html", "write_suite_report"]
-
 # Colours of the heat map at its ends, as red, green and blue; white lies between them.
 _HELPED: Final = (0, 114, 178)
 _HURT: Final = (213, 94, 0)

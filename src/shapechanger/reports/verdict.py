@@ -28,26 +28,6 @@ from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
 
-__all__ = [
-    "ASYMPTOTIC_GAIN",
-    "EXPLANATIONS",
-    "GOOD",
-    "JUMPSTART",
-    "TIME_TO_THRESHOLD",
-    "TOTAL_REWARD_GAIN",
-    "ArmRow",
-    "Direction",
-    "MeasureRow",
-    "arm_rows",
-    "caveats",
-    "direction",
-    "headline_arm",
-    "is_flat",
-    "measure_rows",
-    "successes",
-    "verdict",
-]
-
 JUMPSTART: Final = "Jumpstart"
 TOTAL_REWARD_GAIN: Final = "Total reward gain"
 ASYMPTOTIC_GAIN: Final = "Asymptotic gain"

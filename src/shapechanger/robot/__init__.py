@@ -3,9 +3,3 @@
 `profile` describes a robot, `guard` owns its outputs, `daemon` serves it on the network, `drivers`
 and `cameras` access its hardware, `setup` calibrates and checks it, and `console` is its web page.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

@@ -19,18 +19,6 @@ if TYPE_CHECKING:  # They need the SDK, which only a rig has.
     from shapechanger.robot.drivers.dynamixel.protocol import Port
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
-__all__ = [
-    "REAL",
-    "Clock",
-    "Hardware",
-    "I2cBus",
-    "RealClock",
-    "RealHardware",
-    "ServoPins",
-    "connect",
-    "real",
-]
-
 REAL: Final = "shapechanger.robot.hardware:real"
 """Default source of the hardware."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["write_new"]
-
 
 def write_new(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write a new file completely or not at all; a missing folder is made.

@@ -11,8 +11,6 @@ from dataclasses import dataclass, fields
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["DriveReward"]
-
 
 @dataclass(frozen=True, slots=True)
 class DriveReward:

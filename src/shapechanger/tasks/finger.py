@@ -17,15 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from shapechanger.errors import UnknownName
 from shapechanger.layout import Element, Feature
 
-__all__ = [
-    "FingerSenses",
-    "FingertipReward",
-    "features_of_senses",
-    "fingertip",
-    "fingertip_jacobian",
-    "place_features",
-]
-
 
 def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float64]:
     """Return the place of the fingertip, m, shape (..., 3).

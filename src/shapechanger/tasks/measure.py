@@ -6,8 +6,6 @@ from typing import Final, Literal
 
 import msgspec
 
-__all__ = ["FORWARD_SPEED", "RETURN", "SUCCESS", "Measure"]
-
 
 class Measure(msgspec.Struct, frozen=True):
     """A number of an episode, larger is better.

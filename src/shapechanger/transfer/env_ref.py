@@ -15,22 +15,6 @@ from shapechanger.errors import LayoutError, ShapechangerError, StudyError, Unkn
 from shapechanger.layout import Layout
 from shapechanger.tasks.measure import RETURN, Measure
 
-__all__ = [
-    "CanBeTaught",
-    "EnvRef",
-    "EnvTraits",
-    "HasBodyFamily",
-    "HasDemonstrator",
-    "HasHeldOutStarts",
-    "SourceAdaptation",
-    "TaskDemonstrator",
-    "certify_shift",
-    "env_traits",
-    "is_single_instance",
-    "layouts_of",
-    "measures_of",
-]
-
 
 class EnvRef(msgspec.Struct, frozen=True):
     """An env by its id and arguments, so that another process can make it.

@@ -16,8 +16,6 @@ from typing import Any, Final, Protocol
 
 from shapechanger.errors import ShapechangerError, StudyError
 
-__all__ = ["Executor", "Job", "OnProgress", "Processes", "ReportSteps", "Serial"]
-
 _REPORT_EVERY_S: Final = 0.25
 
 # Called in the job with the number of steps done.

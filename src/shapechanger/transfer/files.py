@@ -10,8 +10,6 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, OutputError
 
-__all__ = ["append_line", "make_folder", "read_json", "write_atomic", "write_json"]
-
 _T = TypeVar("_T")
 
 

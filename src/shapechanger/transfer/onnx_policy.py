@@ -23,8 +23,6 @@ from shapechanger.transfer.files import write_atomic
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
-__all__ = ["OnnxCard", "OnnxPolicy", "export_onnx"]
-
 _CARD: Final = "shapechanger"
 _OPSET: Final = 17
 # The intermediate representation of ONNX 1.12, which every runtime since 2022 reads.

@@ -16,8 +16,6 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import load_method
 
-__all__ = ["ARMS", "NO_SKILL", "SOURCE", "Plan", "Run", "TransferTask"]
-
 ARMS: Final = ("scratch", "zero-shot", "fine-tune")
 """Arms that every pair of envs can be compared by."""
 SOURCE: Final = "source"

@@ -28,8 +28,6 @@ try:
 except ImportError as error:
     raise MissingExtra("ray", "ray") from error
 
-__all__ = ["RayCluster"]
-
 _ATTEMPTS: Final = 3
 _CONNECT_S: Final = 8.0
 _REPORT_EVERY_S: Final = 0.5

@@ -33,15 +33,6 @@ from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
-__all__ = [
-    "RunResult",
-    "last_evaluation",
-    "learner_of",
-    "load_result",
-    "perform_run",
-    "policy_path",
-]
-
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
 

@@ -33,20 +33,6 @@ from shapechanger.transfer.plan import ARMS, SOURCE, Plan, Run, TransferTask
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 
-__all__ = [
-    "PLAN_FILE",
-    "STUDY_FILE",
-    "Study",
-    "TaskTraits",
-    "claim_folder",
-    "default_arms",
-    "inspect_task",
-    "is_folder_of",
-    "make_plan",
-    "run_study",
-    "unfinished_runs",
-]
-
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
 

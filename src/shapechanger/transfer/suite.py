@@ -23,14 +23,6 @@ from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result
 from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
 
-__all__ = [
-    "StudyOutcome",
-    "merge_study",
-    "open_study_folder",
-    "run_in_suite",
-    "study_outcomes",
-]
-
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
 _DEMONSTRATIONS: Final = "demonstrations"

@@ -6,9 +6,3 @@ process. `start` runs a board as a process of its own: `board` composes it of `s
 processes reach it through `hardware` (`board_client`, `gpio_pins`). `signals` has the ledger of
 all outputs, and `wiring` and `oracle` judge from it what the robot did.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

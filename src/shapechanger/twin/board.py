@@ -60,8 +60,6 @@ from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.place import open_world
 from shapechanger.worlds.world import RESTING_V, World
 
-__all__ = ["Board", "main"]
-
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of looking for a reader of the pictures while time stands still."""

@@ -31,8 +31,6 @@ from shapechanger.twin.messages import (
     encode,
 )
 
-__all__ = ["BoardClient", "GrantedClock", "SteadyClock"]
-
 Result = TypeVar("Result")
 
 

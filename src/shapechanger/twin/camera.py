@@ -14,8 +14,6 @@ import simplejpeg
 from shapechanger.robot.cameras.pattern import draw_barcode
 from shapechanger.worlds.world import World
 
-__all__ = ["CAMERA_FAULTS", "CameraFault", "FrontCameraPipe", "with_capture_time"]
-
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
 """Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""
 

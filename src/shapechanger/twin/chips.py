@@ -18,19 +18,6 @@ from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.signals import Pulse
 from shapechanger.worlds.world import Readings, World
 
-__all__ = [
-    "ChannelsBehind",
-    "Chip",
-    "JointWorld",
-    "Magnet",
-    "SimulatedAs5600",
-    "SimulatedIna219",
-    "SimulatedMpu6050",
-    "SimulatedPca9685",
-    "Tca9548a",
-    "chips_of",
-]
-
 
 class Chip(Protocol):
     """A chip at one address of an I2C bus."""

@@ -11,8 +11,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.messages import BoardPins, ClaimPin, DrivePin
 
-__all__ = ["TwinPin", "TwinPinFactory"]
-
 _REVISION: Final = 0xC03115
 """A Raspberry Pi 4B with 4 GB; its header has the pins of all newer ones."""
 

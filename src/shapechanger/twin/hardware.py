@@ -19,8 +19,6 @@ if TYPE_CHECKING:  # The SDK of the servos is an extra of its own.
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
     from shapechanger.twin.servos.port import ServoPort
 
-__all__ = ["TwinBus", "TwinHardware", "TwinServoPins", "connect"]
-
 _POLL_NS: Final = 2_000_000
 """A servo bus that was asked less than this ago has nothing new; asking costs a busy board time."""
 

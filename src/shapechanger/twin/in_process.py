@@ -36,9 +36,6 @@ from shapechanger.twin.signals import NoLedger
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
-__all__ = ["InProcessRobot", "LocalBoard", "LocalClock", "LocalPins"]
-
-
 _log = logging.getLogger(__name__)
 
 _SESSION: Final = 1

@@ -13,49 +13,6 @@ from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import msgspec
 
-__all__ = [
-    "MAX_EDGES",
-    "MAX_MESSAGE",
-    "BoardEvent",
-    "BoardGreeting",
-    "BoardPins",
-    "BoardReply",
-    "BreakCamera",
-    "BreakChip",
-    "BreakMagnet",
-    "BreakServo",
-    "ClaimPin",
-    "ConnectClient",
-    "DrivePin",
-    "Edge",
-    "ExchangeServoBytes",
-    "GrantTime",
-    "InputEdges",
-    "LayOutCourse",
-    "LeaveBoard",
-    "PinRequest",
-    "PlaceVehicle",
-    "PressButton",
-    "PulsePin",
-    "PutVehicleBack",
-    "ReadChip",
-    "ReadLevels",
-    "ReadTensions",
-    "ReadWhereabouts",
-    "Request",
-    "Role",
-    "SetBattery",
-    "SetDistance",
-    "SleepOnBoard",
-    "SleepResult",
-    "WaitForGrant",
-    "Whereabouts",
-    "WriteChip",
-    "decode_event",
-    "decode_request",
-    "encode",
-]
-
 MAX_MESSAGE: Final = 64 * 1024
 """Size of the largest message in bytes."""
 

@@ -12,8 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Self
 
-__all__ = ["BadNetwork"]
-
 _CHUNK: Final = 16 * 1024
 _MAX_QUEUED: Final = 1024 * 1024  # Bytes that one direction queues before it stops reading.
 _POLL_S: Final = 0.01

@@ -13,8 +13,6 @@ from typing import NamedTuple
 from shapechanger.twin.signals import Levels, Transition
 from shapechanger.twin.wiring import TwinWiring, WiredOutput
 
-__all__ = ["ExpectedCommand", "Interval", "propelled", "time_to_rest", "unauthorised"]
-
 
 class ExpectedCommand(NamedTuple):
     """A command that the robot was to obey.

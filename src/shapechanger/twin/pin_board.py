@@ -23,8 +23,6 @@ from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
-__all__ = ["Owner", "PinBoard"]
-
 
 @dataclass(frozen=True, slots=True)
 class Owner:

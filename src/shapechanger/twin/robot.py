@@ -45,8 +45,6 @@ from shapechanger.twin.messages import (
 from shapechanger.twin.servos.rig import ServoFault
 from shapechanger.twin.signals import Levels
 
-__all__ = ["Operator", "RunningRobot", "Whereabouts", "run_robot"]
-
 
 class Operator:
     """A person beside the robot, who moves the vehicle and breaks and presses things.

@@ -14,8 +14,6 @@ from shapechanger.twin.signals import Levels
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import Readings, World
 
-__all__ = ["PinSensors", "SpeedController", "Surroundings"]
-
 # HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
 # as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
 _PING_NS: Final = 450_000

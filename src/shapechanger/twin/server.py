@@ -35,8 +35,6 @@ from shapechanger.twin.messages import (
 )
 from shapechanger.twin.pin_board import Owner, PinBoard
 
-__all__ = ["LATER", "START_NS", "BoardConnection", "BoardServer", "OwnerGone"]
-
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
 

@@ -33,17 +33,6 @@ import msgspec
 
 from shapechanger.errors import RobotError
 
-__all__ = [
-    "Ledger",
-    "LedgerWriter",
-    "Levels",
-    "NoLedger",
-    "Pulse",
-    "PwmChannel",
-    "Transition",
-    "read_ledger",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Transition:

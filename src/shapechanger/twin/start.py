@@ -20,8 +20,6 @@ from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.twin.world.place import Place
 
-__all__ = ["BoardAt", "BoardSettings", "RunningBoard", "find_board", "start_board"]
-
 _HARDWARE: Final = "shapechanger.twin.hardware:connect"
 """Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 

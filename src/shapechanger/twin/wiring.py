@@ -17,8 +17,6 @@ from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 
-__all__ = ["ONE_SHOT_MS", "TwinWiring", "WiredOutput"]
-
 ONE_SHOT_MS: Final = 100.0
 """Time for which the one-shot of the enable line keeps the motors' power on after an edge."""
 

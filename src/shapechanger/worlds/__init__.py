@@ -3,9 +3,3 @@
 `course` and `layout` describe and lay out courses, `scene`, `paint` and `look` draw them, `lens`
 degrades pictures, `expert` drives, and `simulation` puts a vehicle on a course.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import RenderError, WorldError
 from shapechanger.rendering import choose_gl, open_context
 
-__all__ = ["CameraJitter", "OnboardCamera", "move_camera"]
-
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 _MOST_GEOMS: Final = 2000
 

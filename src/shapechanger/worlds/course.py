@@ -12,19 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import WorldError
 
-__all__ = [
-    "HELD_OUT",
-    "HOME",
-    "TRAINING",
-    "Course",
-    "Lamp",
-    "Obstacle",
-    "ObstacleKind",
-    "Surface",
-    "Wall",
-    "require_element",
-]
-
 TRAINING: Final = range(0, 1_000_000)
 """Seeds of the courses for training."""
 

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["LENSES", "Lens", "Picture", "blur", "dirt", "find_lens", "glare", "night"]
-
 Picture = NDArray[np.uint8]
 
 Lens = Callable[[Picture, int], Picture]

@@ -11,8 +11,6 @@ import numpy as np
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["LOOKS", "VARIANTS", "Colour", "Look"]
-
 Colour = tuple[float, float, float]
 """Red, green and blue, each a share from 0 to 1."""
 

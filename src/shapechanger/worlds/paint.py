@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["CELLS", "PAINTERS", "ROWS", "clouds", "texture"]
-
 Field = NDArray[np.floating[Any]]
 """Picture, (H, W, 3), or one channel, (H, W); large ones have single precision."""
 

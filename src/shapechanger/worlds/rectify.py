@@ -16,16 +16,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra, WorldError
 
-__all__ = [
-    "CANONICAL_SIZE",
-    "CameraGeometry",
-    "MeasuredCamera",
-    "Rectifier",
-    "draw_view",
-    "measure_camera",
-    "pitch_of_horizon",
-]
-
 CANONICAL_SIZE: Final = (80, 48)
 """Width and height of a rectified picture, pixels."""
 

@@ -25,8 +25,6 @@ from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene import add_course
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
-__all__ = ["APART_S", "BUMPER_SPREAD", "ContactTracker", "MujocoWorld"]
-
 BUMPER_SPREAD: Final = math.radians(60.0)
 """Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
 

@@ -9,8 +9,6 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RESTING_V", "Pose", "Readings", "World"]
-
 RESTING_V: Final = 8.0
 """Voltage without load of two nearly full lithium cells."""
 

@@ -17,8 +17,6 @@ from shapechanger.bodies.finger import (
 )
 from shapechanger.bodies.finger.anatomy import JOINT_REST
 
-__all__ = ["STRETCHED", "at_rest", "harsh_commands", "made", "modes"]
-
 # With each fault that the model knows.
 STRETCHED = NOMINAL.replace(
     tendon_stiffness=10e3, tendon_friction=1.0, backlash=0.5e-3, command_delay=0.03

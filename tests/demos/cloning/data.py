@@ -13,8 +13,6 @@ from shapechanger.demos.cloning.settings import Augmentation
 from shapechanger.demos.dataset import Dataset
 from shapechanger.layout import Feature, Layout
 
-__all__ = ["KEYS", "QUICK", "STATE", "STEERS", "stripes"]
-
 KEYS: Final = Layout(
     tuple(Feature(name, "1", 0.0, 1.0) for name in ("forward", "backward", "right", "left"))
 )

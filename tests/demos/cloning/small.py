@@ -11,8 +11,6 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from tests.demos.cloning.corridor import Drive, drive
 
-__all__ = ["SIZE", "SMALL", "error", "shown"]
-
 SIZE: Final = (24, 40)
 """Rows and columns."""
 

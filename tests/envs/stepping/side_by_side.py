@@ -22,8 +22,6 @@ from shapechanger.morphology import (
     Stretch,
 )
 
-__all__ = ["random_ant", "random_pendulum", "same", "step_together"]
-
 
 def same(ours: Any, theirs: Any) -> bool:
     """Whether two results of `step` or `reset` hold the same bits, types and keys."""

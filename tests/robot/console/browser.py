@@ -16,8 +16,6 @@ from shapechanger.twin.signals import Transition
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import until
 
-__all__ = ["CHROMIUM_ARGUMENTS", "DESK", "PHONE", "PHONE_ON_ITS_SIDE", "Console", "Pins"]
-
 CHROMIUM_ARGUMENTS: Final = ["--no-sandbox", "--disable-gpu"]
 
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}

@@ -16,8 +16,6 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.robot.hardware import RealClock
 
-__all__ = ["Record", "connect"]
-
 _STUCK = "stuck-"
 """Begins the name of a file that makes a pin fail: `stuck-22` beside the record."""
 

@@ -16,8 +16,6 @@ from tests.robot.guard.plans import quick_car
 from tests.robot.guard.recording import Record
 from tests.robot.guard.waiting import until
 
-__all__ = ["Robot", "running"]
-
 _START = Path(__file__).with_name("start_recorded.py")
 _PINS = {"GPIO17", "GPIO4", "GPIO22", "GPIO27"}
 

@@ -3,8 +3,6 @@
 import time
 from collections.abc import Callable
 
-__all__ = ["until"]
-
 
 def until(condition: Callable[[], bool], at_most_s: float = 20.0) -> None:
     """Wait until a condition holds, and fail when it does not in time."""

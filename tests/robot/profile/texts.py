@@ -6,8 +6,6 @@ from pathlib import Path
 
 from shapechanger.robot.profile import Profile, read_profile
 
-__all__ = ["EVERYTHING", "HOVERCRAFT", "PATH", "changed", "read"]
-
 PATH = Path("rover.toml")
 
 EVERYTHING = """\

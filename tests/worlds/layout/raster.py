@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.layout.geometry import wall_segments
 
-__all__ = ["occupancy"]
-
 
 def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[float, float]]:
     """Grid of free and blocked cells, seen from above.

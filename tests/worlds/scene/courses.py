@@ -8,8 +8,6 @@ import numpy as np
 
 from shapechanger.worlds.course import Course, Lamp, Obstacle, Surface, Wall
 
-__all__ = ["square", "with_walls"]
-
 _KINDS: dict[str, tuple[Surface, ...]] = {
     "corridor": ("plaster", "door", "window", "brick", "board", "glass"),
     "yard": ("hedge", "fence", "shed"),

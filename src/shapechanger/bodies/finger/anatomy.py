@@ -11,25 +11,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "DIP_BY_PIP",
-    "FORCE_POTENTIAL_N",
-    "JOINTS",
-    "JOINT_DAMPING",
-    "JOINT_FRICTION",
-    "JOINT_RANGE",
-    "JOINT_REST",
-    "JOINT_STIFFNESS",
-    "LEAST_TENSION_N",
-    "MOMENT_ARMS",
-    "MOST_TENSION_N",
-    "PHALANGES",
-    "PHALANX_LENGTH_M",
-    "PHALANX_RADIUS_M",
-    "TENDONS",
-    "TISSUE_DENSITY",
-]
-
 JOINTS: Final = ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
 """Names of the joints, in the order of all arrays over joints: knuckle (two axes), middle joint and
 end joint."""

@@ -14,18 +14,6 @@ import mujoco
 
 from shapechanger.bodies.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
 
-__all__ = [
-    "METACARPAL",
-    "TENDON_COLOURS",
-    "THICKEST_M",
-    "THINNEST_M",
-    "Over",
-    "TendonRoute",
-    "Through",
-    "add_anatomy",
-    "route_names",
-]
-
 _HAND: Final = "hand"
 """Name of the hand's body; its axes are those of the finger, at the knuckle."""
 

@@ -29,8 +29,6 @@ from shapechanger.bodies.finger.looks import (
 from shapechanger.bodies.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.bodies.finger.tensions import TendonDrive, drive_of
 
-__all__ = ["FINGERTIP", "SIM_DT", "TARGET", "FingerFigure", "build_finger"]
-
 SIM_DT: Final = 0.002
 """Simulation step, s, that is stable under any command."""
 _SIM_DT_STRETCHED: Final = 0.0005

@@ -20,8 +20,6 @@ from shapechanger.bodies.finger.anatomy import (
 )
 from shapechanger.errors import FingerError
 
-__all__ = ["NOMINAL", "FingerParameters"]
-
 # Time constant between a command and its force. Chosen.
 _MOTOR_LAG_S: Final = 0.020
 # Mass of a motor without gears and its spool, at the tendon. Chosen. That of geared servos is a

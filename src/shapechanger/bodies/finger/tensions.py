@@ -20,15 +20,6 @@ from shapechanger.bodies.finger.anatomy import (
 from shapechanger.bodies.finger.parameters import FingerParameters
 from shapechanger.errors import UnknownName
 
-__all__ = [
-    "DRIVES",
-    "TendonDrive",
-    "co_contraction",
-    "drive_of",
-    "spans_all_torques",
-    "tensions_for_torque",
-]
-
 # N/m and N·s/m, like the short-range stiffness of active muscle. The size is chosen: 3 N per
 # centimetre of stretch.
 _MUSCLE_STIFFNESS: Final = 300.0

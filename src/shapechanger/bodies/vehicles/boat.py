@@ -31,8 +31,6 @@ from shapechanger.bodies.vehicles.parts import (
     add_look,
 )
 
-__all__ = ["BOAT"]
-
 _LENGTH: Final = 0.60  # m
 _WIDTH: Final = 0.20  # m
 _DRAUGHT: Final = 0.04  # m

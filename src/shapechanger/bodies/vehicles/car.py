@@ -19,8 +19,6 @@ from shapechanger.bodies.vehicles.parts import (
 )
 from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
 
-__all__ = ["CAR"]
-
 # Rounded sizes of a touring car at the scale 1:10; mass with battery and computer. Estimates.
 _LENGTH: Final = 0.40  # m
 _WIDTH: Final = 0.20  # m

@@ -15,8 +15,6 @@ from shapechanger.bodies.vehicles.tank import TANK
 from shapechanger.bodies.vehicles.truck import TRUCK
 from shapechanger.errors import ProfileError, UnknownName
 
-__all__ = ["SIM_DT", "VEHICLES", "add_vehicle", "require_fit", "vehicle_model"]
-
 SIM_DT: Final = 0.005
 """Simulation step, s, at which all vehicles are stable."""
 

@@ -17,8 +17,6 @@ import mujoco
 from shapechanger.bodies.vehicles.model import Outputs, PlanarPose
 from shapechanger.bodies.vehicles.parts import DcMotor, MotorDrive, joints_below_chassis, settle
 
-__all__ = ["WATER_DENSITY", "Afloat", "Fin", "Floating", "Hull", "Propeller"]
-
 WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
 
 

@@ -8,8 +8,6 @@ from typing import NamedTuple, Protocol
 
 import mujoco
 
-__all__ = ["BoundVehicle", "CameraMount", "Outputs", "PlanarPose", "VehicleModel"]
-
 Outputs = Mapping[str, float | None]
 """Output of each part, from -1 to 1; None for a motor that is disconnected.
 

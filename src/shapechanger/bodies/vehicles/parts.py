@@ -12,23 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.bodies.vehicles.model import CameraMount
 
-__all__ = [
-    "BATTERY_V",
-    "HOBBY_MOTOR",
-    "HOBBY_SERVO",
-    "PI_CAMERA_FOVY_DEG",
-    "DcMotor",
-    "MotorDrive",
-    "Paint",
-    "ServoMotor",
-    "add_camera",
-    "add_hull",
-    "add_look",
-    "add_wheel",
-    "joints_below_chassis",
-    "settle",
-]
-
 # Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
 # conaffinity of the other. Walls have the type 1 and the affinity 2, the ground 4 and 8.
 _HULL_TYPE, _HULL_MEETS = 2, 1  # Collides with walls and obstacles, not with the ground.

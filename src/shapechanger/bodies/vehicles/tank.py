@@ -20,8 +20,6 @@ from shapechanger.bodies.vehicles.parts import (
 )
 from shapechanger.bodies.vehicles.wheels import Rolling
 
-__all__ = ["TANK"]
-
 # Sizes of a toy tank at the scale 1:16 to 1:24; the mass is an estimate.
 _LENGTH: Final = 0.32  # m
 _WIDTH: Final = 0.24  # m

@@ -20,8 +20,6 @@ from shapechanger.bodies.vehicles.parts import (
 )
 from shapechanger.bodies.vehicles.wheels import Axles, Steered, add_axles
 
-__all__ = ["TRUCK"]
-
 # Sizes of a tractor and a semi-trailer at the scale 1:14, shortened; masses are estimates.
 _TRACTOR_LENGTH: Final = 0.50  # m
 _TRAILER_LENGTH: Final = 0.50  # m

@@ -19,8 +19,6 @@ from shapechanger.bodies.vehicles.parts import (
     settle,
 )
 
-__all__ = ["Axles", "Rolling", "Steered", "add_axles"]
-
 
 class Rolling:
     """A `BoundVehicle` on land, without steering.

@@ -15,16 +15,6 @@ from shapechanger.errors import DemosError, UnknownName
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Repair
 
-__all__ = [
-    "Bad",
-    "CutEpisode",
-    "Good",
-    "MarkStep",
-    "Merge",
-    "RepairEpisodes",
-    "episode_at",
-]
-
 
 def _episode_path(path: Path) -> Path:
     """Resolve a path to the folder of one episode, or of a recording with a single episode.

@@ -10,8 +10,6 @@ import tyro
 
 from shapechanger.cli.console import plain_console
 
-__all__ = ["Export", "Import", "counted"]
-
 
 @dataclass(frozen=True)
 class Import:

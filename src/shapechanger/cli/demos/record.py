@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from shapechanger.demos.recording import RecordEpisodes
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["RecordDemonstrations", "pilot_of"]
-
 _EXPERT: Final = "expert"
 
 # Below this throttle a vehicle does not collide.

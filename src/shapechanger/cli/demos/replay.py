@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from shapechanger.teleop import Terminal
     from shapechanger.transfer.env_ref import EnvRef
 
-__all__ = ["Replay", "film"]
-
 
 @dataclass(frozen=True)
 class Replay:

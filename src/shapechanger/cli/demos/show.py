@@ -16,8 +16,6 @@ from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.reports.numbers import duration_text, shares_text
 
-__all__ = ["ListEpisodes", "ShowEpisodes"]
-
 _WIDEST: Final = 400
 
 

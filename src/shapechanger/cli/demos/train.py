@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
-__all__ = ["Evaluate", "Shrinking", "TrainClone"]
-
 
 @dataclass(frozen=True)
 class TrainClone:

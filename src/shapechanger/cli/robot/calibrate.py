@@ -37,15 +37,6 @@ from shapechanger.robot.setup.calibration import (
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
 
-__all__ = [
-    "Calibrate",
-    "Calibration",
-    "Ended",
-    "Jogger",
-    "Keys",
-    "ask_for_wheels_up",
-]
-
 
 @dataclass(frozen=True)
 class Calibrate:

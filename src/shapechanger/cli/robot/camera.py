@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from shapechanger.robot.profile.profile import Profile
     from shapechanger.worlds.rectify import CameraGeometry
 
-__all__ = ["CameraView"]
-
 # As in a profile.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0

@@ -12,8 +12,6 @@ import tyro
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import ShapechangerError
 
-__all__ = ["Doctor"]
-
 _MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
 
 

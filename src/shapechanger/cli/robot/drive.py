@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from shapechanger.link.messages import Observation
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["Drive", "Driving", "PolicyDriver"]
-
 _LOOK_EVERY_S: Final = 0.2
 
 

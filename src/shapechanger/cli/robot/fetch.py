@@ -32,8 +32,6 @@ from shapechanger.link.messages import EpisodeSummary, Piece
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
 
-__all__ = ["FetchEpisodes", "fetch_episode", "recorded"]
-
 
 @dataclass(frozen=True)
 class FetchEpisodes:

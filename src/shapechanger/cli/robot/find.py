@@ -14,8 +14,6 @@ from rich.table import Table
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import LinkError, ShapechangerError
 
-__all__ = ["Find", "Forget", "Remember"]
-
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
 

@@ -12,8 +12,6 @@ import tyro
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError
 
-__all__ = ["Home", "Init"]
-
 
 @dataclass(frozen=True)
 class Init:

@@ -24,14 +24,6 @@ if TYPE_CHECKING:
     from shapechanger.remote.known_robots import KnownRobot
     from shapechanger.robot.daemon.credentials import Credentials
 
-__all__ = [
-    "Key",
-    "can_open",
-    "how_to_remember",
-    "open_console",
-    "shown_credentials",
-]
-
 
 @dataclass(frozen=True)
 class Key:

@@ -13,8 +13,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.setup.doctor import uses_pins
 
-__all__ = ["SafePins", "require_pins"]
-
 
 @dataclass(frozen=True)
 class SafePins:

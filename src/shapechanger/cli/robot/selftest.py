@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
     from shapechanger.twin.robot import RunningRobot
 
-__all__ = ["Selftest", "SelftestResult", "check_jumper", "check_robot"]
-
 # Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES = 2
 _MARKS = {"good": "good", "bad": "BAD", "unknown": "?"}

@@ -36,20 +36,6 @@ from shapechanger.twin.start import BoardAt, RunningBoard, start_board
 from shapechanger.twin.world.place import Place
 from shapechanger.worlds.course import HOME, require_element
 
-__all__ = [
-    "Serve",
-    "ServeOptions",
-    "TwinOptions",
-    "can_be_known",
-    "credentials_of",
-    "finger_of",
-    "make_known",
-    "place_of",
-    "recordings_folder",
-    "serve_plan",
-    "start_twin",
-]
-
 _LAST_PORT: Final = 65535
 _HERE: Final = "127.0.0.1"
 

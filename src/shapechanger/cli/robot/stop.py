@@ -12,8 +12,6 @@ import tyro
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import LinkError
 
-__all__ = ["Stop"]
-
 # s. A guard stops within a tick and reports it in the next observation.
 _CONFIRMED_WITHIN_S: Final = 2.0
 

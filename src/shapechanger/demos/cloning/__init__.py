@@ -10,9 +10,3 @@ sb3, replay          continue with reinforcement learning in Stable-Baselines3
 
 Nothing is imported here, so that settings can be read without PyTorch.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

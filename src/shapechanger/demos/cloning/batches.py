@@ -15,8 +15,6 @@ from torch.nn import functional
 from shapechanger.demos.cloning.demonstrations import Examples
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
 
-__all__: list[str] = []
-
 _BRIGHTEST: Final = 255.0
 
 

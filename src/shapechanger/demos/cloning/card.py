@@ -11,8 +11,6 @@ from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyErr
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Layout
 
-__all__ = ["CloneCard", "Head"]
-
 Head = Literal["regression", "class"]
 """Kind of output: continuous actions, or a choice among the actions that were demonstrated."""
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.layout import Layout
 
-__all__ = ["SplitBy", "judged_steps"]
-
 # Parts of names, between slashes. In the mirror image, the first change their sign and the second
 # do not. Positive yaw is to the left, and y points to the left.
 _NEGATED: Final = frozenset({"steering", "yaw_rate", "acceleration_y"})

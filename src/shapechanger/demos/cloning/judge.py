@@ -17,8 +17,6 @@ from shapechanger.layout import Layout
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-__all__ = ["Bin", "Judgement", "class_numbers", "goal_of", "judge", "macro_f1", "named"]
-
 AskedHead = Literal["auto", "class", "regression"]
 """Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
 

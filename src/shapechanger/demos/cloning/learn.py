@@ -42,8 +42,6 @@ except ImportError as error:
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-__all__ = ["DEMOS", "Inputs", "MemberCheck", "Training", "clone", "learn", "settings_for"]
-
 Inputs = Literal["auto", "picture", "state", "both"]
 """Inputs of a policy; "auto" takes pictures if there are any, and states otherwise."""
 

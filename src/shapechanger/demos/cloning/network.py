@@ -17,8 +17,6 @@ from torch.nn import functional
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CHANNELS, Framing
 
-__all__: list[str] = []
-
 DIRECTIONS: Final = 6
 """Number of edge directions over half a turn: 30 degrees each."""
 

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import ShapechangerError
 
-__all__ = ["CHANNELS", "CloningError", "Framing", "PolicyError", "area_shares", "prepare"]
-
 
 class CloningError(ShapechangerError, ValueError):
     """Invalid pictures, actions or settings."""

@@ -30,8 +30,6 @@ try:
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
-__all__ = ["KIND", "CameraPolicy", "CloneCard"]
-
 KIND: Final = "clone"
 """Kind of the file of a cloned policy, see `shapechanger.tensor_file`."""
 

@@ -30,8 +30,6 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-__all__ = ["as_ppo", "as_sac"]
-
 _IMAGE: Final = "image"
 _STATE: Final = "state"
 # Logarithm of the initial standard deviation of an action before it is squashed. A larger one would

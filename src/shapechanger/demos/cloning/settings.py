@@ -8,8 +8,6 @@ import msgspec
 
 from shapechanger.demos.cloning.pictures import CloningError, Framing
 
-__all__ = ["Augmentation", "CloneSettings"]
-
 
 class Augmentation(msgspec.Struct, frozen=True, kw_only=True):
     """Random changes of each picture each time it is learned from.

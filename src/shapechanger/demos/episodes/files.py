@@ -10,18 +10,6 @@ from typing import Any, Final
 
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = [
-    "FRAMES",
-    "HEADER",
-    "LOST",
-    "STEPS",
-    "cannot_write",
-    "is_episode",
-    "lock",
-    "write_all",
-    "write_header",
-]
-
 HEADER: Final = "episode.json"
 STEPS: Final = "steps.jsonl"
 FRAMES: Final = "frames"

@@ -31,21 +31,6 @@ from shapechanger.demos.episodes.records import (
 )
 from shapechanger.errors import BrokenEpisode, DemosError
 
-__all__ = [
-    "Drop",
-    "Episode",
-    "EpisodeMark",
-    "Repair",
-    "StepLine",
-    "drop",
-    "episodes_of",
-    "keep",
-    "mark",
-    "read_episode",
-    "read_header",
-    "repair",
-]
-
 # Such a name cannot lead out of the folder.
 _FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
 

@@ -10,17 +10,6 @@ from typing import Any, Final, Literal, cast
 
 from shapechanger.errors import DemosError
 
-__all__ = [
-    "DRIVERS",
-    "Clock",
-    "Driver",
-    "EpisodeHeader",
-    "Step",
-    "decode_line",
-    "encode_line",
-    "split_lines",
-]
-
 _FORMAT: Final = 1
 """Version of the format. Readers refuse any other version."""
 

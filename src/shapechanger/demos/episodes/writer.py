@@ -24,8 +24,6 @@ from shapechanger.demos.episodes.files import (
 from shapechanger.demos.episodes.records import EpisodeHeader, Step, encode_line
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = ["EpisodeWriter", "Syncer"]
-
 _SYNC_PERIOD_S: Final = 1.0
 
 

@@ -28,17 +28,6 @@ from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episo
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 
-__all__ = [
-    "FORMATS",
-    "Exported",
-    "Format",
-    "Imported",
-    "export_recording",
-    "find_format",
-    "import_episodes",
-    "import_recording",
-]
-
 Format = Literal["2017", "tub", "minari", "csv"]
 
 

@@ -29,8 +29,6 @@ from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Layout
 
-__all__ = ["TABLE", "is_csv", "read_csv", "write_csv"]
-
 TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"

@@ -14,17 +14,6 @@ from typing import Any, Final, cast
 from shapechanger.demos.jpeg import decode_picture, picture_size
 from shapechanger.errors import DemosError, OutputError
 
-__all__ = [
-    "Pictures",
-    "cannot_read",
-    "name_problem",
-    "new_folder",
-    "parse_json",
-    "parse_json_object",
-    "read_text",
-    "resolve_file",
-]
-
 _MAX_TEXT_BYTES: Final = 1 << 30
 _MAX_PICTURE_BYTES: Final = 16 << 20  # As the writer of episodes.
 

@@ -40,8 +40,6 @@ from shapechanger.demos.exchange.recorded import (
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
-__all__ = ["LABELS", "is_2017", "read_2017", "write_2017"]
-
 LABELS: Final = "labels.csv"
 
 _KEYS: Final = ("forward", "backward", "right", "left")

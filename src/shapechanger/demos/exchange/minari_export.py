@@ -27,8 +27,6 @@ from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
-__all__ = ["require_dataset_name", "write_minari"]
-
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 256  # Steps in memory at once.
 _OBSERVATIONS: Final = "observations"

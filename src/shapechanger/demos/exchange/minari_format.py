@@ -31,23 +31,6 @@ from gymnasium import spaces
 
 from shapechanger.errors import MissingExtra
 
-__all__ = [
-    "DATA",
-    "HEADERS",
-    "HEADERS_FORMAT",
-    "IMAGE",
-    "JPEG",
-    "MAIN",
-    "METADATA",
-    "STATE",
-    "TIMES",
-    "UNKNOWN_NS",
-    "data_folder",
-    "is_minari",
-    "library",
-    "stored_as_jpeg",
-]
-
 DATA: Final = "data"
 METADATA: Final = "metadata.json"
 MAIN: Final = "main_data.hdf5"

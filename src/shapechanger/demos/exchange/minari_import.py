@@ -37,8 +37,6 @@ from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
 from shapechanger.errors import DemosError, MissingExtra, UnknownName
 from shapechanger.layout import Feature, Layout
 
-__all__ = ["read_minari"]
-
 _OWN_CHUNK: Final = 256  # Steps in memory at once.
 _FOREIGN_CHUNK: Final = 64  # Fewer, because pictures may be stored as pixels.
 _OWN_COLUMNS: Final = (

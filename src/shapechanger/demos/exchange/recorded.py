@@ -11,18 +11,6 @@ from typing import Final
 from shapechanger.demos.episodes import Episode, EpisodeHeader, Step
 from shapechanger.errors import DemosError
 
-__all__ = [
-    "DEFAULT_HZ",
-    "ExchangeEpisode",
-    "ExchangeStep",
-    "exchange_episode",
-    "kept_steps",
-    "rate_hz",
-    "require_one_rate",
-    "require_order",
-    "split_at_gaps",
-]
-
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
 

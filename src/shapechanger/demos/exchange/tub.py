@@ -51,8 +51,6 @@ from shapechanger.demos.exchange.recorded import (
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
-__all__ = ["MANIFEST", "is_tub", "read_tub", "write_tub"]
-
 MANIFEST: Final = "manifest.json"
 
 _IMAGES: Final = "images"

@@ -34,8 +34,6 @@ from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
-__all__ = ["FingerEnv", "as_numbers", "check_posture"]
-
 _MODES: Final = ("human", "rgb_array", "depth_array")
 # From the thumb's side, with the workspace and the end of the hand in view.
 _CAMERA: Final[Mapping[str, Any]] = {

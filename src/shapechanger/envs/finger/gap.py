@@ -15,8 +15,6 @@ from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.bodies.finger.tensions import spans_all_torques
 from shapechanger.errors import FingerError, UnknownName
 
-__all__ = ["GAPS", "Gap", "geared_around", "resolve_gap", "with_gears"]
-
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
 # two hundred with arm errors of 25 %.
 _TRIES: Final = 1000

@@ -26,8 +26,6 @@ from shapechanger.errors import FingerError, LayoutError
 from shapechanger.identify import FingerLog, identify
 from shapechanger.layout import Layout
 
-__all__ = ["FingerBabble", "identify_env", "record_babble"]
-
 # Duration of a recording, s.
 _SECONDS: Final = 10.0
 # Frequencies of the motions, Hz. Ten seconds contain several periods of each; delay and lag would

@@ -24,8 +24,6 @@ from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import angles_for, joint_torque
 from shapechanger.layout import Layout
 
-__all__ = ["FingerOracle"]
-
 # Gain on joint errors, 1/s: most of an error is corrected in two steps.
 _GAIN: Final = 25.0
 # Largest commanded joint speed, rad/s.

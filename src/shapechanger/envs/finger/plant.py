@@ -14,8 +14,6 @@ from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
 from shapechanger.bodies.finger.model import FINGERTIP, TARGET
 from shapechanger.tasks.finger import FingerSenses, fingertip
 
-__all__ = ["CONTROL_DT", "FingerPlant", "JointVelocities"]
-
 # Time constant of the smoothing of velocities, s: two control periods.
 _LAG_S: Final = 0.040
 

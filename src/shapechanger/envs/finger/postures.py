@@ -24,8 +24,6 @@ from shapechanger.bodies.finger.anatomy import (
 from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 
-__all__ = ["angles_for", "can_hold", "draw_posture", "draw_start", "joint_torque", "moving_torque"]
-
 # Distance of a joint from either end, as a fraction of its range.
 _MARGIN: Final = 0.1
 # The end joint follows the middle one within this, rad. Chosen.

@@ -18,8 +18,6 @@ from shapechanger.layout import Element, Feature, Layout
 from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
 from shapechanger.tasks.measure import RETURN, SUCCESS
 
-__all__ = ["FingerReachEnv"]
-
 _TARGET: Final = Element("task", "target")
 # Distance within which the fingertip must stay, m, and for how long without a break, s.
 _TOLERANCE_M: Final = 0.005

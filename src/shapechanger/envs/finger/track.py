@@ -33,8 +33,6 @@ from shapechanger.tasks.paths import (
     sample,
 )
 
-__all__ = ["PREVIEW_S", "FingerTrackEnv", "draw_path", "require_reachable"]
-
 _CHECK_HZ: Final = 50.0
 # Checked time of an endless path, s.
 _LOOK_S: Final = 60.0

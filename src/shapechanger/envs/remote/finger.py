@@ -30,8 +30,6 @@ from shapechanger.robot.profile.load import find_profile
 from shapechanger.tasks.finger import FingerSenses
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 
-__all__ = ["RemoteFingerEnv"]
-
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 

@@ -16,8 +16,6 @@ from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.tasks.finger import FingerSenses, fingertip
 
-__all__ = ["RigSenses", "StartApproach"]
-
 # Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
 _MISFIT_M: Final = 0.012
 _QUANTITIES: Final = ("length", "speed", "tension")

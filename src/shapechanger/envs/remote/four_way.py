@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import SpaceMismatch
 
-__all__ = ["FOUR_WAYS", "FourWay"]
-
 FOUR_WAYS: Final = ("forward", "backward", "right", "left")
 """Meanings of the actions 0 to 3, in the order of the columns of 2017's `labels.csv`."""
 

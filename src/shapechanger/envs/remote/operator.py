@@ -13,8 +13,6 @@ from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
 
-__all__ = ["Preparation", "Takeover"]
-
 _POLL_S: Final = 0.05  # Period of checks for what a person does.
 _LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 _NS_PER_S: Final = 1e9

@@ -21,8 +21,6 @@ from shapechanger.remote.known_robots import KnownRobot, known_names, recall
 from shapechanger.remote.observations import BUMP, RobotSpaces, StepScorer, View
 from shapechanger.tasks.drive import DriveReward
 
-__all__ = ["LATE", "OnReset", "RemoteVehicleEnv", "Schedule"]
-
 OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
 """Kind of reset."""
 

@@ -31,14 +31,6 @@ from numpy.typing import NDArray
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.effective.contacts import colliding_pairs
 
-__all__ = [
-    "demand_for",
-    "find_fast_model",
-    "forget_fast_models",
-    "known_fast_model",
-    "moves_equally",
-]
-
 _Ints = NDArray[np.int64]
 
 _BIT: Final = mujoco.mjtDisableBit

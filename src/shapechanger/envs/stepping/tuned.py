@@ -19,16 +19,6 @@ from shapechanger.envs.stepping.fast_model import demand_for, find_fast_model, k
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
 
-__all__ = [
-    "NO_WARNINGS",
-    "Binding",
-    "Outcomes",
-    "PausedTimer",
-    "StepResult",
-    "TunedStep",
-    "paused_timer",
-]
-
 
 class PausedTimer:
     """Context in which MuJoCo's profiling timer is paused, for all threads at once.

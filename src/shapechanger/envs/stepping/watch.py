@@ -10,8 +10,6 @@ from weakref import WeakValueDictionary
 
 import mujoco
 
-__all__ = ["ModelWatch"]
-
 # Sizes, options, visual settings and statistics lie at the beginning of an mjModel, in this order
 # (mjmodel.h of MuJoCo 4.0.0), and take 1.8 kB together.
 _LONGEST_HEAD: Final = 8192

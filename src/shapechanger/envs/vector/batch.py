@@ -19,8 +19,6 @@ from shapechanger.envs.vector.threads import Failures, attempt
 if TYPE_CHECKING:
     from shapechanger.envs.stepping.tuned import TunedStep
 
-__all__ = ["BatchStep", "SubEnv"]
-
 # The number of an env, and work to do for it.
 _Task = tuple[int, Callable[[int], None]]
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import SpaceMismatch, VectorEnvError
 
-__all__ = ["masked_options", "one_seed_each", "require_boxes", "require_same_spaces"]
-
 _LONGEST_BODY: Final = 60
 
 

@@ -13,8 +13,6 @@ from typing import Any
 
 from shapechanger.envs.vector.make import make_vec
 
-__all__: list[str] = []
-
 
 def __getattr__(name: str) -> Callable[..., Any]:
     """Return `make_vec` for the env of this name."""

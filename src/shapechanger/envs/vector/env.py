@@ -26,9 +26,6 @@ from shapechanger.envs.vector.infos import Restart, StepResults, batched, in_col
 from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError
 
-__all__ = ["ThreadVectorEnv"]
-
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["InfoColumns", "Restart", "Step", "StepResults", "batched", "in_columns"]
-
 Step = tuple[Any, Any, Any, dict[str, Any]]
 """Reward, terminated, truncated and info of one env."""
 

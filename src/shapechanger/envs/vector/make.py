@@ -19,8 +19,6 @@ from shapechanger.errors import UnknownName, VectorEnvError
 if TYPE_CHECKING:
     from shapechanger.bodies.families import BodyLike
 
-__all__ = ["make_vec"]
-
 
 def make_vec(
     env_id: str,

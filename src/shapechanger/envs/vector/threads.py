@@ -9,8 +9,6 @@ from itertools import pairwise
 from queue import SimpleQueue
 from typing import Final
 
-__all__ = ["EnvThreads", "Failures", "ThreadPool", "attempt"]
-
 Failures = list[tuple[int, Exception]]
 """Exceptions, each with the number of the env that raised it."""
 

@@ -18,8 +18,6 @@ from shapechanger.worlds.camera import CameraJitter
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.look import Look
 
-__all__ = ["CourseSampler", "Courses", "Steering", "check_frame_size", "resolve_profile"]
-
 Steering = Literal["proportional", "bang"]
 """Steering angles: any, or only full left, straight and full right, as in 2017."""
 

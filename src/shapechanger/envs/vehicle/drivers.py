@@ -16,16 +16,6 @@ from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.simulation import MujocoWorld
 from shapechanger.worlds.world import Pose
 
-__all__ = [
-    "BEARINGS_DEG",
-    "CLONES",
-    "FARTHEST_M",
-    "ExpertDriver",
-    "TeacherDemonstrator",
-    "VehicleDemonstrator",
-    "observe_ranges",
-]
-
 BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
 """Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
 

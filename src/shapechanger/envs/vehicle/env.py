@@ -34,8 +34,6 @@ from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["VehicleEnv", "without_world"]
-
 # The ground in images of the vehicle: half of its side, m, and its colour on land and on water.
 _GROUND_M: Final = 2.0
 _LAND: Final = (0.62, 0.60, 0.56, 1.0)

@@ -13,8 +13,6 @@ from scipy.stats import chi2
 
 from shapechanger.errors import WorldError
 
-__all__ = ["LIMIT_S", "METRES", "Act", "DriveResult", "DriveScore", "drive", "poisson_interval"]
-
 Act = Callable[[Any], NDArray[np.float32]]
 """A driver: maps an observation to an action."""
 

@@ -26,8 +26,6 @@ from shapechanger.robot.guard.rules import aimed, slewed
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["OutputShaper", "RangesEnv"]
-
 # Slower than this it stands. Without a price for it, two of four teachers learned to stop in front
 # of a wall and stay there.
 _STANDING_MPS: Final = 0.1

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["VehicleShift", "certify_vehicles"]
-
 _STEPS: Final = 40
 # Commands of the rollout: half of the steps straight ahead, the other half to the left.
 _THROTTLE: Final = 0.5

@@ -30,8 +30,6 @@ from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
 from shapechanger.worlds.simulation import MujocoWorld
 
-__all__ = ["AHEAD_M", "SteeringResponse", "WaypointDemonstrator", "WaypointEnv", "measure_response"]
-
 AHEAD_M: Final = 0.8
 """Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
 

@@ -8,8 +8,6 @@ import mujoco
 
 from shapechanger.layout import Layout
 
-__all__ = ["Certifiable", "Wrapped", "attribute"]
-
 
 class Certifiable(Protocol):
     """An environment whose body and numbers are known.

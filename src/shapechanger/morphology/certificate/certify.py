@@ -19,8 +19,6 @@ from shapechanger.morphology.certificate.consistency import inconsistencies, lon
 from shapechanger.morphology.certificate.rollout import Rollout, compare_rollouts
 from shapechanger.morphology.effective import fingerprint
 
-__all__ = ["Certificate", "certify"]
-
 
 class Certificate(msgspec.Struct, frozen=True):
     """Certified differences between a target and its source.

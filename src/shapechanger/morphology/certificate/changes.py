@@ -15,8 +15,6 @@ from shapechanger.morphology.effective.model import EffectiveModel, effective_mo
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Value
 
-__all__ = ["Amount", "Change", "change", "compare", "grouped"]
-
 Amount = float | str | tuple[float | str, ...] | None
 """A number, a word, some of them, or None for what is not there."""
 

@@ -19,8 +19,6 @@ from shapechanger.morphology.effective.elements import Names, named, names_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["inconsistencies", "lone_masses"]
-
 # `mj_setConst` gives the same bits on an untouched model; the margin is for models that were
 # compiled elsewhere and loaded from a file.
 _TOLERANCE: Final = 1e-6

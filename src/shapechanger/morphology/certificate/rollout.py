@@ -19,8 +19,6 @@ from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped
 if TYPE_CHECKING:
     from shapechanger.layout import Layout
 
-__all__ = ["Commands", "Rollout", "compare_rollouts", "matched_commands", "number_names"]
-
 Commands = NDArray[np.float32]
 """Commands of an episode, shape (steps, motors)."""
 

@@ -19,8 +19,6 @@ from shapechanger.errors import MorphologyError
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["Edit", "Vector", "part_of_the_way", "require_factor", "require_vector"]
-
 Vector = tuple[float, float, float]
 
 # A limb a hundred times longer or shorter is a typing mistake, and MuJoCo's contacts, whose

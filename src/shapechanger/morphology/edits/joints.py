@@ -13,8 +13,6 @@ from shapechanger.morphology.edits.edit import Edit, part_of_the_way
 from shapechanger.morphology.spec.elements import delete_joint, select
 from shapechanger.morphology.spec.geometry import orientation, rotation
 
-__all__ = ["JointRange", "Lock", "set_limits"]
-
 _J = mujoco.mjtJoint
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)

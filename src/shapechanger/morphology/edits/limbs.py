@@ -40,8 +40,6 @@ from shapechanger.morphology.spec.geometry import (
 )
 from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
 
-__all__ = ["AddLimb", "AddSegment", "Cut", "Remove", "Split"]
-
 _SPHERE: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 # MuJoCo refuses bodies of almost no mass, so a limb that appears or goes is never smaller than this
 # part of its full size: a millionth of its mass.

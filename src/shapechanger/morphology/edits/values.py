@@ -31,19 +31,6 @@ from shapechanger.morphology.spec.geometry import (
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = [
-    "Damping",
-    "Density",
-    "Friction",
-    "Gear",
-    "Gravity",
-    "Mass",
-    "Radius",
-    "StartHeight",
-    "Stiffness",
-    "Stretch",
-]
-
 # Beyond this, in any unit here, a value is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST_VALUE: Final = 1e6
 

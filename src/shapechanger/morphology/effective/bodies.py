@@ -21,19 +21,6 @@ from shapechanger.morphology.effective.elements import Rows, Section, is_any, na
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
 
-__all__ = [
-    "Frames",
-    "bodies",
-    "bodies_that_matter",
-    "digest",
-    "geom_frames",
-    "geoms",
-    "inertial_frames",
-    "joints",
-    "site_frames",
-    "sites",
-]
-
 _Floats = NDArray[np.float64]
 _SAME: Final = mujoco.mjtSameFrame
 _IDENTITY: Final = (1.0, 0.0, 0.0, 0.0)

@@ -26,8 +26,6 @@ from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.elements import Names, is_any, names_of
 
-__all__ = ["Contact", "colliding_pairs", "effective_contacts", "geoms_of_pairs", "safe_solref"]
-
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
 

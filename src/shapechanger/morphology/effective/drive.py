@@ -14,8 +14,6 @@ from shapechanger.morphology.effective.elements import Rows, Section, Value, is_
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
 
-__all__ = ["actuators", "equalities", "tendons"]
-
 _GAIN: Final = mujoco.mjtGain
 _BIAS: Final = mujoco.mjtBias
 _DYN: Final = mujoco.mjtDyn

@@ -14,19 +14,6 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "Element",
-    "Fields",
-    "Names",
-    "Rows",
-    "Section",
-    "Value",
-    "is_any",
-    "named",
-    "names_of",
-    "word",
-]
-
 _TARGET: Final = {
     mujoco.mjtTrn.mjTRN_JOINT: "joints",
     mujoco.mjtTrn.mjTRN_JOINTINPARENT: "joints",

@@ -29,8 +29,6 @@ from shapechanger.morphology.effective.contacts import (
 )
 from shapechanger.morphology.effective.elements import Section, Value, is_any, names_of
 
-__all__ = ["EffectiveModel", "effective_model", "fingerprint"]
-
 _Bools = NDArray[np.bool_]
 
 

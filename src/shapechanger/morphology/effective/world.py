@@ -14,8 +14,6 @@ from shapechanger.morphology.effective.elements import Rows, Section, Value, wor
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
 
-__all__ = ["derived", "flexes", "options", "plugins", "sizes"]
-
 _DISABLE: Final = mujoco.mjtDisableBit
 _ENABLE: Final = mujoco.mjtEnableBit
 

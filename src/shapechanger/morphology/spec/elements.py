@@ -14,15 +14,6 @@ from shapechanger.errors import MorphologyError, UnknownName
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = [
-    "delete_joint",
-    "name_elements",
-    "require_free_name",
-    "require_limb",
-    "select",
-    "subtree",
-]
-
 
 class _Named(Protocol):
     name: str

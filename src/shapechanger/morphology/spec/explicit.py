@@ -15,8 +15,6 @@ from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import limbs_and_trunks, name_elements
 from shapechanger.morphology.spec.geometry import Array, has_ends, orientation, rotation, scale_mass
 
-__all__ = ["make_explicit", "resolve_frames"]
-
 _UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
 
 

@@ -12,30 +12,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import subtree
 
-__all__ = [
-    "Array",
-    "anchor",
-    "axis_ends",
-    "far_end",
-    "has_ends",
-    "held_at",
-    "inertia_is_written_out",
-    "move_by",
-    "orientation",
-    "place_of",
-    "require_geometry",
-    "resize_geom",
-    "resize_limb",
-    "rotation",
-    "scale_geom_mass",
-    "scale_mass",
-    "stretch_geom",
-    "stretch_segment",
-    "stretched",
-    "thicken_segment",
-    "volume",
-]
-
 Array = NDArray[np.float64]
 _Oriented = mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsFrame
 _G = mujoco.mjtGeom

@@ -16,8 +16,6 @@ from shapechanger.morphology.spec.elements import require_free_name, subtree
 from shapechanger.morphology.spec.explicit import resolve_frames
 from shapechanger.morphology.spec.geometry import orientation
 
-__all__ = ["copy_geom", "graft_copy", "move_limb", "move_point"]
-
 # Begins no name that anybody writes.
 _MARK: Final = "graft~"
 # What geoms and sites name that lies outside the tree of bodies.

@@ -12,8 +12,6 @@ from typing import Final, Protocol
 
 from shapechanger.errors import RobotError, UnknownName
 
-__all__ = ["CAMERA_DRIVERS", "Camera", "CameraPlan", "Frame", "Interruption", "Pace", "open_camera"]
-
 CAMERA_DRIVERS: Final = {
     "picamera2": "shapechanger.robot.cameras.picamera2",
     "v4l2": "shapechanger.robot.cameras.v4l2",

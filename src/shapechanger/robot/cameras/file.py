@@ -9,8 +9,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
 from shapechanger.robot.cameras.jpeg import checked_frame
 
-__all__ = ["Folder", "open_driver"]
-
 _SUFFIXES: Final = (".jpg", ".jpeg")
 
 

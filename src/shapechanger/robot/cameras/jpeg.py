@@ -11,14 +11,6 @@ import simplejpeg
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
-__all__ = [
-    "FreezeDetector",
-    "JpegSplitter",
-    "captured_ns_of",
-    "check_jpeg",
-    "checked_frame",
-]
-
 _MAX_JPEG: Final = 4 * 1024 * 1024
 """Size of the largest frame, bytes."""
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Pace
 
-__all__ = ["Pattern", "barcode_rows", "draw_barcode", "open_driver", "read_barcode"]
-
 _BARCODE_BITS: Final = 48
 """Bits of the number. In nanoseconds they count 78 hours, and then start again."""
 

@@ -15,8 +15,6 @@ import simplejpeg
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
-__all__ = ["PiCamera", "open_driver"]
-
 _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 
 # The name describes a word in memory: "BGR888" is red, green, blue in byte order.

@@ -18,8 +18,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
 from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, checked_frame
 
-__all__ = ["Pipe", "open_driver"]
-
 _CHUNK: Final = 64 * 1024  # Bytes; the default capacity of a Linux pipe.
 _MOST_WAITING: Final = 1 << 20  # Bytes; the largest capacity of a pipe without privileges.
 _PROGRAM_ENDS_S: Final = 2.0

@@ -18,29 +18,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
 from shapechanger.robot.cameras.jpeg import checked_frame
 
-__all__ = [
-    "BUFFER_FLAG_ERROR",
-    "BUFFER_FLAG_MONOTONIC",
-    "BUFFER_FLAG_TIMESTAMP_MASK",
-    "CAPTURE",
-    "DEQUEUE",
-    "MJPEG",
-    "QUERY_BUFFER",
-    "QUEUE",
-    "REQUEST_BUFFERS",
-    "SET_FORMAT",
-    "SET_PARAMETERS",
-    "STREAM_OFF",
-    "STREAM_ON",
-    "Buffer",
-    "V4l2",
-    "frame_rate",
-    "image_size",
-    "open_driver",
-    "pixel_format",
-    "request",
-]
-
 SET_FORMAT: Final = 0xC0D05605  # VIDIOC_S_FMT
 SET_PARAMETERS: Final = 0xC0CC5616  # VIDIOC_S_PARM
 REQUEST_BUFFERS: Final = 0xC0145608  # VIDIOC_REQBUFS

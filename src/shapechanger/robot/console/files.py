@@ -8,8 +8,6 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 
-__all__ = ["ENTRY", "ConsoleFile", "console_files"]
-
 ENTRY: Final = "index.html"
 """Name of the page."""
 

@@ -5,9 +5,3 @@ connections before authentication, `connection` and `session` handle one client,
 what all clients share: the lease and the commands (`control`), the recorder and the library.
 `guard_link` passes orders to the guard, which alone owns the outputs.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

@@ -12,8 +12,6 @@ from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.jpeg import FreezeDetector, check_jpeg
 
-__all__ = ["FrameChecks", "FrameReader", "Latest"]
-
 _T = TypeVar("_T")
 
 _FUTURE_NS: Final = 50_000_000  # Two readings of one clock may be seen in the other order.

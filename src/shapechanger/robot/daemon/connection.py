@@ -23,8 +23,6 @@ from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.hardware import Clock
 
-__all__ = ["HELLO_TIMEOUT_S", "ClientConnection", "ObservationPacer", "Timekeeper", "new_socket"]
-
 HELLO_TIMEOUT_S: Final = 3.0
 """Time that a client has for its hello, s."""
 

@@ -7,8 +7,6 @@ from typing import Final
 
 from shapechanger.link.messages import Role
 
-__all__ = ["ClientIdentity", "ControlLease", "PendingCommand", "PendingCommands"]
-
 _NS_PER_MS: Final = 1_000_000
 
 

@@ -17,16 +17,6 @@ from shapechanger.link.authentication import fingerprint_of, new_key, parse_key
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.new_file import write_new
 
-__all__ = [
-    "Credentials",
-    "check_exposure",
-    "credentials_folder",
-    "load_credentials",
-    "make_credentials",
-    "read_key",
-    "server_tls",
-]
-
 _KEY: Final = "key"
 _CERTIFICATE: Final = "certificate.pem"
 _PRIVATE_KEY: Final = "certificate.key"

@@ -19,8 +19,6 @@ from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import VERSION
 from shapechanger.robot.daemon.plan import DaemonPlan
 
-__all__ = ["Announcement"]
-
 _log = logging.getLogger(__name__)
 
 

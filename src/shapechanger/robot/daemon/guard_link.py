@@ -15,8 +15,6 @@ from typing import Final
 
 from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_state, encode
 
-__all__ = ["LIFELINE", "GuardLink", "send_heartbeats", "send_lifeline"]
-
 LIFELINE: Final = b"life"
 """The message that carries the lifeline's descriptor."""
 

@@ -25,8 +25,6 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
 
-__all__ = ["ConnectedClient", "SessionHub"]
-
 _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
 

@@ -30,8 +30,6 @@ from shapechanger.link.messages import (
     encode,
 )
 
-__all__ = ["Answer", "LineIndex", "RecordingLibrary", "Summaries"]
-
 Question = Browse | Fetch | Judge
 Answer = Recordings | Piece | Refused
 

@@ -12,8 +12,6 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity, PendingCommand
 from shapechanger.robot.guard.messages import GuardState
 
-__all__ = ["NumberedFrame", "StateReader", "build_observation"]
-
 _ABSENT: Final = "absent"
 """Source of a quantity that no sensor measures; its value is NaN, never an invented 0."""
 

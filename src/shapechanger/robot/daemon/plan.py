@@ -11,8 +11,6 @@ from shapechanger.errors import ProfileError
 from shapechanger.link.address import DEFAULT_PORT
 from shapechanger.robot.cameras.camera import CameraPlan
 
-__all__ = ["DaemonPlan"]
-
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of the daemon, type-checked when they are read.

@@ -20,8 +20,6 @@ from typing import Final, Protocol
 
 from shapechanger.errors import RobotError
 
-__all__ = ["Listener", "PreAuthConnection", "PreAuthConnections"]
-
 _PRE_AUTH_TIMEOUT_S: Final = 3.0
 """Time that a connection has for its first request, and for each one after it, s."""
 

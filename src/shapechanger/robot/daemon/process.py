@@ -33,8 +33,6 @@ from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.hardware import Clock, connect
 
-__all__ = ["Daemon", "main"]
-
 _log = logging.getLogger(__name__)
 
 _HEARTBEAT_S: Final = 0.05  # The supervisor expects one each 100 ms.

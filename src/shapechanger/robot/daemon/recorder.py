@@ -22,8 +22,6 @@ from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
 
-__all__ = ["DISK_TOO_SLOW", "EpisodeThread", "Recorder", "StepBuilder", "StepWithFrame"]
-
 _log = logging.getLogger(__name__)
 
 DISK_TOO_SLOW: Final = "The disk is too slow: recording ended, and the steps so far are kept."

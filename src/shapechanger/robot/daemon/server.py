@@ -28,8 +28,6 @@ from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.pre_auth import Listener, PreAuthConnections
 from shapechanger.robot.daemon.session import Authenticator, Session, WrongKey
 
-__all__ = ["Server", "origin_refusal"]
-
 _log = logging.getLogger(__name__)
 
 # A key of 128 bits cannot be guessed. The pause keeps an attempt from costing the robot more than

@@ -49,15 +49,6 @@ from shapechanger.robot.daemon.library import Answer
 from shapechanger.robot.daemon.observation import build_observation
 from shapechanger.robot.guard.messages import Order
 
-__all__ = [
-    "Authenticator",
-    "MessageRate",
-    "Outbox",
-    "SentObservations",
-    "Session",
-    "WrongKey",
-]
-
 MESSAGES_PER_S: Final = 500.0
 """Messages per second that a connection may send; a driver sends 50."""
 

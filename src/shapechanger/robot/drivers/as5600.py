@@ -16,16 +16,6 @@ from shapechanger.robot.drivers.settings import in_words, texts, whole, wholes
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
-__all__ = [
-    "ADDRESS",
-    "COUNTS_PER_TURN",
-    "As5600",
-    "JointEncoder",
-    "Measured",
-    "connect_encoders",
-    "open_driver",
-]
-
 ADDRESS: Final = 0x36
 """Of every AS5600."""
 

@@ -10,8 +10,6 @@ from shapechanger.robot.drivers.settings import in_words, text
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["CpuTemperature", "open_driver"]
-
 _PERIOD_NS: Final = 1_000_000_000
 
 

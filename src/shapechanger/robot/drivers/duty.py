@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["Duty"]
-
 # gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
 # here makes all pin factories equal, and the returned value is the applied one.
 _STEPS: Final = 100

@@ -7,8 +7,6 @@ from typing import Any, Literal
 
 from gpiozero import InputDevice
 
-__all__ = ["EdgeInput"]
-
 
 class EdgeInput:
     """Input with a callback on each change of its level.

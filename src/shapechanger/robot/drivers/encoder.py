@@ -12,8 +12,6 @@ from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["Encoder", "open_driver"]
-
 # Time without an edge after which the wheel counts as standing.
 _STANDS_AFTER_S: Final = 0.5
 

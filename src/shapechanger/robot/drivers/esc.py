@@ -11,8 +11,6 @@ from shapechanger.robot.drivers.settings import in_words, number, text
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["Esc", "open_driver"]
-
 _REVERSES: Final = ("direct", "double", "none")
 
 

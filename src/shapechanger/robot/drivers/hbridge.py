@@ -16,8 +16,6 @@ from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["HBridge", "open_driver"]
-
 
 class HBridge:
     """Bidirectional motor; see `OutputDriver`.

@@ -18,8 +18,6 @@ from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, RealClock
 
-__all__ = ["Hcsr04", "open_driver"]
-
 _TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
 _MOST_MISSED: Final = 3  # Pings without an echo before it fails: about 200 ms, or 0.2 m at 1 m/s.

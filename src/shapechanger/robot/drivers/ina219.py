@@ -11,8 +11,6 @@ from shapechanger.robot.drivers.settings import in_words, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
-__all__ = ["Ina219", "open_driver"]
-
 _CONFIGURATION: Final = 0x00
 _BUS_VOLTAGE: Final = 0x02
 _CONTINUOUS_32_V: Final = (0x39, 0x9F)  # The value at power-up: 0x399F.

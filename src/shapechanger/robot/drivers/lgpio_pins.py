@@ -19,8 +19,6 @@ from typing import Any, Final
 import lgpio
 from gpiozero.pins.lgpio import LGPIOFactory, LGPIOPin
 
-__all__ = ["LgpioServoPins", "LowAtOnceFactory", "LowAtOncePin"]
-
 _MOST_CHIPS: Final = 32
 
 

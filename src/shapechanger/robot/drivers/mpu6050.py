@@ -15,8 +15,6 @@ from shapechanger.robot.drivers.settings import in_words, whole
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
-__all__ = ["Mpu6050", "open_driver"]
-
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C

@@ -9,8 +9,6 @@ from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["OUTPUT_DRIVERS", "OutputDriver", "SharedDevice", "open_output"]
-
 # Each module has `open_driver(plan, hardware)` and is loaded on demand, so that the guard loads
 # only its own drivers.
 OUTPUT_DRIVERS: Final = {

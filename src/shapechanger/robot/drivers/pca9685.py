@@ -17,8 +17,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.settings import in_words, whole
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["Pca9685", "Pca9685Channel", "open_channel", "prescale_for"]
-
 _MODE1: Final = 0x00
 _MODE2: Final = 0x01
 _CHANNEL_0: Final = 0x06  # LED0_ON_L; four registers a channel follow: ON_L, ON_H, OFF_L, OFF_H.

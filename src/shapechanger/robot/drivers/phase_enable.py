@@ -12,8 +12,6 @@ from shapechanger.robot.drivers.settings import in_words, number, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["PhaseEnable", "open_driver"]
-
 
 class PhaseEnable:
     """Bidirectional motor; see `OutputDriver`.

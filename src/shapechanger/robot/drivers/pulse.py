@@ -12,8 +12,6 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.settings import in_words, text, whole
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["PulseChannel", "PulseRange", "SysfsPwm", "open_pulse_channel"]
-
 
 @dataclass(frozen=True, slots=True)
 class PulseRange:

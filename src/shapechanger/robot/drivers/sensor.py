@@ -9,8 +9,6 @@ from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["SENSOR_DRIVERS", "SensorDriver", "open_sensor"]
-
 SENSOR_DRIVERS: Final = {
     "encoder": "shapechanger.robot.drivers.encoder",
     "switch": "shapechanger.robot.drivers.switch",

@@ -10,8 +10,6 @@ from shapechanger.robot.drivers.settings import in_words, number
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["ServoDriver", "open_driver"]
-
 _DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.
 
 

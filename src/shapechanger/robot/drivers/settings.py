@@ -9,8 +9,6 @@ from typing import TypeVar, cast
 
 from shapechanger.errors import RobotError
 
-__all__ = ["in_words", "number", "numbers", "text", "texts", "whole", "wholes"]
-
 _T = TypeVar("_T")
 
 

@@ -11,8 +11,6 @@ from shapechanger.robot.drivers.settings import in_words, text, wholes
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["Switch", "open_driver"]
-
 _PULLS: Final = ("up", "down")
 
 

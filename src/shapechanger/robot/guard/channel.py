@@ -12,8 +12,6 @@ from typing import Protocol
 
 from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 
-__all__ = ["DaemonChannel", "GuardChannel", "Heartbeat"]
-
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
 _MOST_ORDERS_A_ROUND = 1024

@@ -12,8 +12,6 @@ import select
 import sys
 from typing import Final
 
-__all__ = ["log_to_stderr", "shortened"]
-
 _STDERR: Final = 2
 
 

@@ -11,8 +11,6 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal, cast
 
-__all__ = ["MAX_DATAGRAM", "GuardState", "Order", "decode_order", "decode_state", "encode"]
-
 MAX_DATAGRAM: Final = 16 * 1024
 """Size of the largest datagram, bytes."""
 

@@ -19,17 +19,6 @@ from shapechanger.robot.drivers.output import (
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.robot.hardware import REAL, Hardware
 
-__all__ = [
-    "Done",
-    "OutputBank",
-    "Switches",
-    "Truth",
-    "enable_device",
-    "make_safe",
-    "noted",
-    "preload",
-]
-
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
     """Open the pin that triggers the one-shot, low.

@@ -13,16 +13,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-__all__ = [
-    "ActionPlan",
-    "GuardPlan",
-    "LimitPlan",
-    "OutputPlan",
-    "SensorPlan",
-    "StopPlan",
-    "output_values",
-]
-
 Setting = bool | int | float | str | list[int] | list[float] | list[str]
 
 

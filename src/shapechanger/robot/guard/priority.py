@@ -7,8 +7,6 @@ import gc
 import os
 import resource
 
-__all__ = ["GUARD", "SUPERVISOR", "run_early", "run_promptly"]
-
 GUARD = 5
 """Real-time priority of the guard."""
 

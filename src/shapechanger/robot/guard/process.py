@@ -29,8 +29,6 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, descriptors, read_plan_fd
 from shapechanger.robot.hardware import Hardware, connect
 
-__all__ = ["Guard", "main"]
-
 _BEAT_S: Final = 0.01
 """Interval between heartbeats, s of real time; the supervisor allows `guard_silence_ms`."""
 

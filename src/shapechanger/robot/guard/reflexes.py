@@ -7,15 +7,6 @@ from collections.abc import Mapping, Sequence
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.sensors import Sensing
 
-__all__ = [
-    "STEERING",
-    "Bump",
-    "Persistence",
-    "Propulsion",
-    "RobotHealth",
-    "Stall",
-]
-
 
 class Persistence:
     """Condition that counts once it has held without interruption.

@@ -18,8 +18,6 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Stall
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
-__all__ = ["Arming", "OutputDecision", "Rules", "Stopping"]
-
 _NS_PER_MS = 1_000_000
 _SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
 _CLIPPED = "Clipped by the robot's caps."

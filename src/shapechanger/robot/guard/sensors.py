@@ -12,8 +12,6 @@ from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["SensedState", "Sensing", "Sensors", "merge"]
-
 
 def _larger(new: float, old: float) -> bool:
     return new > old

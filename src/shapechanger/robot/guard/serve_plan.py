@@ -20,15 +20,6 @@ from shapechanger.robot.guard import start
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import REAL
 
-__all__ = [
-    "AFTER_FAILURE",
-    "ServePlan",
-    "descriptors",
-    "plan_fd",
-    "read_plan_fd",
-    "supervisor_command",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class ServePlan:

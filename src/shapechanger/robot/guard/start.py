@@ -13,8 +13,6 @@ import types
 from pathlib import Path
 from typing import Final
 
-__all__ = ["run"]
-
 _PROGRAMS: Final = {
     "guard": "shapechanger.robot.guard.process",
     "supervise": "shapechanger.robot.guard.supervisor",

@@ -33,8 +33,6 @@ from shapechanger.robot.guard.priority import SUPERVISOR, run_promptly
 from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, ServePlan, descriptors, read_plan_fd
 from shapechanger.robot.hardware import connect
 
-__all__ = ["Child", "ProcessCommands", "Restarts", "Supervisor", "main"]
-
 
 class Child:
     """A child process with a heartbeat.

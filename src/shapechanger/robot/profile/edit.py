@@ -17,8 +17,6 @@ from shapechanger.robot.profile.load import profile_text
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.profile.read import read_profile
 
-__all__ = ["rewrite"]
-
 
 def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
     """Change values, or add keys to existing tables, atomically.

@@ -13,15 +13,6 @@ from shapechanger.robot.new_file import write_new
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.profile.read import read_profile
 
-__all__ = [
-    "find_profile",
-    "load_profile",
-    "profile_text",
-    "shipped_profiles",
-    "starter_text",
-    "write_profile",
-]
-
 _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
 _LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.

@@ -16,8 +16,6 @@ from typing import Any, Final, cast
 
 from shapechanger.errors import ProfileError
 
-__all__ = ["Place", "Source", "called", "choice", "lines_of", "nearest", "shown"]
-
 Place = tuple[str | int, ...]
 """Path to a value: names of tables and keys, and numbers for entries of table arrays."""
 

@@ -29,17 +29,6 @@ from shapechanger.robot.guard.plan import (
 )
 from shapechanger.robot.profile.mistakes import Source, called
 
-__all__ = [
-    "JOINTS",
-    "TENDONS",
-    "EnablePlan",
-    "Profile",
-    "Quantity",
-    "ResetStep",
-    "RewardPlan",
-    "with_servo_bus",
-]
-
 _APPLIED: Final = "applied"
 """Suffix of the features with the applied value of an action: `steering/applied`."""
 

@@ -42,8 +42,6 @@ from shapechanger.robot.profile.sections import (
 )
 from shapechanger.robot.profile.wiring import PinAllocation
 
-__all__ = ["read_profile"]
-
 _MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")

@@ -15,40 +15,6 @@ from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
 from shapechanger.robot.profile.mistakes import nearest, shown
 
-__all__ = [
-    "ACTION_KEYS",
-    "BCM_OF_BOARD",
-    "CAMERA_KEYS",
-    "CAMERA_SETTINGS",
-    "DRIVING_PARTS",
-    "EMERGENCY_BUTTON_KEYS",
-    "ENABLE_KEYS",
-    "I2C_PINS",
-    "JOINT_KEYS",
-    "LIMIT_KEYS",
-    "MEASURES",
-    "NO_PIN",
-    "OUTPUT_KEYS",
-    "OUTPUT_SETTINGS",
-    "OVER",
-    "OVER_SETTINGS",
-    "PARTS",
-    "REQUIRED",
-    "RESET_KEYS",
-    "REWARD_KEYS",
-    "ROBOT_KEYS",
-    "SENSOR_KEYS",
-    "SENSOR_SETTINGS",
-    "SERVO_BUS_KEYS",
-    "STOP_KEYS",
-    "TABLES",
-    "Kind",
-    "ProfileKey",
-    "bcm",
-    "unit_of",
-    "with_unit",
-]
-
 _HIGHEST_BCM: Final = 27
 """Largest BCM number on the header; the smallest is 0."""
 

@@ -31,17 +31,6 @@ from shapechanger.robot.profile.schema import (
     with_unit,
 )
 
-__all__ = [
-    "Section",
-    "check_mix",
-    "check_stop",
-    "read_action",
-    "read_camera",
-    "read_limits",
-    "read_output",
-    "read_sensor",
-]
-
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 

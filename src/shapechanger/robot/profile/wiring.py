@@ -17,8 +17,6 @@ from shapechanger.robot.profile.schema import (
     ProfileKey,
 )
 
-__all__ = ["PinAllocation"]
-
 _Settings = Mapping[str, Any]
 # Address of every AS5600: ams, data sheet v1-06, "Register Description".
 _AS5600: Final = 0x36

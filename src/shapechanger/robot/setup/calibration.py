@@ -10,16 +10,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.pulse import PulseRange
 from shapechanger.robot.guard.plan import OutputPlan
 
-__all__ = [
-    "PULSES",
-    "JogResult",
-    "motor_changes",
-    "pulse_changes",
-    "reading",
-    "wheel_changes",
-    "with_widest_pulses",
-]
-
 PULSES: Final = {
     "servo": ("left_us", "centre_us", "right_us"),
     "esc": ("backward_us", "neutral_us", "forward_us"),

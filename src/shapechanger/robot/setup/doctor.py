@@ -23,8 +23,6 @@ from shapechanger.robot.hardware import RealHardware
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600
 
-__all__ = ["Finding", "examine_robot", "unit_name", "uses_pins"]
-
 _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
 _NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
 _CAMERA_S: Final = 5.0

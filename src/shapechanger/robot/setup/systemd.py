@@ -12,8 +12,6 @@ from shapechanger.errors import OutputError
 from shapechanger.robot.new_file import write_new
 from shapechanger.robot.setup.doctor import unit_name
 
-__all__ = ["unit_text", "write_unit"]
-
 _TEMPLATE: Final = Path(__file__).parent / "robot.service"
 
 

@@ -12,8 +12,6 @@ from shapechanger.robot.drivers.dynamixel.settings import bus_settings, servo_se
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["find_joint_zeros", "find_zeros"]
-
 _READINGS: Final = 50  # Half a second; single readings differ by a count or two.
 
 

@@ -12,22 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import PathError
 
-__all__ = [
-    "CLOSED_M",
-    "FASTEST_MPS",
-    "FingertipPath",
-    "PathMotion",
-    "Points",
-    "Times",
-    "Vector",
-    "finite",
-    "jumps",
-    "positive",
-    "sample",
-    "too_fast",
-    "vector",
-]
-
 Vector = tuple[float, float, float]
 """x, y and z."""
 

@@ -24,8 +24,6 @@ from shapechanger.tasks.paths.path import (
     vector,
 )
 
-__all__ = ["Harmonics", "circle", "curve_3d", "figure_eight", "line"]
-
 
 @dataclass(frozen=True, slots=True)
 class Harmonics:

@@ -28,8 +28,6 @@ from shapechanger.tasks.paths.path import (
 )
 from shapechanger.tasks.paths.shapes import circle, curve_3d, figure_eight, line
 
-__all__ = ["KINDS", "Function", "PathSource", "Spline", "as_path", "from_callable", "from_csv"]
-
 _STEP_S: Final = 1e-3  # Of differences: the error at 5 Hz is a millionth of the velocity.
 _NODES: Final = np.arange(-2.0, 3.0)
 # Values at the nodes become coefficients of the polynomial through them, shape (5, 5).

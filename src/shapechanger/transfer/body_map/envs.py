@@ -16,8 +16,6 @@ from shapechanger.transfer.body_map.map import BodyMap
 from shapechanger.transfer.body_map.matching import Units
 from shapechanger.transfer.body_map.rules import RuleLike, Zero
 
-__all__ = ["MappedEnv", "body_map", "check_size", "wrap"]
-
 Array = NDArray[Any]
 
 

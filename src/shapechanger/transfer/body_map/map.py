@@ -38,8 +38,6 @@ from shapechanger.transfer.body_map.rules import (
 )
 from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
-__all__ = ["BodyMap", "MapRow"]
-
 
 def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
     """Replace each feature that `outer` copies by its rule in `inner`.

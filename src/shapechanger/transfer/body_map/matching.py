@@ -47,18 +47,6 @@ from shapechanger.transfer.body_map.rules import (
     expand_template,
 )
 
-__all__ = [
-    "MapText",
-    "MirrorText",
-    "Resolution",
-    "Units",
-    "check_patterns",
-    "constant_rule",
-    "read_toml",
-    "resolve",
-    "write_toml",
-]
-
 Units = Literal["same", "torque"]
 
 _COPY: Final = "copy "

@@ -23,26 +23,6 @@ from numpy.typing import ArrayLike, NDArray
 from shapechanger.errors import MapError, SpaceMismatch, UnknownName
 from shapechanger.layout import Feature, Layout
 
-__all__ = [
-    "BY_DEFAULT",
-    "SAME_NAME",
-    "Copy",
-    "Gather",
-    "Hold",
-    "Learn",
-    "MapEntry",
-    "Rule",
-    "RuleLike",
-    "Side",
-    "SideName",
-    "Zero",
-    "check_entries",
-    "compose_rules",
-    "describe_rule",
-    "expand_template",
-    "same_meaning",
-]
-
 
 class Copy(msgspec.Struct, frozen=True, tag="take", omit_defaults=True):
     """Copy another feature, times a scale.

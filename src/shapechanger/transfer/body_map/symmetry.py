@@ -28,8 +28,6 @@ from shapechanger.transfer.body_map.rules import (
     same_meaning,
 )
 
-__all__ = ["Symmetry", "mirror"]
-
 
 class Symmetry(msgspec.Struct, frozen=True):
     """A permutation of a body's features with a sign for each.

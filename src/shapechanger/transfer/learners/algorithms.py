@@ -20,8 +20,6 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3 and sb3-contrib", "learn") from error
 
-__all__ = ["SpacesOnly", "build_model", "checked_settings", "require_class"]
-
 _SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
 # Arguments that are not settings.
 _GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")

@@ -25,8 +25,6 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import CloningSettings
 
-__all__ = ["CameraLearner"]
-
 
 class _CardData(msgspec.Struct):
     """Provenance in the card of a clone that a study or `shapechanger train` wrote."""

@@ -22,18 +22,6 @@ from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
 from shapechanger.transfer.learners.settings import CloningSettings
 
-__all__ = [
-    "DemonstrationFile",
-    "Demonstrations",
-    "evaluate_clone",
-    "is_clone",
-    "load_clone",
-    "load_or_record",
-    "record_demonstrations",
-    "require_camera_env",
-    "train_clones",
-]
-
 _CLONE_EVALUATION_SEED = 10_000_000
 """Seed of the first evaluation episode, the same for every run and arm."""
 

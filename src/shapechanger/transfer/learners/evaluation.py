@@ -21,16 +21,6 @@ from shapechanger.transfer.env_ref import (
 )
 from shapechanger.transfer.learners.settings import Settings
 
-__all__ = [
-    "EVALUATION_SEED",
-    "Act",
-    "Evaluation",
-    "evaluate",
-    "evaluation_envs",
-    "random_actions",
-    "zero_actions",
-]
-
 EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from those of training, the same for every run."""
 

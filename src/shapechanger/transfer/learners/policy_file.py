@@ -39,14 +39,6 @@ except ImportError as error:
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act
 
-__all__ = [
-    "Normalisation",
-    "PolicyCard",
-    "TrainedPolicy",
-    "load_policy",
-    "save_policy",
-]
-
 _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."

@@ -52,17 +52,6 @@ except ImportError as error:
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.cloning import DemonstrationFile
 
-__all__ = [
-    "OnEvaluation",
-    "OnSteps",
-    "Sb3Learner",
-    "ThreadVecEnv",
-    "require_budget",
-    "train",
-    "training_vec_env",
-    "use_one_thread",
-]
-
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
 

@@ -13,20 +13,6 @@ import msgspec
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
 
-__all__ = [
-    "LEARNERS",
-    "TUNED_ON",
-    "CloningSettings",
-    "ImportedSettings",
-    "OffPolicySettings",
-    "PpoSettings",
-    "Sb3Settings",
-    "Settings",
-    "learner_settings",
-    "resolve_learner",
-    "tuning_text",
-]
-
 
 class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     """Settings that all learners of Stable-Baselines3 share.

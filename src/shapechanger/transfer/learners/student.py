@@ -25,8 +25,6 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import CanBeTaught, EnvRef, TaskDemonstrator
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
-__all__ = ["STUDENT_CLONING", "STUDENT_STEPS", "train_student"]
-
 STUDENT_STEPS: Final = 7200
 """Default steps of a student: six minutes, a third of which the teacher drives."""
 

@@ -11,8 +11,6 @@ from shapechanger.transfer.files import write_json
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["AdaptedSource", "Identified", "Randomised"]
-
 # The env in the folder of the run.
 _SOURCE: Final = "source.json"
 

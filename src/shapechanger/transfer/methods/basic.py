@@ -6,8 +6,6 @@ from typing import Any
 
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["FineTune", "Scratch", "ZeroShot"]
-
 
 class Scratch(Method):
     """Learn the target from the start, without the source: the baseline."""

@@ -14,8 +14,6 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["Evolution", "bodies_between"]
-
 # Share of the target steps that is spent on the bodies in between.
 _ON_THE_WAY: Final = 0.5
 

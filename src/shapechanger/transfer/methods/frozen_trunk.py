@@ -12,8 +12,6 @@ from shapechanger.transfer.env_ref import EnvTraits
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["FrozenTrunk"]
-
 _LEAST_LAYERS = 2
 
 

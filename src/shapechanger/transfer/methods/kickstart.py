@@ -19,8 +19,6 @@ from shapechanger.transfer.learners.evaluation import Act
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["Kickstart", "MappedTeacher"]
-
 # Weight of the distillation at the start, and the share of the steps after which it is 0.
 _WEIGHT: Final = 1.0
 _UNTIL: Final = 0.5

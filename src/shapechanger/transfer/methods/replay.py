@@ -22,8 +22,6 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import OffPolicySettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["DomainClassifiers", "OffDynamics", "PrefilledReplay", "Transitions", "collect"]
-
 # Number of prefilled source transitions, as a share of the target steps.
 _PREFILLED: Final = 0.5
 # The classifiers have one hidden layer and noisy inputs, as in the paper; these numbers (width,

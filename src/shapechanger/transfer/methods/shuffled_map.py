@@ -13,8 +13,6 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Copy, MapEntry
 from shapechanger.transfer.methods import Method, MethodRun
 
-__all__ = ["ShuffledMap", "shuffle"]
-
 _WHY = "shuffled"
 
 

@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import StudyError
 
-__all__ = ["LearningCurves", "Reference", "check_comparable", "in_total_steps"]
-
 # Larger numbers are overflows, and the statistics would overflow too.
 _LARGEST_RETURN: Final = 1e30
 

@@ -17,8 +17,6 @@ from scipy import stats
 
 from shapechanger.errors import StudyError
 
-__all__ = ["Estimate", "IntervalKind", "estimate_difference", "estimate_ratio", "undefined"]
-
 IntervalKind = Literal["Welch's t", "studentised bootstrap", "stratified bootstrap", "none"]
 
 # Numbers that differ by a smaller share of their size are equal up to rounding.

@@ -31,23 +31,6 @@ from shapechanger.transfer.metrics.intervals import (
     undefined,
 )
 
-__all__ = [
-    "DEFAULT_THRESHOLDS",
-    "MIN_HEADROOM",
-    "Measures",
-    "ReachTimes",
-    "Summary",
-    "TimeToThreshold",
-    "asymptotic_gain",
-    "auc_ratio",
-    "forward_transfer",
-    "jumpstart",
-    "steps_to_reach",
-    "summarise",
-    "time_to_threshold",
-    "total_reward_gain",
-]
-
 _NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
 
 _NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."

@@ -18,8 +18,6 @@ from scipy import stats
 from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics.intervals import Estimate
 
-__all__ = ["interquartile_mean", "probability_of_improvement"]
-
 # A quarter of the runs is left out at each end.
 _TRIMMED = 0.25
 

@@ -18,21 +18,6 @@ from shapechanger.errors import TransplantError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 
-__all__ = [
-    "Affine",
-    "Edges",
-    "OutputMap",
-    "PolicyOutputs",
-    "Scaling",
-    "critic_actions",
-    "first_linear",
-    "gaussian_outputs",
-    "move_parameters",
-    "observation_affine",
-    "squashed_outputs",
-    "transplant_normalisation",
-]
-
 Vector = NDArray[np.float64]
 
 

@@ -40,8 +40,6 @@ from shapechanger.transfer.transplant.layers import (
     transplant_normalisation,
 )
 
-__all__ = ["check_supported", "transplant"]
-
 Model = TypeVar("Model", bound=BaseAlgorithm)
 
 _POLICIES: Final = (ActorCriticPolicy, SACPolicy, tqc.TQCPolicy)

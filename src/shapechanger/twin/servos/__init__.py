@@ -5,9 +5,3 @@ SDK. Below them, `protocol` has packets and registers, `servo` one servo, and `m
 its tendon and the load. The SDK's own packet code never runs on this side, so each side tests the
 other. Assumptions are marked "assumed" and listed in `servo`.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

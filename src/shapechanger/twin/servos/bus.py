@@ -10,8 +10,6 @@ from shapechanger.twin.servos.motor import EndStops, Load
 from shapechanger.twin.servos.protocol import BROADCAST, Packet, Parser, status
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 
-__all__ = ["SimulatedBus"]
-
 _STATUS: Final = 0x55
 _SYNC_READ: Final = 0x82
 _SYNC_WRITE: Final = 0x83

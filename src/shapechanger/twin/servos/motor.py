@@ -10,8 +10,6 @@ from typing import Final, Protocol
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["MODELS", "EndStops", "Load", "SimulatedMotor", "Tendon", "TwinModel", "twin_model"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwinModel:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-__all__ = ["ServoPort"]
-
 
 class ServoPort:
     """Port for the SDK's packet handler, without real time.

@@ -12,19 +12,6 @@ from typing import Final, NamedTuple
 
 from shapechanger.twin.servos.motor import TwinModel
 
-__all__ = [
-    "BROADCAST",
-    "LIMIT",
-    "RANGE",
-    "Packet",
-    "Parser",
-    "Table",
-    "TableError",
-    "crc16",
-    "pack",
-    "status",
-]
-
 BROADCAST: Final = 0xFE
 """Id that addresses all servos."""
 

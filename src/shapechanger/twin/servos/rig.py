@@ -14,8 +14,6 @@ from shapechanger.twin.servos.motor import EndStops, Load, Tendon
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
-__all__ = ["Rig", "ServoFault", "TendonWorld"]
-
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
 """Faults of a servo.
 

@@ -19,8 +19,6 @@ from typing import Final, Literal
 from shapechanger.twin.servos.motor import SimulatedMotor, Tendon, TwinModel, twin_model
 from shapechanger.twin.servos.protocol import BROADCAST, LIMIT, RANGE, Table, TableError
 
-__all__ = ["Faults", "ServoPlan", "SimulatedServo", "StatusPacket"]
-
 _PING: Final = 0x01
 _READ: Final = 0x02
 _WRITE: Final = 0x03

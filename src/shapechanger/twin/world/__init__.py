@@ -2,9 +2,3 @@
 
 Courses in MuJoCo come from `shapechanger.worlds`.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

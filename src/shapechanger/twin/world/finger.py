@@ -24,8 +24,6 @@ from shapechanger.worlds.world import RESTING_V, Pose, Readings
 if TYPE_CHECKING:
     from shapechanger.twin.servos.rig import Rig
 
-__all__ = ["FingerWorld"]
-
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3
 # kg, mass of the end of a cable: enough for steps of 1 ms to follow the cable's spring.

@@ -9,8 +9,6 @@ from shapechanger.errors import MissingExtra
 from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.world import World
 
-__all__ = ["Place", "open_world"]
-
 _ROOM = (160, 120)
 """Width and height of the pictures of a room without a camera, in pixels."""
 

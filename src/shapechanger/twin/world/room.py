@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.world import Pose
 
-__all__ = ["Box", "FrontCamera", "Room", "find_start", "lay_out"]
-
 ROOM_LENGTH: Final = 6.0  # m, along x
 ROOM_WIDTH: Final = 4.0  # m, along y
 BOXES: Final = 5

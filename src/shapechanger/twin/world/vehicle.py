@@ -17,8 +17,6 @@ from shapechanger.errors import RobotError
 from shapechanger.twin.world.room import FrontCamera, find_start, lay_out
 from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
-__all__ = ["DrivingWorld", "RoomVehicle", "VehicleMotion"]
-
 Outputs = Mapping[str, float | None]
 
 DEAD_BAND: Final = 0.04

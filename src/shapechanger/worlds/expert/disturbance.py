@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.expert.traits import traits_of
 
-__all__ = ["Disturbance"]
-
 WANDER_S: Final = 0.6
 """Correlation time of the wandering, s."""
 

@@ -22,8 +22,6 @@ from shapechanger.worlds.expert.recovery import Recovery
 from shapechanger.worlds.expert.traits import Traits, traits_of
 from shapechanger.worlds.world import Pose
 
-__all__ = ["CourseExpert", "Pursuit", "ThreeWay"]
-
 
 def _wrap_angle(angle: float) -> float:
     """Equivalent angle from -pi to pi, rad."""

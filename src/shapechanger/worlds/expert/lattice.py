@@ -12,8 +12,6 @@ from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert.line import ClosedLine
 
-__all__ = ["FAR_M", "ClearanceField", "Lattice", "cheapest_way", "lay_lattice"]
-
 FAR_M: Final = 2.5
 """Largest distance that is computed, m; larger ones are reported as this."""
 

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
 
-__all__ = ["ClosedLine", "CourseProgress", "Spot"]
-
 WINDOW_M: Final = 2.0
 """Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
 of a course are much farther apart along the line, so none is mistaken for another."""

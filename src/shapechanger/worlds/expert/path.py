@@ -22,8 +22,6 @@ from shapechanger.worlds.expert.lattice import ClearanceField, Lattice, cheapest
 from shapechanger.worlds.expert.line import ClosedLine, Spot
 from shapechanger.worlds.expert.traits import Traits
 
-__all__ = ["CoursePath", "plan_path", "plan_path_for", "speed_profile"]
-
 ROUNDS: Final = 150
 RELAXATION: Final = 1.6
 """Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and

@@ -9,8 +9,6 @@ import numpy as np
 
 from shapechanger.worlds.expert.traits import Traits
 
-__all__ = ["Recovery"]
-
 PATIENCE_S: Final = 0.7
 """Time after which a driven vehicle that stands still counts as stuck, s."""
 

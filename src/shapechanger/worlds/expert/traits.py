@@ -10,8 +10,6 @@ from typing import Final, Literal
 
 from shapechanger.errors import UnknownName
 
-__all__ = ["TRAITS", "Traits", "traits_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Traits:

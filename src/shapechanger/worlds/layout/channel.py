@@ -35,8 +35,6 @@ from shapechanger.worlds.layout.geometry import (
     wall_segments,
 )
 
-__all__ = ["BankKind", "ChannelShape", "build_banks", "harbour", "yard"]
-
 _FINE: Final = 1024
 """Number of points of the route while it is shaped."""
 

@@ -19,8 +19,6 @@ from shapechanger.worlds.layout.geometry import (
     trace_outline,
 )
 
-__all__ = ["DOOR_M", "FRAME_M", "RECESS_M", "corridor", "panel_walls"]
-
 DOOR_M: Final = 0.9
 """Width of a door without its frame, m."""
 

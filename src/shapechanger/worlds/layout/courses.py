@@ -17,8 +17,6 @@ from shapechanger.worlds.layout.corridor import corridor
 from shapechanger.worlds.layout.geometry import distances_from_obstacle, turn_angles
 from shapechanger.worlds.world import Pose
 
-__all__ = ["WORLDS", "lay_out", "start_pose"]
-
 _MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]] = (
     MappingProxyType({"corridor": corridor, "yard": yard, "harbour": harbour})
 )

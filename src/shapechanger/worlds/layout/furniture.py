@@ -20,16 +20,6 @@ from shapechanger.worlds.layout.geometry import (
     wall_segments,
 )
 
-__all__ = [
-    "Lane",
-    "LaneObstacles",
-    "Scatter",
-    "Size",
-    "place_sun_patches",
-    "scatter_obstacles",
-    "weighted_choice",
-]
-
 
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     """Draw an index with a probability proportional to its share.

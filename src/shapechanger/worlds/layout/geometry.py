@@ -12,28 +12,6 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Obstacle, Wall
 
-__all__ = [
-    "Cell",
-    "any_crossing",
-    "arc_lengths",
-    "box_sides",
-    "distances_from_obstacle",
-    "distances_to_segments",
-    "even_distances",
-    "grow_cells",
-    "interpolate",
-    "length",
-    "normals",
-    "obstacle_gap",
-    "resample",
-    "scale_grid",
-    "smooth",
-    "tangent_radii",
-    "trace_outline",
-    "turn_angles",
-    "wall_segments",
-]
-
 Points = NDArray[np.float64]
 
 

@@ -21,10 +21,6 @@ from shapechanger.worlds.scene.surfaces import (
     wall_patches,
 )
 
-__all__ = [
-    "add_course",
-]
-
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 _SOLID_TYPE: Final = 1
 _SOLID_AFFINITY: Final = 2

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.paint import CELLS, ROWS
 
-__all__ = ["Array", "Patches", "add_box", "add_material", "add_patches", "add_turned", "grid_cells"]
-
 Array = NDArray[np.float64]
 
 # The corners of a patch are counter-clockwise seen from its front.

@@ -13,16 +13,6 @@ from shapechanger.worlds.course import Course, Obstacle, Wall
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned, grid_cells
 
-__all__ = [
-    "Light",
-    "ceiling_patches",
-    "ground_patches",
-    "lamp_patches",
-    "obstacle_patches",
-    "verge_patches",
-    "wall_patches",
-]
-
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
 # Share of the light on a wall that faces away from the sun.

@@ -21,8 +21,6 @@ from shapechanger.layout import Layout
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.known_robots import KnownRobot
 
-__all__ = ["Driver", "main"]
-
 _STARTED_S: Final = 30.0
 
 

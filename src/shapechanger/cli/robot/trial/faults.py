@@ -22,8 +22,6 @@ from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.network import BadNetwork
 from shapechanger.twin.robot import Operator, RunningRobot
 
-__all__ = ["FAULTS", "Fault", "Make", "Scene", "Untimely"]
-
 _LATE_S: Final = 1.0
 # Longest duration of an instantaneous fault; a longer one means that the machine was paused.
 _AT_ONCE_MS: Final = 5.0

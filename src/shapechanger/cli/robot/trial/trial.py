@@ -29,8 +29,6 @@ from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import RunningBoard, start_board
 from shapechanger.twin.wiring import TwinWiring
 
-__all__ = ["Trial", "TrialResult", "has"]
-
 _ATTEMPTS: Final = 3
 # Unlike a broken robot, a busy machine recovers.
 _UNTIMELY_ATTEMPTS: Final = 10

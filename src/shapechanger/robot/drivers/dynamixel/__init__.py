@@ -4,9 +4,3 @@
 `sensor` are the drivers that a profile names. Below them, `settings` has models, servos and their
 units, `protocol` registers and packets over `dynamixel_sdk`, and `health` the fault detection.
 """
-
-from __future__ import annotations
-
-from typing import Final
-
-__all__: Final[list[str]] = []

@@ -40,8 +40,6 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = ["Ramp", "ServoBus"]
-
 
 class Ramp:
     """Linear ramp of tensions.

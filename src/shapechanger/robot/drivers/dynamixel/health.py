@@ -18,14 +18,6 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = [
-    "BusState",
-    "Mode",
-    "ServoHealth",
-    "ServoState",
-    "SlackDetector",
-]
-
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
 

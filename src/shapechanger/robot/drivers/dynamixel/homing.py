@@ -8,8 +8,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-__all__ = ["Homing"]
-
 # Chosen: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
 

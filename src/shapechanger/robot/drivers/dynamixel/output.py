@@ -23,8 +23,6 @@ if TYPE_CHECKING:  # They need the SDK, which is loaded when a bus is opened.
     from shapechanger.robot.drivers.dynamixel.bus import ServoBus
     from shapechanger.robot.drivers.dynamixel.health import BusState
 
-__all__ = ["SharedBus", "TendonOutput", "bus_at", "open_driver"]
-
 
 class SharedBus:
     """All servos at one device; see `SharedDevice`.

@@ -13,34 +13,6 @@ from typing import Final, NamedTuple, Protocol
 from shapechanger.errors import MissingExtra, RobotError
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
-__all__ = [
-    "ALERT",
-    "BUS_WATCHDOG",
-    "CURRENT_LIMIT",
-    "CURRENT_MODE",
-    "DRIVE_MODE",
-    "FIRMWARE",
-    "GOAL_CURRENT",
-    "HARDWARE_ERROR",
-    "OPERATING_MODE",
-    "PRESENT",
-    "RETURN_DELAY",
-    "TORQUE_ENABLE",
-    "TRIPPED",
-    "WATCHDOG_STEP_NS",
-    "OpenPort",
-    "Port",
-    "Present",
-    "PromptPort",
-    "Register",
-    "RegisterBus",
-    "ServoPoller",
-    "ServoReply",
-    "decode_present",
-    "hardware_errors",
-    "open_serial_port",
-]
-
 try:
     from dynamixel_sdk import PacketHandler, PortHandler
 except ImportError as error:

@@ -8,8 +8,6 @@ from shapechanger.robot.drivers.settings import text
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
-__all__ = ["TendonSensor", "open_driver"]
-
 
 class TendonSensor:
     """Runs one cycle of the bus per reading; see `SensorDriver`.

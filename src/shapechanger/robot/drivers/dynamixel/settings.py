@@ -13,17 +13,6 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 
-__all__ = [
-    "COUNTS_PER_TURN",
-    "MODELS",
-    "BusSettings",
-    "ServoModel",
-    "ServoSettings",
-    "bus_settings",
-    "servo_settings",
-]
-
-
 COUNTS_PER_TURN: Final = 4096
 """Counts of position per turn."""
 
