@@ -6,12 +6,10 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from tests.robot.daemon.fakes import FakeCamera
 from tests.robot.daemon.plans import SIZE, picture
 
@@ -25,7 +23,7 @@ class Watched:
         self.frames: list[Frame] = []
         self.reports: list[str] = []
         self._changed = threading.Condition()
-        checks = FrameChecks(SIZE, lambda: NOW_NS)
+        checks = FrameChecks(lambda: NOW_NS)
         plan = CameraPlan("pattern", SIZE, fps=500.0)
         self.reader = FrameReader(plan, checks, self._frame, self._report, camera.open)
         self.reader.start()
@@ -62,7 +60,7 @@ def watched(camera: FakeCamera) -> Iterator[Watched]:
 
 def test_good_and_new_pictures_pass() -> None:
     """As they are."""
-    checks = FrameChecks(SIZE, lambda: NOW_NS)
+    checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert checks.refusal(Frame(picture(2), 2)) == ""
 
@@ -73,11 +71,10 @@ GOOD = picture(3)
 @pytest.mark.parametrize(
     ("jpeg", "captured_ns", "words"),
     [
-        (b"", 2, "an incomplete JPEG"),
-        (b"garbage" * 100, 2, "an incomplete JPEG"),
-        (GOOD[: len(GOOD) // 2], 2, "an incomplete JPEG"),
-        (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "Corrupt|Premature|JPEG"),
-        (picture(3, (80, 64)), 2, "80 by 64 pixels"),
+        (b"", 2, "cannot be decoded"),
+        (b"garbage" * 100, 2, "cannot be decoded"),
+        (GOOD[: len(GOOD) // 2], 2, "cannot be decoded"),
+        (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "cannot be decoded"),
         (picture(1), 2, "same frame"),
         (GOOD, 1, "older than the one before"),
         (GOOD, NOW_NS + 60_000_000, "from the future"),
@@ -85,10 +82,9 @@ GOOD = picture(3)
 )
 def test_bad_pictures_do_not(jpeg: bytes, captured_ns: int, words: str) -> None:
     """In words; and they do not move the time of what was seen last."""
-    checks = FrameChecks(SIZE, lambda: NOW_NS)
+    checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
-    refusal = checks.refusal(Frame(jpeg, captured_ns))
-    assert any(word in refusal for word in words.split("|"))
+    assert words in checks.refusal(Frame(jpeg, captured_ns))
     assert checks.refusal(Frame(picture(4), 3)) == ""
 
 
@@ -142,7 +138,7 @@ def test_garbage_without_end_opens_the_camera_again(camera: FakeCamera, watched:
     camera.put(Frame(picture(1), 100))
     watched.until(lambda: len(watched.frames) == 1)
     assert camera.opened == 2
-    assert len([text for text in watched.reports if "an incomplete JPEG" in text]) == 1
+    assert len([text for text in watched.reports if "cannot be decoded" in text]) == 1
 
 
 def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
@@ -150,42 +146,3 @@ def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
     watched.reader.close()
     assert not watched.reader._thread.is_alive()
     assert watched.reports == []
-
-
-@given(moves=st.lists(st.booleans(), max_size=60))
-def test_the_mailbox_gives_only_the_newest_item_and_only_once(moves: list[bool]) -> None:
-    """In any order of puts and takes; the items that come out only rise."""
-    box: Latest[int] = Latest()
-    waiting: int | None = None
-    taken: list[int] = []
-    for number, put in enumerate(moves):
-        if put:
-            box.put(number)
-            waiting = number
-        else:
-            got = box.take()
-            assert got == waiting
-            waiting = None
-            if got is not None:
-                taken.append(got)
-    assert taken == sorted(set(taken))
-
-
-def test_two_threads_never_take_an_item_twice() -> None:
-    """One thread puts and one takes: numbers rise, and the last one is not lost."""
-    box: Latest[int] = Latest()
-    last = 20_000
-
-    def put() -> None:
-        for number in range(last + 1):
-            box.put(number)
-
-    writer = threading.Thread(target=put)
-    writer.start()
-    taken: list[int] = []
-    while not taken or taken[-1] != last:
-        got = box.take()
-        if got is not None:
-            taken.append(got)
-    writer.join()
-    assert taken == sorted(set(taken))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Final
 
 import aiohttp
@@ -20,7 +20,7 @@ from shapechanger.link.messages import (
     encode,
 )
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import Session
+from shapechanger.robot.daemon.session import NOT_READING, Session
 from shapechanger.robot.hardware import Clock
 
 HELLO_TIMEOUT_S: Final = 3.0
@@ -243,16 +243,19 @@ class ClientConnection:
             _log.info("The connection of %s was cut.", self._session.client.name or "a client")
 
     async def _send(self, message: RobotMessage) -> None:
-        """Send a message.
+        await self._in_time(self._socket.send_bytes(encode(message)))
+
+    async def _in_time(self, sending: Awaitable[None]) -> None:
+        """Wait for a message to be sent.
 
         Raises:
             LinkError: If the client does not read it in time.
         """
         try:
             async with asyncio.timeout(_SEND_S):
-                await self._socket.send_bytes(encode(message))
+                await sending
         except TimeoutError:
-            raise LinkError("The client does not read its messages.") from None
+            raise LinkError(NOT_READING) from None
         except (ConnectionError, RuntimeError) as error:
             raise LinkError(f"The connection ended: {error}") from error
 
@@ -270,8 +273,8 @@ class ClientConnection:
             session.posted.clear()
             while (message := session.outbox.take()) is not None:
                 await self._send(message)
-            if session.overflow:
-                raise LinkError(session.overflow)
+            if session.outbox.is_full:
+                raise LinkError(NOT_READING)
 
     async def _observe(self) -> None:
         while True:
@@ -288,7 +291,8 @@ class ClientConnection:
             if message.type is WSMsgType.BINARY:
                 return message.data
             if message.type is WSMsgType.PING:
-                await self._pong(message.data)
+                self._session.count()
+                await self._in_time(self._socket.pong(message.data))
             elif message.type is WSMsgType.PONG:
                 self._session.count()
             elif message.type is WSMsgType.TEXT:
@@ -297,11 +301,3 @@ class ClientConnection:
                 raise LinkError(f"The message cannot be read: {message.data}.")
             else:
                 return None
-
-    async def _pong(self, data: bytes) -> None:
-        self._session.count()
-        try:
-            async with asyncio.timeout(_SEND_S):
-                await self._socket.pong(data)
-        except (TimeoutError, ConnectionError, RuntimeError) as error:
-            raise LinkError("The client does not read its messages.") from error

@@ -10,6 +10,7 @@ import logging
 import os
 import queue
 import signal
+from collections import deque
 from collections.abc import Callable, Sequence
 from logging.handlers import QueueHandler, QueueListener
 from pathlib import Path
@@ -19,7 +20,7 @@ from shapechanger.errors import ShapechangerError
 from shapechanger.link.address import Address, is_loopback
 from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from shapechanger.robot.daemon.connection import Timekeeper
 from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
 from shapechanger.robot.daemon.discovery import Announcement
@@ -154,15 +155,14 @@ class Daemon:
 
     def _camera(self, plan: CameraPlan) -> FrameReader:
         """Start to read the camera. While the loop is busy, only the newest frame is kept."""
-        newest: Latest[Frame] = Latest()
+        newest: deque[Frame] = deque(maxlen=1)
 
         def collect() -> None:
-            frame = newest.take()
-            if frame is not None:
-                self._hub.on_frame(frame)
+            if newest:
+                self._hub.on_frame(newest.pop())
 
         def deliver(frame: Frame) -> None:
-            newest.put(frame)
+            newest.append(frame)
             self._call(collect)
 
         def report(text: str) -> None:
@@ -170,7 +170,7 @@ class Daemon:
             self._call(lambda: self._hub.event("camera", text))
 
         now_ns = self._clock.now_ns if self._plan.clock == "real" else None
-        reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)
+        reader = FrameReader(plan, FrameChecks(now_ns), deliver, report)
         reader.start()
         return reader
 
