@@ -15,7 +15,7 @@ from typing import Final, Literal, NamedTuple
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.errors import ShapechangerError
+from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation, RecorderState, Refused, RobotMessage
 from shapechanger.robot.daemon.control import ClientIdentity
@@ -34,17 +34,8 @@ _NOT_RECORDING: Final = "Nothing is being recorded."
 
 _Post = Callable[[RobotMessage], None]
 
-
-class StepWithFrame(NamedTuple):
-    """A step and its frame.
-
-    Attributes:
-        step: The step.
-        jpeg: The frame; None if it is that of the step before, or there is no camera.
-    """
-
-    step: Step
-    jpeg: bytes | None
+_Write = Callable[[Step, bytes | None], object]
+"""Writes a step and its frame, which is None if it is that of the step before."""
 
 
 class _Seen(NamedTuple):
@@ -71,33 +62,31 @@ class StepBuilder:
     backwards in an episode.
 
     Args:
+        write: Called with each complete step, and its frame as JPEG; None if the frame is that of
+            the step before, or there is no camera.
         wall_ns: Returns the Unix time, ns.
     """
 
-    def __init__(self, wall_ns: Callable[[], int] = time.time_ns) -> None:
+    def __init__(self, write: _Write, wall_ns: Callable[[], int] = time.time_ns) -> None:
+        self._write = write
         self._wall_ns = wall_ns
         self._seen: dict[int, deque[_Seen]] = {}
         self._decided: _Decided | None = None
         self._newest: _Decided | None = None
         self._frame_seq = 0
 
-    def observed(
-        self, session: int, observation: Observation, frame: NumberedFrame | None
-    ) -> StepWithFrame | None:
-        """Note an observation that is sent to a client.
+    def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
+        """Note an observation that is sent to a client, and complete the step before it.
 
         Args:
             session: Number of the connection.
             observation: The observation.
             frame: The newest frame, whether or not it was sent to this client.
-
-        Returns:
-            The step that this completes, or None.
         """
         self._seen.setdefault(session, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
         decided = self._decided
         if decided is None or decided.session != session:
-            return None
+            return
         if observation.mine:
             step = replace(
                 decided.step,
@@ -105,29 +94,26 @@ class StepBuilder:
                 stop_reason=observation.stop_reason,
             )
             self._decided = decided._replace(step=step)
-        return self.complete()
+        self.complete()
 
     def decided(
         self, client: ClientIdentity, answers: int, action: tuple[float, ...], now_ns: int
-    ) -> StepWithFrame | None:
-        """Note a command of a client.
+    ) -> None:
+        """Note a command of a client, and complete a step that answers another observation.
 
         Args:
             client: The client.
             answers: `seq` of the observation that the command answers.
             action: The values of the command.
             now_ns: Arrival time on the robot's clock, ns.
-
-        Returns:
-            The previous step, which this completes, or None.
         """
         window = self._seen.get(client.session, ())
         seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
         if seen is None or self._is_past(client.session, seen):
-            return None
+            return
         before = self._decided
-        again = before is not None and before.session == client.session and before.seen is seen
-        completed = None if again else self.complete()
+        if before is None or before.session != client.session or before.seen is not seen:
+            self.complete()
         step = Step(
             action=action,
             driver=client.role,
@@ -138,17 +124,16 @@ class StepBuilder:
             wall_ns=self._wall_ns(),
         )
         self._decided = self._newest = _Decided(client.session, seen, step)
-        return completed
 
-    def complete(self) -> StepWithFrame | None:
-        """Return the pending step with the outputs known so far, or None."""
+    def complete(self) -> None:
+        """Write the pending step, if there is one, with the outputs known so far."""
         decided, self._decided = self._decided, None
         if decided is None:
-            return None
+            return
         frame, jpeg = decided.seen.frame, None
         if frame is not None and frame.seq != self._frame_seq:
             self._frame_seq, jpeg = frame.seq, frame.frame.jpeg
-        return StepWithFrame(decided.step, jpeg)
+        self._write(decided.step, jpeg)
 
     def forget(self, session: int) -> None:
         """Drop the observations of a client that left."""
@@ -198,45 +183,41 @@ class EpisodeThread:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def add(self, step: StepWithFrame) -> bool:
-        """Write a step. Return False if the disk is too slow, which ends the episode."""
-
-        def write(writer: EpisodeWriter) -> None:
-            writer.add(step.step, step.jpeg)
-            self._note(writer)
-
-        return self._put(write, len(step.jpeg or b""))
-
-    def mark(self, text: str, then: Callable[[str], None]) -> None:
-        """Mark the newest step.
+    def add(self, step: Step, jpeg: bytes | None) -> bool:
+        """Write a step.
 
         Args:
-            text: Text of the mark.
-            then: Called in the thread with the reason for a refusal, or "".
+            step: The step.
+            jpeg: Its frame; None if it is that of the step before, or there is no camera.
+
+        Returns:
+            False if the disk is too slow, which ends the episode.
         """
 
         def write(writer: EpisodeWriter) -> None:
-            if writer.steps:
-                writer.mark(text)
+            writer.add(step, jpeg)
             self._note(writer)
-            then("" if writer.steps else "There is no step to mark yet.")
 
-        self._put(write, len(text))
+        return self._put(write, len(jpeg or b""))
 
-    def undo(self, seconds: float, then: Callable[[str], None]) -> None:
-        """Drop the newest steps.
+    def edit(self, work: Callable[[EpisodeWriter], None], then: Callable[[str], None]) -> None:
+        """Edit the steps so far.
 
         Args:
-            seconds: How far back, s.
+            work: Edits the episode; a `DemosError` refuses.
             then: Called in the thread with the reason for a refusal, or "".
         """
 
-        def write(writer: EpisodeWriter) -> None:
-            dropped = writer.undo(seconds)
+        def edit(writer: EpisodeWriter) -> None:
+            refusal = ""
+            try:
+                work(writer)
+            except DemosError as error:
+                refusal = str(error)
             self._note(writer)
-            then("" if dropped else "There is nothing to undo.")
+            then(refusal)
 
-        self._put(write, 0)
+        self._put(edit, 0)
 
     def end(self, outcome: str = "") -> None:
         """Close the episode once all steps are written."""
@@ -385,7 +366,7 @@ class Recorder:
             notes={"name": name, "recorded_by": client.name},
         )
         self._text = ""
-        self._builder = StepBuilder()
+        self._builder = StepBuilder(self._write)
 
         def report(what: Literal["begun", "ended"], trouble: str) -> None:
             self._call(lambda: self._reported(thread, what, trouble, post))
@@ -406,7 +387,7 @@ class Recorder:
         """
         if self._thread is None or self._builder is None:
             return _NOT_RECORDING
-        self._write(self._builder.complete())
+        self._builder.complete()
         self._builder = None
         self._text = self._text or text
         self._thread.end(text)
@@ -419,7 +400,7 @@ class Recorder:
             text: The mark's text.
             post: Called with the message that reports the outcome.
         """
-        return self._edit(lambda thread: thread.mark(text, self._then(post)))
+        return self._edit(lambda writer: writer.mark(text), post)
 
     def undo(self, seconds: float, post: _Post) -> str:
         """Drop the newest steps. Return the reason for a refusal, or "".
@@ -428,12 +409,17 @@ class Recorder:
             seconds: Time to drop, s.
             post: Called with the message that reports the outcome.
         """
-        return self._edit(lambda thread: thread.undo(seconds, self._then(post)))
+
+        def work(writer: EpisodeWriter) -> None:
+            if not writer.undo(seconds):
+                raise DemosError("There is nothing to undo.")
+
+        return self._edit(work, post)
 
     def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
         """Note an observation that is sent to a client; see `StepBuilder.observed`."""
         if self._builder is not None:
-            self._write(self._builder.observed(session, observation, frame))
+            self._builder.observed(session, observation, frame)
 
     def decided(
         self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
@@ -445,7 +431,7 @@ class Recorder:
             min(max(value, low), high)
             for value, (low, high) in zip(values, self._limits, strict=True)
         )
-        self._write(self._builder.decided(client, answers, action, now_ns))
+        self._builder.decided(client, answers, action, now_ns)
 
     def forget(self, session: int) -> None:
         """Drop the observations of a client that left."""
@@ -463,23 +449,11 @@ class Recorder:
         if self._thread is not None:
             self._thread.join(_CLOSE_S)
 
-    def _edit(self, edit: Callable[[EpisodeThread], None]) -> str:
+    def _edit(self, work: Callable[[EpisodeWriter], None], post: _Post) -> str:
         """Edit the episode after the pending step. Return the reason for a refusal, or ""."""
         if self._thread is None or self._builder is None:
             return _NOT_RECORDING
-        self._write(self._builder.complete())
-        edit(self._thread)
-        return ""
-
-    def _write(self, step: StepWithFrame | None) -> None:
-        if step is None or self._thread is None or self._thread.add(step):
-            return
-        # The thread reports this too, once the disk responds.
-        self._builder, self._text = None, DISK_TOO_SLOW
-        self._broadcast(self.state())
-
-    def _then(self, post: _Post) -> Callable[[str], None]:
-        """Return a handler for the thread's answer to a request of one person."""
+        self._builder.complete()
 
         def answer(refusal: str) -> None:
             if refusal:
@@ -487,7 +461,15 @@ class Recorder:
             else:
                 self._broadcast(self.state())
 
-        return lambda refusal: self._call(lambda: answer(refusal))
+        self._thread.edit(work, lambda refusal: self._call(lambda: answer(refusal)))
+        return ""
+
+    def _write(self, step: Step, jpeg: bytes | None) -> None:
+        if self._thread is None or self._thread.add(step, jpeg):
+            return
+        # The thread reports this too, once the disk responds.
+        self._builder, self._text = None, DISK_TOO_SLOW
+        self._broadcast(self.state())
 
     def _reported(
         self, thread: EpisodeThread, what: Literal["begun", "ended"], trouble: str, post: _Post
