@@ -8,7 +8,7 @@ import socket
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from shapechanger.errors import LinkError, MissingExtra, RobotRefused
 from shapechanger.link import messages
@@ -33,6 +33,7 @@ _CHECK_EVERY: Final = 0.1
 _CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=_CLOSE_S)  # pyright: ignore[reportCallIssue]
 
 _Handler = Callable[[RobotMessage], None]
+_M = TypeVar("_M", Challenge, Welcome)
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,17 +225,12 @@ async def _let_go(sockets: list[socket.socket]) -> None:
 
 
 async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:
-    challenge = await _receive(line)
-    if isinstance(challenge, messages.Refused):
-        raise RobotRefused(challenge.reason)
-    if not isinstance(challenge, Challenge):
-        raise LinkError(f"Expected a Challenge from the robot, got {type(challenge).__name__}.")
+    challenge = await _expect(line, Challenge)
     if challenge.version != messages.VERSION:
         older = "robot" if challenge.version < messages.VERSION else "workstation"
         raise LinkError(
             f"The robot uses version {challenge.version} of the link, this workstation "
-            f"{messages.VERSION}: "
-            f"update Shapechanger on the {older}."
+            f"{messages.VERSION}: update Shapechanger on the {older}."
         )
     hello = Hello(
         version=messages.VERSION,
@@ -245,12 +241,22 @@ async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> We
         frames=access.frames,
     )
     await line.send_bytes(messages.encode(hello))
-    answer = await _receive(line)
-    if isinstance(answer, messages.Refused):
-        raise RobotRefused(answer.reason)
-    if not isinstance(answer, Welcome):
-        raise LinkError(f"Expected a Welcome from the robot, got {type(answer).__name__}.")
-    return answer
+    return await _expect(line, Welcome)
+
+
+async def _expect(line: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
+    """Receive a message of one type.
+
+    Raises:
+        RobotRefused: If the robot refuses.
+        LinkError: If the connection ended, or another message arrives.
+    """
+    message = await _receive(line)
+    if isinstance(message, messages.Refused):
+        raise RobotRefused(message.reason)
+    if not isinstance(message, kind):
+        raise LinkError(f"Expected a {kind.__name__} from the robot, got {type(message).__name__}.")
+    return message
 
 
 async def _receive(line: aiohttp.ClientWebSocketResponse) -> RobotMessage:

@@ -14,8 +14,8 @@ from shapechanger.robot.console.files import ENTRY, console_files
 def test_the_page_names_only_files_that_are_there() -> None:
     """Scripts, styles and what they import."""
     files = console_files()
-    for name, file in files.items():
-        text = file.body.decode()
+    for name, (_, body) in files.items():
+        text = body.decode()
         named = re.findall(r'(?:src|href)="([^"]+)"|from "([^"]+)"', text)
         for path in (one or other for one, other in named):
             assert path.startswith(("/console/", "./")), (name, path)
@@ -24,8 +24,8 @@ def test_the_page_names_only_files_that_are_there() -> None:
 
 def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
     """The policy would forbid it in the browser; here it is seen without one."""
-    for name, file in console_files().items():
-        text = file.body.decode()
+    for name, (_, body) in console_files().items():
+        text = body.decode()
         outside = set(re.findall(r"https?://[^\s\"'`)]+", text))
         assert outside <= {"http://127.0.0.1.", "http://www.w3.org/2000/svg"}, name
         if name == ENTRY:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -21,28 +20,15 @@ _KINDS: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ConsoleFile:
-    """File to send to a browser.
-
-    Attributes:
-        content_type: Media type; the text is UTF-8.
-        body: Content of the file.
-    """
-
-    content_type: str
-    body: bytes
-
-
-def console_files(folder: Path = _FOLDER) -> dict[str, ConsoleFile]:
-    """Read the console's files, by name.
+def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
+    """Return the media type and the content (UTF-8) of each file of the console, by name.
 
     Raises:
         RobotError: If they cannot be read, as after a failed installation.
     """
     try:
         files = {
-            path.name: ConsoleFile(_KINDS[path.suffix], path.read_bytes())
+            path.name: (_KINDS[path.suffix], path.read_bytes())
             for path in sorted(folder.iterdir())
             if path.suffix in _KINDS
         }

@@ -42,7 +42,7 @@ _MAX_LOG_LINES: Final = 1000
 
 
 class Daemon:
-    """The daemon of a robot, from start to end.
+    """The daemon of a robot, from start to end; make it in the event loop that runs it.
 
     Args:
         plan: Settings of the daemon.
@@ -70,7 +70,7 @@ class Daemon:
             on_state=self._on_state,
             on_lost=lambda: self.end("The guard is gone."),
         )
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop = asyncio.get_running_loop()
         self._hub = SessionHub(plan, clock.now_ns, self._guard.send, self._call)
         self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
@@ -85,7 +85,6 @@ class Daemon:
             RobotError: If it cannot start.
         """
         plan = self._plan
-        loop = self._loop = asyncio.get_running_loop()
         check_exposure(plan)
         key = read_key(Path(plan.key_file)) if plan.key_file else b""
         tls, fingerprint = None, b""
@@ -96,7 +95,7 @@ class Daemon:
         tasks = [
             asyncio.create_task(work) for work in (self._heartbeats(), self._report_recorder())
         ]
-        self._guard.attach(loop)
+        self._guard.attach(self._loop)
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
@@ -149,9 +148,8 @@ class Daemon:
 
     def _call(self, work: Callable[[], None]) -> None:
         """Run a function in the event loop's thread, from any other thread."""
-        if self._loop is not None:
-            with contextlib.suppress(RuntimeError):  # The loop ended before the thread.
-                self._loop.call_soon_threadsafe(work)
+        with contextlib.suppress(RuntimeError):  # The loop ended before the thread.
+            self._loop.call_soon_threadsafe(work)
 
     def _camera(self, plan: CameraPlan) -> FrameReader:
         """Start to read the camera. While the loop is busy, only the newest frame is kept."""
