@@ -64,6 +64,11 @@ class Access:
 class RobotConnection:
     """Open connection to a robot, made by `open_connection`.
 
+    Args:
+        line: The WebSocket.
+        welcome: Description of the robot.
+        access: Settings of the connection.
+
     Attributes:
         welcome: Description of the robot.
     """

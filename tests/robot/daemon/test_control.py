@@ -87,7 +87,7 @@ def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: in
     assert hub.commanded() == ()
     hub.on_state(guard_state(armed=True))
     hub.lease.take(ANN)
-    hub.command(Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms), now_ns)
+    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms), now_ns)
     now_ns = age_ms * MS
     assert hub.commanded() == ((0.0, 0.5) if age_ms <= min(ttl_ms, 250) else ())
     now_ns = 0

@@ -183,7 +183,9 @@ class Built:
 
     def __init__(self) -> None:
         self.written: list[tuple[Step, bytes | None]] = []
-        self.builder = StepBuilder(lambda *step: self.written.append(step), lambda: 7)
+        self.builder = StepBuilder(
+            [(-1.0, 1.0)], lambda *step: self.written.append(step), lambda: 7
+        )
 
 
 @pytest.fixture

@@ -104,8 +104,9 @@ class SessionHub:
             return
         self._drop_suggestion(session)
         self.release(member.client, f"the connection to {member.client.name} ended")
-        self.recorder.forget(session)
         people = any(other.client.role == "person" for other in self._clients.values())
+        if self.recorder.builder is not None:
+            self.recorder.builder.forget(session)
         if self.recorder.on and not people:
             self.recorder.end("The last person disconnected, which ended the recording.")
             self._broadcast(self.recorder.state())
@@ -140,10 +141,11 @@ class SessionHub:
         self._command = None
         self._broadcast_lease(f"No client has control: {why}.")
 
-    def command(self, command: Command, now_ns: int) -> None:
+    def command(self, client: ClientIdentity, command: Command, now_ns: int) -> None:
         """Pass a valid command of the lease holder to the guard.
 
         Args:
+            client: The lease holder.
             command: The command.
             now_ns: Its arrival time, ns.
         """
@@ -151,11 +153,11 @@ class SessionHub:
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
         values = tuple(command.scale * value for value in command.values)
-        if (held := self.lease.holder) is not None:
-            until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.deadline_ms)
-            self._command = PendingCommand(held, values, until_ns)
-            if self.state is not None and self.state.armed:
-                self.recorder.decided(held, command.answers, values, now_ns)
+        until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.deadline_ms)
+        self._command = PendingCommand(client, values, until_ns)
+        builder = self.recorder.builder
+        if builder is not None and self.state is not None and self.state.armed:
+            builder.decided(client, command.answers, values, now_ns)
         self._order(
             Order(
                 kind="command",

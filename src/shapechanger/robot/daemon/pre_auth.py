@@ -208,6 +208,12 @@ class Listener:
 class AcceptedSocket:
     """A connection from its acceptance on, through the TLS handshake.
 
+    Args:
+        accepted: The socket, which this object owns.
+        address: The address of the other end.
+        protocol: Handles the connection once it is open.
+        tls: The TLS context, or None for plain TCP.
+
     Attributes:
         address: The address of the other end.
     """

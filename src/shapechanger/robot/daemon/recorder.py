@@ -7,7 +7,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -62,12 +62,19 @@ class StepBuilder:
     backwards in an episode.
 
     Args:
+        limits: Range of each action, to which the guard clips.
         write: Called with each complete step, and its frame as JPEG; None if the frame is that of
             the step before, or there is no camera.
         wall_ns: Returns the Unix time, ns.
     """
 
-    def __init__(self, write: _Write, wall_ns: Callable[[], int] = time.time_ns) -> None:
+    def __init__(
+        self,
+        limits: Sequence[tuple[float, float]],
+        write: _Write,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._limits = limits
         self._write = write
         self._wall_ns = wall_ns
         self._seen: dict[int, deque[_Seen]] = {}
@@ -97,14 +104,14 @@ class StepBuilder:
         self.complete()
 
     def decided(
-        self, client: ClientIdentity, answers: int, action: tuple[float, ...], now_ns: int
+        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
     ) -> None:
         """Note a command of a client, and complete a step that answers another observation.
 
         Args:
             client: The client.
             answers: `seq` of the observation that the command answers.
-            action: The values of the command.
+            values: The values of the command.
             now_ns: Arrival time on the robot's clock, ns.
         """
         window = self._seen.get(client.session, ())
@@ -115,7 +122,10 @@ class StepBuilder:
         if before is None or before.session != client.session or before.seen is not seen:
             self.complete()
         step = Step(
-            action=action,
+            action=tuple(
+                min(max(value, low), high)
+                for value, (low, high) in zip(values, self._limits, strict=True)
+            ),
             driver=client.role,
             wanted=seen.observation.suggested or None,
             state=seen.observation.state,
@@ -305,6 +315,9 @@ class Recorder:
         plan: Settings of the daemon.
         broadcast: Sends a message to all clients.
         call: Runs a function in the event loop's thread, from any other thread.
+
+    Attributes:
+        builder: Makes the steps of the episode; None while nothing is recorded.
     """
 
     def __init__(
@@ -316,18 +329,13 @@ class Recorder:
         features = Layout.from_json(plan.action_layout).features
         self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
         self._thread: EpisodeThread | None = None
-        self._builder: StepBuilder | None = None
+        self.builder: StepBuilder | None = None
         self._text = ""
-
-    @property
-    def can_record(self) -> bool:
-        """True if there is a folder for recordings."""
-        return bool(self._plan.recordings)
 
     @property
     def on(self) -> bool:
         """True while an episode is recorded."""
-        return self._builder is not None
+        return self.builder is not None
 
     def state(self) -> RecorderState:
         """Return the state of the recorder."""
@@ -346,7 +354,7 @@ class Recorder:
         Returns:
             The reason for a refusal, or "".
         """
-        if not self.can_record:
+        if not self._plan.recordings:
             return "This robot was served without a folder for recordings."
         if self.on:
             return (
@@ -366,7 +374,7 @@ class Recorder:
             notes={"name": name, "recorded_by": client.name},
         )
         self._text = ""
-        self._builder = StepBuilder(self._write)
+        self.builder = StepBuilder(self._limits, self._write)
 
         def report(what: Literal["begun", "ended"], trouble: str) -> None:
             self._call(lambda: self._reported(thread, what, trouble, post))
@@ -385,10 +393,10 @@ class Recorder:
         Returns:
             The reason for a refusal, or "".
         """
-        if self._thread is None or self._builder is None:
+        if self._thread is None or self.builder is None:
             return _NOT_RECORDING
-        self._builder.complete()
-        self._builder = None
+        self.builder.complete()
+        self.builder = None
         self._text = self._text or text
         self._thread.end(text)
         return ""
@@ -416,28 +424,6 @@ class Recorder:
 
         return self._edit(work, post)
 
-    def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
-        """Note an observation that is sent to a client; see `StepBuilder.observed`."""
-        if self._builder is not None:
-            self._builder.observed(session, observation, frame)
-
-    def decided(
-        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
-    ) -> None:
-        """Note a command, clipped as the guard clips it; see `StepBuilder.decided`."""
-        if self._builder is None:
-            return
-        action = tuple(
-            min(max(value, low), high)
-            for value, (low, high) in zip(values, self._limits, strict=True)
-        )
-        self._builder.decided(client, answers, action, now_ns)
-
-    def forget(self, session: int) -> None:
-        """Drop the observations of a client that left."""
-        if self._builder is not None:
-            self._builder.forget(session)
-
     def tick(self) -> None:
         """Report the state to all clients while recording; called once a second."""
         if self.on:
@@ -451,9 +437,9 @@ class Recorder:
 
     def _edit(self, work: Callable[[EpisodeWriter], None], post: _Post) -> str:
         """Edit the episode after the pending step. Return the reason for a refusal, or ""."""
-        if self._thread is None or self._builder is None:
+        if self._thread is None or self.builder is None:
             return _NOT_RECORDING
-        self._builder.complete()
+        self.builder.complete()
 
         def answer(refusal: str) -> None:
             if refusal:
@@ -468,7 +454,7 @@ class Recorder:
         if self._thread is None or self._thread.add(step, jpeg):
             return
         # The thread reports this too, once the disk responds.
-        self._builder, self._text = None, DISK_TOO_SLOW
+        self.builder, self._text = None, DISK_TOO_SLOW
         self._broadcast(self.state())
 
     def _reported(
@@ -479,7 +465,7 @@ class Recorder:
         if thread is not self._thread:
             return  # The next episode has begun already, and its state was reported.
         if what == "ended":
-            self._builder = None
+            self.builder = None
             self._text = self._text or trouble
             if trouble and not thread.progress.episode:
                 post(Refused(reason=trouble))  # The episode could not even begin.

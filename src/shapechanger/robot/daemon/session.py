@@ -373,7 +373,8 @@ class Session:
             suggested=hub.suggested(),
         )
         self._sent.add(observation.seq, now_ns)
-        hub.recorder.observed(self._number, observation, hub.newest)
+        if hub.recorder.builder is not None:
+            hub.recorder.builder.observed(self._number, observation, hub.newest)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
@@ -406,7 +407,7 @@ class Session:
         self._command_seq = max(self._command_seq, command.seq)
         self._refuse(refusal, command.seq)
         if not refusal:
-            self._hub.command(command, now_ns)
+            self._hub.command(self.client, command, now_ns)
         self._give_credit()
 
     def _suggest(self, suggestion: Suggest) -> None:
@@ -514,5 +515,5 @@ class Session:
             arming=plan.arming,
             clock=plan.clock,
             session=self._number,
-            can_record=self._hub.recorder.can_record,
+            can_record=bool(plan.recordings),
         )
