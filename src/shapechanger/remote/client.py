@@ -45,7 +45,7 @@ def _own_name() -> str:
 
 
 class RobotClient:
-    """Connection to a robot, kept by a thread of its own.
+    """Connection to a robot, made by `connect` and kept by a thread of its own.
 
     All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
     the robot refuses.
@@ -56,10 +56,6 @@ class RobotClient:
     Attributes:
         welcome: Description of the robot.
         pace: Whether the clocks or the client set the pace.
-
-    Raises:
-        RobotRefused: If the robot's certificate differs, or it refuses the client.
-        LinkError: If no robot answers, or one with another version of the link.
     """
 
     def __init__(self, access: Access) -> None:
@@ -73,7 +69,7 @@ class RobotClient:
         self._stop = asyncio.Event()
         self._connection: RobotConnection | None = None
         self._thread = threading.Thread(
-            target=self._keep, name=f"robot {access.address}", daemon=True
+            target=self._run, name=f"robot {access.address}", daemon=True
         )
         welcome = Request(Welcome)
         with self._inbox.expecting(welcome):
@@ -112,7 +108,8 @@ class RobotClient:
 
         Raises:
             RobotRefused: If the robot's certificate differs, or it refuses the client.
-            LinkError: If no robot answers. Without a fingerprint the message shows the robot's.
+            LinkError: If no robot answers, or one with another version of the link. Without a
+                fingerprint the message shows the robot's.
         """
         if not timeout_s > 0.0:
             raise LinkError(f"timeout_s must be above 0, got {timeout_s:g}.")
@@ -413,11 +410,11 @@ class RobotClient:
         For clients that are dropped without `close`: the garbage collector may call this in any
         thread, including that of the connection.
         """
-        loop, made = self._loop, self._connection
-        if self._process != os.getpid() or loop is None or made is None:
+        loop, connection = self._loop, self._connection
+        if self._process != os.getpid() or loop is None or connection is None:
             return
         with contextlib.suppress(RuntimeError):  # It has ended already.
-            loop.call_soon_threadsafe(made.post, messages.Release())
+            loop.call_soon_threadsafe(connection.post, messages.Release())
             loop.call_soon_threadsafe(self._stop.set)
 
     def __enter__(self) -> Self:
@@ -479,21 +476,21 @@ class RobotClient:
 
     # In the connection's thread.
 
-    def _keep(self) -> None:
+    def _run(self) -> None:
         try:
-            asyncio.run(self._live())
+            asyncio.run(self._exchange())
         except LinkError as error:
             self._inbox.fail(error)
         except BaseException as error:
-            # Callers that wait must not wait for ever.
+            # Waiting callers must not wait for ever.
             self._inbox.fail(LinkError(f"The link to the robot failed: {error!r}."))
             raise
         else:
             self._inbox.fail(LinkError("The connection was closed: make a new one."))
 
-    async def _live(self) -> None:
+    async def _exchange(self) -> None:
         self._loop = asyncio.get_running_loop()
-        async with open_connection(self._access) as made:
-            self._connection = made
-            self._inbox.put(made.welcome)
-            await made.run(self._inbox.put, self._stop)
+        async with open_connection(self._access) as connection:
+            self._connection = connection
+            self._inbox.put(connection.welcome)
+            await connection.run(self._inbox.put, self._stop)

@@ -30,9 +30,8 @@ _log = logging.getLogger(__name__)
 
 _SEND_S: Final = 2.0  # A client that does not read for so long is disconnected.
 _CLOSE_S: Final = 1.0
-_HEARTBEAT_S: Final = (
-    4.0  # A dead radio sends nothing: the connection ends 6 s after it fell silent.
-)
+# A dead radio sends nothing: the connection ends 6 s after it fell silent.
+_HEARTBEAT_S: Final = 4.0
 _FRAME_WAIT_S: Final = 2.0  # Real time that a frame may spend in the camera's driver.
 
 # A camera that is about as fast as the commands sets the pace, so that each observation has a new

@@ -23,7 +23,7 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from shapechanger.robot.daemon.connection import Timekeeper
 from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
-from shapechanger.robot.daemon.discovery import Announcement
+from shapechanger.robot.daemon.discovery import announce, withdraw
 from shapechanger.robot.daemon.guard_link import GuardLink, send_heartbeats, send_lifeline
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -106,9 +106,11 @@ class Daemon:
             if not self._ended.is_set():
                 port = await server.start()
                 self._report_ready(port, fingerprint)
-                announcement = self._announcement(port, fingerprint)
-                if announcement is not None:
-                    await announcement.start()
+                if plan.discovery and is_loopback(plan.host):
+                    words = "%s is not announced: only this machine reaches %s."
+                    _log.info(words, plan.robot, plan.host)
+                elif plan.discovery:
+                    announcement = await announce(plan, port, fingerprint)
             await self._ended.wait()
         finally:
             # First of all the guard stops the robot, when it sees this socket close.
@@ -118,7 +120,7 @@ class Daemon:
                 await asyncio.to_thread(camera.close)
             await server.close()
             if announcement is not None:
-                await announcement.close()
+                await withdraw(announcement)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -171,16 +173,6 @@ class Daemon:
         reader = FrameReader(plan, FrameChecks(now_ns), deliver, report)
         reader.start()
         return reader
-
-    def _announcement(self, port: int, fingerprint: bytes) -> Announcement | None:
-        """Return the announcement on the network, or None where it is unwanted or pointless."""
-        plan = self._plan
-        if not plan.discovery:
-            return None
-        if is_loopback(plan.host):
-            _log.info("%s is not announced: only this machine reaches %s.", plan.robot, plan.host)
-            return None
-        return Announcement(plan, port, fingerprint)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
         """Report the port in the log, and to the process that started this one."""
