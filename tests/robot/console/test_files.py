@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.console.files import ENTRY, console_files
+from shapechanger.robot.console import ENTRY, console_files
 
 
 def test_the_page_names_only_files_that_are_there() -> None:

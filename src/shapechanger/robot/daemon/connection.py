@@ -47,23 +47,21 @@ class Timekeeper:
         clock: The robot's clock.
         hub: State that all connections share.
         drain: Reads all states that the guard has sent.
+
+    Attributes:
+        in_steps: True if time stands still between calls of `step`.
     """
 
     def __init__(self, clock: Clock, hub: SessionHub, drain: Callable[[], None]) -> None:
         self._clock = clock
         self._hub = hub
         self._drain = drain
-        self._in_steps = hub.plan.clock == "twin"
+        self.in_steps = hub.plan.clock == "twin"
         self._one_at_a_time = asyncio.Lock()
-
-    @property
-    def in_steps(self) -> bool:
-        """True if time stands still between calls of `step`."""
-        return self._in_steps
 
     async def step(self, seconds: float) -> None:
         """Let `seconds` pass."""
-        if not self._in_steps:
+        if not self.in_steps:
             await self._clock.sleep(seconds)
             self._drain()
             return
@@ -72,7 +70,7 @@ class Timekeeper:
 
     async def settle(self) -> None:
         """Let the guard handle an order that was just given; a real clock needs no help."""
-        if self._in_steps and self._hub.unsettled:
+        if self.in_steps and self._hub.unsettled:
             self._hub.unsettled = False
             await self.step(1.0 / self._hub.plan.tick_hz)
 
@@ -138,7 +136,7 @@ class ObservationPacer:
     async def _wait_until_due(self) -> None:
         """Wait until one period after the last observation was due, or for its frame."""
         loop = asyncio.get_running_loop()
-        while (not self._comes_with_frame()) and loop.time() < self._due_s:
+        while not (self._by_frames and self._session.has_new_frame) and loop.time() < self._due_s:
             self._session.updated.clear()
             try:
                 async with asyncio.timeout_at(self._due_s):
@@ -153,9 +151,6 @@ class ObservationPacer:
             # was away gets no burst.
             was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
             self._due_s = was_s + self._period_s
-
-    def _comes_with_frame(self) -> bool:
-        return self._by_frames and self._session.has_new_frame
 
 
 def new_socket() -> web.WebSocketResponse:

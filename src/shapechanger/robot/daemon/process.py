@@ -63,7 +63,7 @@ class Daemon:
         self._plan = plan
         self._clock = clock
         self._ended = asyncio.Event()
-        self._guard_heard = asyncio.Event()  # The guard has reported, or never will.
+        self._guard_reported = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
         self._guard = GuardLink(
             guard_fd,
@@ -102,7 +102,7 @@ class Daemon:
             # The first client must not see a robot of unknown state. Where time moves in steps,
             # the guard reports nothing before the first step.
             if not time.in_steps:
-                await self._guard_heard.wait()
+                await self._guard_reported.wait()
             if not self._ended.is_set():
                 port = await server.start()
                 self._report_ready(port, fingerprint)
@@ -132,11 +132,11 @@ class Daemon:
         """Stop serving; the first reason counts."""
         self._why = self._why or why
         self._ended.set()
-        self._guard_heard.set()
+        self._guard_reported.set()
 
     def _on_state(self, state: GuardState) -> None:
         self._hub.on_state(state)
-        self._guard_heard.set()
+        self._guard_reported.set()
 
     async def _heartbeats(self) -> None:
         if self._heartbeat_fd is not None:

@@ -17,7 +17,7 @@ from shapechanger.errors import LinkError, RobotError, ShapechangerError
 from shapechanger.link.address import is_loopback, parse_address
 from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import VERSION
-from shapechanger.robot.console.files import ENTRY, console_files
+from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.connection import (
     ClientConnection,
     ObservationPacer,

@@ -248,7 +248,6 @@ class Session:
         self.credit = False
         self.client = ClientIdentity(number, "", "program")
         self.pace: Pace = "realtime"
-        self._number = number
         self._hub = hub
         self._authenticator = authenticator
         self._rate = MessageRate() if rate is None else rate
@@ -292,8 +291,8 @@ class Session:
             raise WrongKey(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
-        name = printable(hello.name) or f"{hello.role} {self._number}"
-        self.client = ClientIdentity(self._number, name, hello.role)
+        name = printable(hello.name) or f"{hello.role} {self.client.session}"
+        self.client = ClientIdentity(self.client.session, name, hello.role)
         self._hub.join(self)
         self._is_known, self.pace, self._wants_frames = True, hello.pace, hello.frames
         if (recorded := self._hub.recorder.state()).episode:
@@ -347,7 +346,7 @@ class Session:
 
     def close(self) -> None:
         """End the session."""
-        self._hub.leave(self._number)
+        self._hub.leave(self.client.session)
 
     def post(self, message: RobotMessage) -> None:
         """Queue a message; if the queue is full, the connection ends."""
@@ -368,13 +367,13 @@ class Session:
             lease=hub.lease.number,
             command_ns=hub.command_ns(),
             holder=hub.lease.holder,
-            mine=hub.lease.holds(self._number),
+            mine=hub.lease.holds(self.client.session),
             commanded=hub.commanded(),
             suggested=hub.suggested(),
         )
         self._sent.add(observation.seq, now_ns)
         if hub.recorder.builder is not None:
-            hub.recorder.builder.observed(self._number, observation, hub.newest)
+            hub.recorder.builder.observed(self.client.session, observation, hub.newest)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
@@ -394,7 +393,7 @@ class Session:
     def _command(self, command: Command) -> None:
         now_ns = self._hub.now_ns()
         refusal = ""
-        if not self._hub.lease.holds(self._number):
+        if not self._hub.lease.holds(self.client.session):
             refusal = "You do not have control; take it first."
         elif command.seq <= self._command_seq:
             refusal = f"Command {command.seq} is not newer than {self._command_seq}."
@@ -411,7 +410,7 @@ class Session:
         self._give_credit()
 
     def _suggest(self, suggestion: Suggest) -> None:
-        if self._hub.lease.holds(self._number):
+        if self._hub.lease.holds(self.client.session):
             refusal = "You have control: send a command in place of a suggestion."
         elif suggestion.seq <= self._suggestion_seq:
             refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
@@ -455,12 +454,12 @@ class Session:
             return "Only a person can arm this robot."
         if state is not None and state.emergency:
             return "Only a person can end an emergency stop."
-        if not self._hub.lease.holds(self._number):
+        if not self._hub.lease.holds(self.client.session):
             return "Only the client in control, or a person, can arm this robot."
         return ""
 
     def _disarm(self) -> None:
-        if self.client.role != "person" and not self._hub.lease.holds(self._number):
+        if self.client.role != "person" and not self._hub.lease.holds(self.client.session):
             self._refuse(
                 "Only the client in control, or a person, can disarm this robot; any client can "
                 "stop it with an emergency stop."
@@ -514,6 +513,6 @@ class Session:
             reset=plan.reset,
             arming=plan.arming,
             clock=plan.clock,
-            session=self._number,
+            session=self.client.session,
             can_record=bool(plan.recordings),
         )
