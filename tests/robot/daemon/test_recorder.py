@@ -15,15 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import (
-    EpisodeHeader,
-    EpisodeWriter,
-    Step,
-    episodes_of,
-    read_episode,
-    repair,
-)
-from shapechanger.link.messages import Observation
+from shapechanger.demos.episodes import EpisodeHeader, Step, episodes_of, read_episode, repair
+from shapechanger.link.messages import Mark, Observation, Undo
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
@@ -52,24 +45,21 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     """The episode is closed with its outcome."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
-
-    def undo(writer: EpisodeWriter) -> None:
-        assert writer.undo(0.5) == 10
-
-    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
-    scribe.edit(lambda writer: writer.mark("too early"), answers.append)
-    assert all(scribe.add(*step(number)) for number in range(40))
-    scribe.edit(lambda writer: writer.mark("here"), answers.append)
-    scribe.edit(undo, answers.append)
-    scribe.end("time")
-    assert scribe.add(*step(41))  # Too late: it has ended well, and this is no trouble.
-    assert scribe.join(WITHIN_S)
+    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
+    thread.edit(Mark(text="too early"), answers.append)
+    thread.edit(Undo(), answers.append)
+    assert all(thread.add(*step(number)) for number in range(40))
+    thread.edit(Mark(text="here"), answers.append)
+    thread.edit(Undo(seconds=0.5), answers.append)
+    thread.end("time")
+    assert thread.add(*step(41))  # Too late: it has ended well, and this is no trouble.
+    assert thread.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
-    assert answers == ["There is no step yet that could be marked.", "", ""]
-    episode = read_episode(tmp_path / scribe.progress.episode)
+    assert answers == ["There is no step to mark yet.", "There is nothing to undo.", "", ""]
+    episode = read_episode(tmp_path / thread.progress.episode)
     assert (episode.closed, episode.outcome) == (True, "time")
     assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
-    assert (len(episode.kept), scribe.progress.dropped) == (30, 10)
+    assert (len(episode.kept), thread.progress.dropped) == (30, 10)
     assert [mark.step for mark in episode.marks] == [39]
 
 
@@ -78,16 +68,16 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_
     """Queued steps and bytes are bounded; here the disk is busy elsewhere."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
-    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
+    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
     taken = 0
     large = b"\xff\xd8" + bytes(bytes_each)
-    while scribe.add(step(taken)[0], large):
+    while thread.add(step(taken)[0], large):
         taken += 1
         assert taken < 10_000
     busy.end()
-    assert scribe.join(WITHIN_S)
+    assert thread.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
-    episode = read_episode(tmp_path / scribe.progress.episode)
+    episode = read_episode(tmp_path / thread.progress.episode)
     assert episode.outcome == DISK_TOO_SLOW
     assert len(episode.steps) == taken == (15 if bytes_each else 256)
 
@@ -96,10 +86,10 @@ def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
     """Once, and the episode does not begin."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
-    scribe = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
-    assert scribe.join(WITHIN_S)
+    thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
+    assert thread.join(WITHIN_S)
     ((what, trouble),) = reports
-    assert (what, scribe.progress.episode) == ("ended", "")
+    assert (what, thread.progress.episode) == ("ended", "")
     assert "Cannot write" in trouble
 
 
@@ -109,13 +99,13 @@ from pathlib import Path
 from tests.robot.daemon.test_recorder import HEADER, step
 from shapechanger.robot.daemon.recorder import EpisodeThread
 
-scribe, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
+thread, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
 while True:
-    if scribe.progress.steps >= number - 100:
-        scribe.add(*step(number))
+    if thread.progress.steps >= number - 100:
+        thread.add(*step(number))
         number += 1
     if number % 20 == 0:
-        print(scribe.progress.steps, flush=True)
+        print(thread.progress.steps, flush=True)
 """
 
 

@@ -94,10 +94,9 @@ class PreAuthConnections:
 
     def drop_one(self) -> None:
         """Drop the oldest connection of the address that has the most."""
-        counts = self._counts()
-        if counts:
-            # Of addresses with equal counts, `max` picks the one that connected first.
-            self._drop_oldest(max(counts, key=lambda address: counts[address]))
+        # Of addresses with equal counts, this is the one that connected first.
+        for address, _ in self._counts().most_common(1):
+            self._drop_oldest(address)
 
     def close(self) -> None:
         """Drop all connections."""

@@ -15,9 +15,9 @@ from typing import Final, Literal, NamedTuple
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.errors import DemosError, ShapechangerError
+from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation, RecorderState, Refused, RobotMessage
+from shapechanger.link.messages import Mark, Observation, RecorderState, Refused, RobotMessage, Undo
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -210,20 +210,22 @@ class EpisodeThread:
 
         return self._put(write, len(jpeg or b""))
 
-    def edit(self, work: Callable[[EpisodeWriter], None], then: Callable[[str], None]) -> None:
-        """Edit the steps so far.
+    def edit(self, request: Mark | Undo, then: Callable[[str], None]) -> None:
+        """Mark the newest step, or drop the newest ones.
 
         Args:
-            work: Edits the episode; a `DemosError` refuses.
+            request: The mark's text, or how far back to drop.
             then: Called in the thread with the reason for a refusal, or "".
         """
 
         def edit(writer: EpisodeWriter) -> None:
             refusal = ""
-            try:
-                work(writer)
-            except DemosError as error:
-                refusal = str(error)
+            if isinstance(request, Undo):
+                refusal = "" if writer.undo(request.seconds) else "There is nothing to undo."
+            elif writer.steps:
+                writer.mark(request.text)
+            else:
+                refusal = "There is no step to mark yet."
             self._note(writer)
             then(refusal)
 
@@ -401,28 +403,28 @@ class Recorder:
         self._thread.end(text)
         return ""
 
-    def mark(self, text: str, post: _Post) -> str:
-        """Mark the newest step. Return the reason for a refusal, or "".
+    def edit(self, request: Mark | Undo, post: _Post) -> str:
+        """Mark the newest step, or drop the newest ones, after the pending step.
 
         Args:
-            text: The mark's text.
-            post: Called with the message that reports the outcome.
+            request: The mark's text, or how far back to drop.
+            post: Called with the message that reports a later refusal.
+
+        Returns:
+            The reason for a refusal, or "".
         """
-        return self._edit(lambda writer: writer.mark(text), post)
+        if self._thread is None or self.builder is None:
+            return _NOT_RECORDING
+        self.builder.complete()
 
-    def undo(self, seconds: float, post: _Post) -> str:
-        """Drop the newest steps. Return the reason for a refusal, or "".
+        def answer(refusal: str) -> None:
+            if refusal:
+                post(Refused(reason=refusal))
+            else:
+                self._broadcast(self.state())
 
-        Args:
-            seconds: Time to drop, s.
-            post: Called with the message that reports the outcome.
-        """
-
-        def work(writer: EpisodeWriter) -> None:
-            if not writer.undo(seconds):
-                raise DemosError("There is nothing to undo.")
-
-        return self._edit(work, post)
+        self._thread.edit(request, lambda refusal: self._call(lambda: answer(refusal)))
+        return ""
 
     def tick(self) -> None:
         """Report the state to all clients while recording; called once a second."""
@@ -434,21 +436,6 @@ class Recorder:
         self.end()
         if self._thread is not None:
             self._thread.join(_CLOSE_S)
-
-    def _edit(self, work: Callable[[EpisodeWriter], None], post: _Post) -> str:
-        """Edit the episode after the pending step. Return the reason for a refusal, or ""."""
-        if self._thread is None or self.builder is None:
-            return _NOT_RECORDING
-        self.builder.complete()
-
-        def answer(refusal: str) -> None:
-            if refusal:
-                post(Refused(reason=refusal))
-            else:
-                self._broadcast(self.state())
-
-        self._thread.edit(work, lambda refusal: self._call(lambda: answer(refusal)))
-        return ""
 
     def _write(self, step: Step, jpeg: bytes | None) -> None:
         if self._thread is None or self._thread.add(step, jpeg):

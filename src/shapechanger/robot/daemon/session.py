@@ -483,9 +483,9 @@ class Session:
                 driver = self._hub.lease.holder_name
                 return recorder.begin(self.client, printable(message.name), driver, self.post)
             case Mark():
-                return recorder.mark(printable(message.text), self.post)
+                return recorder.edit(Mark(text=printable(message.text)), self.post)
             case Undo():
-                return recorder.undo(message.seconds, self.post)
+                return recorder.edit(message, self.post)
             case Browse() | Fetch() | Judge():
                 # An answer may be large, so the next question waits until it has left.
                 if self._awaits_library or self.outbox.holds(Recordings, Piece):
