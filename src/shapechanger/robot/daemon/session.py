@@ -6,7 +6,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import Final
 
@@ -77,7 +77,7 @@ class Authenticator:
         certificate: Fingerprint of the certificate; empty without TLS.
     """
 
-    key: bytes = b""
+    key: bytes = field(default=b"", repr=False)  # It does not belong in a log.
     certificate: bytes = b""
 
     @property
