@@ -51,20 +51,20 @@ def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
 
 @dataclass
 class Robot:
-    """What the robot is and does; tests change it while it runs.
+    """Settings and state of the robot, which tests change while it runs.
 
     Attributes:
-        silent: Whether it says nothing more, on lines that stay open.
-        delay_s: How long it takes for each answer, s.
+        silent: Whether it sends nothing more, on connections that stay open.
+        delay_s: Delay of each answer, s.
         garbage: Bytes to send instead of the next observation.
-        refusal: Why it refuses each command; "" for not.
-        frozen: Whether its camera gives no new picture.
-        jpeg: The picture that it sends each time; None for one that tells its number.
-        held_by: Who else commands it.
-        absent: Names of the numbers of the state that nothing measures.
-        arm_by_itself: Whether its operator arms it as soon as somebody commands.
-        home_at_take: Whether it goes to where it started as soon as somebody commands.
-        heard: What clients said.
+        refusal: Reason to refuse each command; "" to accept them.
+        frozen: Whether its camera sends no new frame.
+        jpeg: Frame to send each time; None for frames that encode their number.
+        held_by: Name of another client in control; "" for none.
+        absent: Names of the features of the state without a measurement.
+        arm_by_itself: Whether its operator arms it as soon as a client takes control.
+        home_at_take: Whether it returns to its start when a client takes control.
+        heard: Messages of the clients.
     """
 
     actions: tuple[Feature, ...] = (STEERING, THROTTLE)
@@ -135,7 +135,7 @@ class Robot:
         """Move the robot to a place, m."""
         self._place = place
 
-    # Its life.
+    # Serving.
 
     @contextlib.contextmanager
     def running(self, folder: Path, port: int = 0) -> Iterator[Robot]:

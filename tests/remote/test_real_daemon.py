@@ -66,11 +66,11 @@ class Served:
 
     @property
     def known(self) -> KnownRobot:
-        """What a workstation remembers of it."""
+        """The robot as a known robot."""
         return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
 
     def sense(self, **quantities: float) -> None:
-        """Let the guard say what it senses."""
+        """Let the guard report sensor values."""
         sensed = SENSED | quantities
         state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
         self._loop.call_soon_threadsafe(lambda: self.running.guard.say(**state))

@@ -104,7 +104,7 @@ def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) ->
 
 
 def _cut(env: gym.Env[Any, Any]) -> str:
-    """Step until the episode is cut off; why."""
+    """Step until the episode is truncated, and return the reason."""
     for _ in range(100):
         _, _, _, truncated, info = env.step(AHEAD)
         if truncated:

@@ -19,7 +19,7 @@ from shapechanger.teleop import (
 
 @pytest.mark.parametrize(("key", "meaning"), DIRECTIONS.items())
 def test_each_direction_moves_its_action(key: str, meaning: tuple[str, float]) -> None:
-    """W is forward, A is left, and the arrows say the same."""
+    """W is forward, A is left, and the arrows mean the same."""
     keys = HeldKeys()
     assert keys.press(key, 0.0)
     action, value = meaning
@@ -35,7 +35,7 @@ def test_a_press_ends_by_itself() -> None:
     assert keys.value("throttle", 10.0 + FIRST_HOLD_S + 1e-6) == 0.0
 
 
-def test_a_held_key_runs_on_and_stops_soon_after_its_last_repeat() -> None:
+def test_a_held_key_lasts_until_shortly_after_its_last_repeat() -> None:
     """The hold is long only until the terminal begins to repeat."""
     keys = HeldKeys()
     for n in range(20):
@@ -46,15 +46,15 @@ def test_a_held_key_runs_on_and_stops_soon_after_its_last_repeat() -> None:
 
 
 def test_the_opposite_key_takes_over_at_once() -> None:
-    """Who presses S while W still holds wants to go back."""
+    """S replaces a W that is still held."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("s", 0.1)
     assert keys.value("throttle", 0.1) == -1.0
 
 
-def test_other_keys_move_nothing_and_letting_go_ends_all() -> None:
-    """A slip of the finger is no command."""
+def test_other_keys_move_nothing_and_letting_go_releases_all() -> None:
+    """Only direction keys count."""
     keys = HeldKeys()
     assert not keys.press("x", 0.0)
     keys.press("a", 0.0)
@@ -68,15 +68,17 @@ def test_terminals_spell_arrows_in_two_ways() -> None:
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A pipe has no keys."""
+    """The standard input may be a pipe."""
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(NoTerminal, match="needs a terminal"):
             Terminal()
 
 
-def test_keys_come_singly_and_the_terminal_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody waits for Enter, and the shell afterwards echoes again."""
+def test_keys_arrive_without_enter_and_the_terminal_is_restored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Line editing and echo are off only within the block."""
     import termios
 
     ours, theirs = pty.openpty()
@@ -103,7 +105,7 @@ def test_a_held_key_goes_on_a_little_when_another_one_is_pressed() -> None:
 
 
 def test_no_key_outlives_its_last_press_because_another_one_is_held() -> None:
-    """Whoever lets W go and holds A stands after the time that one press of W holds."""
+    """After W is let go, holding A does not extend it beyond the hold of one press."""
     keys = HeldKeys()
     for n in range(30):
         keys.press("w", 0.03 * n)
@@ -114,7 +116,7 @@ def test_no_key_outlives_its_last_press_because_another_one_is_held() -> None:
 
 
 def test_a_key_that_has_ended_is_not_brought_back_by_another_one() -> None:
-    """Steering alone drives nowhere."""
+    """An expired key stays expired."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("w", 0.5)

@@ -465,13 +465,13 @@ class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     id: _Episode
-    steps: int
-    kept: int
-    seconds: float
-    closed: bool
-    created: str
-    driver: str
-    outcome: str
+    steps: int = 0
+    kept: int = 0
+    seconds: float = 0.0
+    closed: bool = False
+    created: str = ""
+    driver: str = ""
+    outcome: str = ""
 
 
 class Recordings(_Message, frozen=True):

@@ -8,7 +8,7 @@ import socket
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from shapechanger.errors import LinkError, MissingExtra, RobotRefused
 from shapechanger.link import messages
@@ -33,6 +33,7 @@ _CHECK_EVERY: Final = 0.1
 _CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=_CLOSE_S)  # pyright: ignore[reportCallIssue]
 
 _Handler = Callable[[RobotMessage], None]
+_M = TypeVar("_M", Challenge, Welcome)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +64,24 @@ class Access:
 class RobotConnection:
     """Open connection to a robot, made by `open_connection`.
 
+    Args:
+        websocket: The WebSocket.
+        welcome: Description of the robot.
+        access: Settings of the connection.
+
     Attributes:
         welcome: Description of the robot.
     """
 
     def __init__(
-        self, line: aiohttp.ClientWebSocketResponse, welcome: Welcome, access: Access
+        self, websocket: aiohttp.ClientWebSocketResponse, welcome: Welcome, access: Access
     ) -> None:
         self.welcome = welcome
-        self._line = line
+        self._websocket = websocket
         self._access = access
         self._received_at = asyncio.get_running_loop().time()
         self._pending: list[ClientMessage] = []
-        self._something = asyncio.Event()
+        self._posted = asyncio.Event()
 
     def post(self, message: ClientMessage) -> None:
         """Queue a message, in place of one of the same type that still waits.
@@ -84,7 +90,7 @@ class RobotConnection:
         """
         self._pending = [m for m in self._pending if type(m) is not type(message)]
         self._pending.append(message)
-        self._something.set()
+        self._posted.set()
 
     async def run(self, handle: _Handler, stop: asyncio.Event) -> None:
         """Receive and send until `stop` is set.
@@ -111,21 +117,21 @@ class RobotConnection:
     async def _receive(self, handle: _Handler) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            message = await _receive(self._line)
+            message = await _receive(self._websocket)
             self._received_at = loop.time()
             handle(message)
 
     async def _send(self) -> None:
         while True:
-            await self._something.wait()
-            self._something.clear()
+            await self._posted.wait()
+            self._posted.clear()
             await self._send_pending()
 
     async def _send_pending(self) -> None:
         while self._pending:
             message = self._pending.pop(0)
             try:
-                await self._line.send_bytes(messages.encode(message))
+                await self._websocket.send_bytes(messages.encode(message))
             except (ConnectionError, aiohttp.ClientError) as error:
                 raise _lost(str(error) or "the connection broke") from None
 
@@ -144,7 +150,7 @@ class RobotConnection:
         try:
             async with asyncio.timeout(_CLOSE_S):
                 await self._send_pending()
-                await self._line.close()
+                await self._websocket.close()
         except (LinkError, TimeoutError):
             return  # The robot notices the end of the connection anyway.
 
@@ -158,7 +164,7 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
         LinkError: If no robot answers, or one with another version of the link.
     """
     expected = access.fingerprint
-    line: aiohttp.ClientWebSocketResponse | None = None
+    websocket: aiohttp.ClientWebSocketResponse | None = None
     sockets: list[socket.socket] = []
 
     def made(address: tuple[Any, ...]) -> socket.socket:
@@ -171,14 +177,14 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
     session = aiohttp.ClientSession(connector=connector, connector_owner=False)
     try:
         async with asyncio.timeout(access.timeout_s) as limit:
-            line = await session.ws_connect(
+            websocket = await session.ws_connect(
                 f"{'wss' if expected else 'ws'}://{access.address}{PATH}",
                 max_msg_size=messages.MAX_ROBOT_MESSAGE,
                 timeout=_CLOSING,
             )
-            welcome = await _welcomed(line, access)
+            welcome = await _welcomed(websocket, access)
             limit.reschedule(None)
-            yield RobotConnection(line, welcome, access)
+            yield RobotConnection(websocket, welcome, access)
     # Callers see one error of ours, without a chain of library errors.
     except TimeoutError:
         raise LinkError(
@@ -208,14 +214,14 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
         for each in sockets:
             with contextlib.suppress(OSError):  # It was never connected, or has ended already.
                 each.shutdown(socket.SHUT_RDWR)
-        if line is not None:
-            await line.close()
+        if websocket is not None:
+            await websocket.close()
         await session.close()
         await connector.close(abort_ssl=True)
-        await _let_go(sockets)
+        await _wait_until_closed(sockets)
 
 
-async def _let_go(sockets: list[socket.socket]) -> None:
+async def _wait_until_closed(sockets: list[socket.socket]) -> None:
     """Wait until the loop has noticed the end of the sockets, which would stay open otherwise."""
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(_CLOSE_S):
@@ -223,18 +229,13 @@ async def _let_go(sockets: list[socket.socket]) -> None:
                 await asyncio.sleep(0)
 
 
-async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:
-    challenge = await _receive(line)
-    if isinstance(challenge, messages.Refused):
-        raise RobotRefused(challenge.reason)
-    if not isinstance(challenge, Challenge):
-        raise LinkError(f"Expected a Challenge from the robot, got {type(challenge).__name__}.")
+async def _welcomed(websocket: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:
+    challenge = await _expect(websocket, Challenge)
     if challenge.version != messages.VERSION:
         older = "robot" if challenge.version < messages.VERSION else "workstation"
         raise LinkError(
             f"The robot uses version {challenge.version} of the link, this workstation "
-            f"{messages.VERSION}: "
-            f"update Shapechanger on the {older}."
+            f"{messages.VERSION}: update Shapechanger on the {older}."
         )
     hello = Hello(
         version=messages.VERSION,
@@ -244,22 +245,32 @@ async def _welcomed(line: aiohttp.ClientWebSocketResponse, access: Access) -> We
         pace=access.pace,
         frames=access.frames,
     )
-    await line.send_bytes(messages.encode(hello))
-    answer = await _receive(line)
-    if isinstance(answer, messages.Refused):
-        raise RobotRefused(answer.reason)
-    if not isinstance(answer, Welcome):
-        raise LinkError(f"Expected a Welcome from the robot, got {type(answer).__name__}.")
-    return answer
+    await websocket.send_bytes(messages.encode(hello))
+    return await _expect(websocket, Welcome)
 
 
-async def _receive(line: aiohttp.ClientWebSocketResponse) -> RobotMessage:
+async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
+    """Receive a message of one type.
+
+    Raises:
+        RobotRefused: If the robot refuses.
+        LinkError: If the connection ended, or another message arrives.
+    """
+    message = await _receive(websocket)
+    if isinstance(message, messages.Refused):
+        raise RobotRefused(message.reason)
+    if not isinstance(message, kind):
+        raise LinkError(f"Expected a {kind.__name__} from the robot, got {type(message).__name__}.")
+    return message
+
+
+async def _receive(websocket: aiohttp.ClientWebSocketResponse) -> RobotMessage:
     """Receive the next message.
 
     Raises:
         LinkError: If the connection ended, or the message is invalid.
     """
-    received = await line.receive()
+    received = await websocket.receive()
     if received.type is aiohttp.WSMsgType.BINARY:
         return messages.decode_robot_message(received.data)
     if received.type is aiohttp.WSMsgType.TEXT:

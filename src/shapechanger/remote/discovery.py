@@ -35,18 +35,11 @@ class FoundRobot:
 
 
 class _Collector(ServiceListener):
-    """Listener that resolves each service."""
+    """Listener that resolves each service, in the one thread of its browser."""
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_ms = int(timeout_s * 1e3)
-        self._lock = threading.Lock()
-        self._found: dict[str, FoundRobot] = {}
-
-    @property
-    def found(self) -> list[FoundRobot]:
-        """The robots found so far, by name."""
-        with self._lock:
-            return sorted(self._found.values(), key=lambda robot: (robot.name, str(robot.address)))
+        self.found: dict[str, FoundRobot] = {}
 
     def add_service(self, zc: Zeroconf, type_: str, name: str) -> None:
         """Add a robot."""
@@ -58,15 +51,13 @@ class _Collector(ServiceListener):
             key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
             for key, value in info.properties.items()
         }
-        robot = FoundRobot(
+        self.found[name] = FoundRobot(
             name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
             body=properties.get("body", ""),
             address=Address(addresses[0], info.port),
             fingerprint=properties.get("fp", ""),
             version=properties.get("v", ""),
         )
-        with self._lock:
-            self._found[name] = robot
 
     def update_service(self, zc: Zeroconf, type_: str, name: str) -> None:
         """Update a robot."""
@@ -74,8 +65,7 @@ class _Collector(ServiceListener):
 
     def remove_service(self, zc: Zeroconf, type_: str, name: str) -> None:
         """Remove a robot."""
-        with self._lock:
-            self._found.pop(name, None)
+        self.found.pop(name, None)
 
 
 def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
@@ -92,8 +82,8 @@ def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
     try:
         browser = ServiceBrowser(own, SERVICE, listener)
         threading.Event().wait(timeout_s)
-        browser.cancel()
-        return listener.found
+        browser.cancel()  # It waits for the browser's thread.
+        return sorted(listener.found.values(), key=lambda found: (found.name, str(found.address)))
     finally:
         if zeroconf is None:
             own.close()

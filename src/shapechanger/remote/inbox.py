@@ -1,15 +1,20 @@
-"""Messages of a robot on their way from the receiving thread to the calling threads."""
+"""Messages of a robot on their way from the connection's thread to the calling threads."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass, field
-from typing import Any
+from collections import deque
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
 
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
-from shapechanger.link.messages import Observation, Refused, RobotMessage
+from shapechanger.link.messages import Event, Observation, RecorderState, Refused, RobotMessage
+
+_Answer = TypeVar("_Answer", bound=RobotMessage)
+
+_MAX_EVENTS: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,51 +32,100 @@ class Received:
     jpeg: bytes | None
 
 
-class Inbox:
-    """Newest observation, in one slot, so that a slow reader never gets an old one.
+@dataclass(eq=False)
+class Request(Generic[_Answer]):
+    """A call that waits for an answer.
 
-    A robot sends each frame once, so an observation that replaces an unread one takes over its
-    frame.
+    Attributes:
+        kind: Type of the answer.
+        accepts: Returns True if a message of that type is the answer.
+        answer: The answer; None until it arrives.
+        refusal: Reason of a refusal in place of the answer; None without one.
+    """
+
+    kind: type[_Answer]
+    accepts: Callable[[_Answer], bool] = lambda _: True
+    answer: _Answer | None = None
+    refusal: str | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """True until the robot has answered or refused."""
+        return self.answer is None and self.refusal is None
+
+    def offer(self, message: RobotMessage) -> bool:
+        """Take a message if it is the answer; a refusal answers any open request."""
+        if not self.is_open:
+            return False
+        if isinstance(message, Refused):
+            self.refusal = message.reason
+        elif isinstance(message, self.kind) and self.accepts(message):
+            self.answer = message
+        return not self.is_open
+
+
+class Inbox:
+    """What a robot has sent, for any number of calling threads.
+
+    The newest observation is in one slot, so that a slow reader never gets an old one. A robot
+    sends each frame once, so an observation that replaces an unread one takes over its frame.
 
     Args:
         clock: Monotonic clock, s.
+
+    Attributes:
+        newest: The newest observation of any age; None before the first.
+        recorder: Last reported state of the robot's recorder, or None.
+        failure: Why the link is lost; None while it is up.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
+        self.newest: Received | None = None
+        self.recorder: RecorderState | None = None
+        self.failure: LinkError | None = None
         self._clock = clock
         self._changed = threading.Condition()
-        self._newest: Received | None = None
-        self._failure: LinkError | None = None
+        self._events: deque[Event] = deque(maxlen=_MAX_EVENTS)
+        self._refusals: dict[int, str] = {}
+        self._requests: list[Request[Any]] = []
 
-    @property
-    def newest(self) -> Received | None:
-        """The newest observation of any age; None before the first."""
-        with self._changed:
-            return self._newest
-
-    def put(self, message: Observation) -> None:
-        """Store an observation that has just arrived.
+    def put(self, message: RobotMessage) -> None:
+        """Store a message that has just arrived.
 
         Raises:
-            LinkError: If it is not newer than the one before, as in a replay.
+            RobotRefused: If the robot ends the connection.
+            LinkError: If an observation is not newer than the one before, as in a replay.
         """
         with self._changed:
-            last = self._newest
-            if last is not None and message.seq <= last.message.seq:
-                raise LinkError(
-                    f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
-                )
-            jpeg = message.frame
-            if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:
-                jpeg = last.jpeg
-            self._newest = Received(message, self._clock(), jpeg)
+            match message:
+                case Observation():
+                    self._observe(message)
+                case Event():
+                    self._events.append(message)
+                case Refused(fatal=True):
+                    raise RobotRefused(message.reason)
+                case Refused(seq=int(seq)):
+                    self._refusals = {seq: message.reason}
+                case _:
+                    if isinstance(message, RecorderState):
+                        self.recorder = message
+                    any(request.offer(message) for request in self._requests)  # The oldest one.
             self._changed.notify_all()
 
     def fail(self, failure: LinkError) -> None:
         """End all waits with an error; the first one counts."""
         with self._changed:
-            self._failure = self._failure or failure
+            self.failure = self.failure or failure
             self._changed.notify_all()
+
+    def check(self) -> None:
+        """Do nothing while the link is up.
+
+        Raises:
+            LinkError: If it is lost, without the traceback of the connection's thread.
+        """
+        if self.failure is not None:
+            raise type(self.failure)(*self.failure.args)
 
     def wait(self, newer_than: int, timeout_s: float) -> Received | None:
         """Wait for an observation. Return None after the time limit.
@@ -83,11 +137,15 @@ class Inbox:
         Raises:
             LinkError: If the link is lost.
         """
+
+        def found() -> Received | None:
+            newest = self.newest
+            return newest if newest is not None and newest.message.seq > newer_than else None
+
         with self._changed:
-            self._changed.wait_for(lambda: self._failure or self._is_newer(newer_than), timeout_s)
-            if self._failure is not None:
-                raise type(self._failure)(*self._failure.args)
-            return self._newest if self._is_newer(newer_than) else None
+            self._changed.wait_for(lambda: self.failure or found(), timeout_s)
+            self.check()
+            return found()
 
     def take(self, newer_than: int, timeout_s: float) -> Received:
         """Wait for an observation as `wait` does, and raise an error after the time limit.
@@ -109,66 +167,56 @@ class Inbox:
             f"The robot sent no new observation within {timeout_s:.2f} s ({age})."
         )
 
-    def _is_newer(self, newer_than: int) -> bool:
-        return self._newest is not None and self._newest.message.seq > newer_than
+    @contextmanager
+    def expecting(self, request: Request[_Answer]) -> Generator[None]:
+        """Offer the messages that arrive within the block to a request, after older requests."""
+        with self._changed:
+            self._requests.append(request)
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._requests.remove(request)
 
+    def answer(self, request: Request[_Answer], timeout_s: float | None = None) -> _Answer:
+        """Wait for the answer to a request.
 
-@dataclass(eq=False)
-class Request:
-    """A call that waits for an answer.
+        Args:
+            request: The request, which must be expected.
+            timeout_s: Time limit, s; None for that of the link.
 
-    Attributes:
-        kind: Type of the answer.
-        answer: Receives the answer.
-        accepts: Returns True if a message of that type is the answer.
-    """
+        Raises:
+            RobotRefused: If the robot refuses.
+            TimeoutError: If there is no answer in time.
+            LinkError: If the link is lost.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self.failure or not request.is_open, timeout_s)
+        if request.refusal is not None:
+            raise RobotRefused(request.refusal)
+        if request.answer is None:
+            self.check()
+            raise TimeoutError
+        return request.answer
 
-    kind: type[RobotMessage]
-    answer: Future[Any] = field(default_factory=Future[Any])
-    accepts: Callable[[Any], bool] = lambda _: True
+    def events(self) -> list[Event]:
+        """Return the events since the last call, oldest first, at most 256."""
+        with self._changed:
+            events = list(self._events)
+            self._events.clear()
+        return events
 
+    def refusal(self, seq: int) -> str:
+        """Return the reason why the robot refused a command, or "" if it has not."""
+        return self._refusals.get(seq, "")
 
-class Requests:
-    """Calls that wait for an answer, oldest first."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._open: list[Request] = []
-
-    def add(self, request: Request) -> None:
-        """Wait for the answer to a request."""
-        with self._lock:
-            self._open.append(request)
-
-    def remove(self, request: Request) -> None:
-        """Wait no longer for the answer to a request."""
-        with self._lock:
-            if request in self._open:
-                self._open.remove(request)
-
-    def answer(self, message: RobotMessage) -> None:
-        """Give a message to the first call that waits for it; a refusal answers any call."""
-        refused = isinstance(message, Refused)
-        with self._lock:
-            request = next(
-                (
-                    r
-                    for r in self._open
-                    if refused or (isinstance(message, r.kind) and r.accepts(message))
-                ),
-                None,
+    def _observe(self, message: Observation) -> None:
+        last = self.newest
+        if last is not None and message.seq <= last.message.seq:
+            raise LinkError(
+                f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
             )
-            if request is None:
-                return
-            self._open.remove(request)
-        if isinstance(message, Refused):
-            request.answer.set_exception(RobotRefused(message.reason))
-        else:
-            request.answer.set_result(message)
-
-    def fail(self, failure: LinkError) -> None:
-        """End all calls with an error."""
-        with self._lock:
-            requests, self._open = self._open, []
-        for request in requests:
-            request.answer.set_exception(failure)
+        jpeg = message.frame
+        if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:
+            jpeg = last.jpeg
+        self.newest = Received(message, self._clock(), jpeg)

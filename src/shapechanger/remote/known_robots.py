@@ -158,23 +158,6 @@ def parse_trust(fingerprint: str) -> bytes | None:
     return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
 
 
-def _shown_fingerprint(address: Address, timeout_s: float) -> bytes:
-    """Return the SHA-256 of the certificate that a server shows, without trusting it.
-
-    Args:
-        address: Address of the server.
-        timeout_s: Time limit, s.
-
-    Raises:
-        LinkError: If no server shows a certificate.
-    """
-    try:
-        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
-    except OSError as error:
-        raise LinkError(f"No server shows a certificate at {address}: {error}.") from None
-    return fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
-
-
 def untrusted(address: Address, timeout_s: float) -> LinkError:
     """Return the error for a connection without a fingerprint, which shows the one to compare.
 
@@ -185,11 +168,15 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
     Raises:
         LinkError: If no server shows a certificate.
     """
-    shown = _shown_fingerprint(address, timeout_s)
-    digits = fingerprint_hex(shown)
+    try:
+        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
+    except OSError as error:
+        raise LinkError(f"No server shows a certificate at {address}: {error}.") from None
+    fingerprint = fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
+    digits = fingerprint_hex(fingerprint)
     return LinkError(
         f"The robot at {address} is not trusted yet. Its fingerprint is\n"
-        f"  {digits}  (in short {fingerprint_short(shown)})\n"
+        f"  {digits}  (in short {fingerprint_short(fingerprint)})\n"
         "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
         f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
     )

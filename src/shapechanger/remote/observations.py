@@ -105,6 +105,8 @@ class RobotSpaces:
         action_space: One number for each action of the robot.
         observation_layout: Layout of an observation; a picture is one block.
         observation_space: Space of the picture, the state, or both.
+        has_image: Whether observations have a picture.
+        picture: The newest picture at the camera's size; None before the first.
 
     Raises:
         RobotRefused: If a picture is required and the robot has no camera.
@@ -124,8 +126,8 @@ class RobotSpaces:
                 f"A picture must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
             )
         self._size = size
-        self._has_image = has_camera if image is None else image
-        self._has_state = state or not self._has_image
+        self.has_image = has_camera if image is None else image
+        self._has_state = state or not self.has_image
         self._state_layout = Layout.from_json(welcome.state_layout)
         self._places: dict[str, int] = {
             name: place.start for name, place in self._state_layout.slices.items()
@@ -136,20 +138,10 @@ class RobotSpaces:
         )
         self.observation_layout = self._layout()
         self.observation_space = self._space()
-        self._picture: NDArray[np.uint8] | None = None
+        self.picture: NDArray[np.uint8] | None = None
         self._tried_seq = 0
         self._picture_seq = 0
         self._viewed_seq = 0
-
-    @property
-    def has_image(self) -> bool:
-        """True if observations have a picture."""
-        return self._has_image
-
-    @property
-    def picture(self) -> NDArray[np.uint8] | None:
-        """The newest picture at the camera's size; None before the first."""
-        return self._picture
 
     def values(self, action: Any) -> tuple[float, ...]:
         """Return the values of a command, clipped to the range of the action.
@@ -207,7 +199,7 @@ class RobotSpaces:
         if seq != self._tried_seq:  # An invalid frame is tried once, too.
             self._tried_seq = seq
             try:
-                self._picture = decode_picture(received.jpeg)
+                self.picture = decode_picture(received.jpeg)
             except LinkError:
                 return False
             self._picture_seq = seq
@@ -230,14 +222,14 @@ class RobotSpaces:
                 f"{len(message.state)}."
             )
         state, absent = self._state(message)
-        if not self._has_image:
+        if not self.has_image:
             return View(state, True, absent)
         self.shows(received)
-        if self._picture is None:
+        if self.picture is None:
             raise LinkError("The robot has sent no picture yet.")
         fresh, self._viewed_seq = self._picture_seq != self._viewed_seq, self._picture_seq
-        image = resize_picture(self._picture, self._size)
-        image = image.copy() if image is self._picture else image
+        image = resize_picture(self.picture, self._size)
+        image = image.copy() if image is self.picture else image
         seen = {"image": image, "state": state} if self._has_state else image
         return View(seen, fresh, absent)
 
@@ -256,7 +248,7 @@ class RobotSpaces:
 
     def _layout(self) -> Layout:
         features: list[Feature] = []
-        if self._has_image:
+        if self.has_image:
             shape = (self._size[1], self._size[0], 3)
             camera = Element("camera", "camera")
             features.append(Feature(IMAGE, "1", 0.0, _BRIGHTEST, camera, shape))
@@ -269,7 +261,7 @@ class RobotSpaces:
             bound.astype(np.float32) for bound in (self._state_layout.low, self._state_layout.high)
         )
         state = gym.spaces.Box(low, high)
-        if not self._has_image:
+        if not self.has_image:
             return state
         image = gym.spaces.Box(0, _BRIGHTEST, (self._size[1], self._size[0], 3), np.uint8)
         return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image

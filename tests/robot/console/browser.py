@@ -31,24 +31,25 @@ _RECENT: Final = 1_000_000
 
 _PRESSES: Final = 6
 _PRESSED_S: Final = 10.0
-# What Chromium says of an answer or a connection that a test itself brought about.
-_BROUGHT_ABOUT: Final = ("net::ERR_", "WebSocket connection to")
+# Errors that Chromium logs for failures that a test provokes.
+_PROVOKED: Final = ("net::ERR_", "WebSocket connection to")
 
 
 class Console:
     """A page in a browser of its own.
 
     Args:
-        browser: Where.
-        robot: Whose page.
-        key: What is put into the address; the robot's own if not given, "" for nothing.
-        script: What runs before the page's own scripts.
-        options: Of the browser's context, such as `PHONE`.
+        browser: The browser.
+        robot: The robot that serves the page.
+        key: Key in the address; None for that of the robot, "" for none.
+        script: Script to run before those of the page.
+        address: Address of the page; "" for that of the robot.
+        options: Options of the browser's context, such as `PHONE`.
 
     Attributes:
         page: The page.
-        complaints: Errors of its scripts and of the browser, such as a breach of the policy.
-        asked: The addresses that it asked for.
+        errors: Errors of its scripts and of the browser, such as a breach of the policy.
+        requested: The addresses that it requested.
     """
 
     def __init__(
@@ -64,11 +65,11 @@ class Console:
         self._context = browser.new_context(ignore_https_errors=True, **(DESK | options))
         self._context.set_default_timeout(60_000)
         self.page: Page = self._context.new_page()
-        self.complaints: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.errors: list[str] = []
+        self.requested: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda said: self._hear(said.type, said.text))
-        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("request", lambda request: self.requested.append(request.url))
         if script:
             self.page.add_init_script(script)
         self._robot = robot
@@ -77,28 +78,28 @@ class Console:
         self.page.goto(self.address + (f"#key={key}" if key else ""))
 
     def __enter__(self) -> Self:
-        """The page itself."""
+        """The console itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """Close the page."""
         self._context.close()
 
     def _hear(self, kind: str, text: str) -> None:
-        if kind == "error" and not any(words in text for words in _BROUGHT_ABOUT):
-            self.complaints.append(text)
+        if kind == "error" and not any(words in text for words in _PROVOKED):
+            self.errors.append(text)
 
     def await_state(self, seconds: float = 60.0, /, **state: str) -> None:
-        """Wait until the page says so, such as `robot="armed"`."""
+        """Wait until the page is in a state, such as `robot="armed"`."""
         wanted = "".join(f"[data-{name}='{value}']" for name, value in state.items())
         self.page.locator(f"body{wanted}").wait_for(timeout=1000 * seconds)
 
     def arm(self) -> None:
-        """Arm the robot, as who drives it.
+        """Arm the robot as its driver.
 
-        On a busy machine the robot's answer may come too late, and the page wants the key again.
+        On a busy machine the robot's answer may come too late, and E must be pressed again.
         """
-        self.await_state(link="open", view="cockpit")
+        self.await_state(link="open", view="drive")
         self.page.locator("body[data-robot='disarmed'], body[data-robot='emergency']").wait_for()
         for _ in range(_PRESSES):
             self.page.keyboard.press("e")
@@ -108,9 +109,10 @@ class Console:
         raise AssertionError("The robot was not armed, though E was pressed.")
 
     def drive(self, key: str, pins: Pins, way: float = 0.0) -> None:
-        """Hold a key until the robot was propelled, this way if one is given.
+        """Hold a key until the robot was propelled, in a direction (the sign of `way`) or in any.
 
-        On a busy machine the page may hear nothing for so long that it wants a key pressed anew.
+        On a busy machine the page may receive nothing for so long that the key must be pressed
+        again.
         """
         pins.forget()
         for _ in range(_PRESSES):
@@ -120,13 +122,13 @@ class Console:
             except AssertionError:
                 self.page.keyboard.up(key)
                 with self._robot.operator() as operator:
-                    operator.place(0)  # In twin time it may have come to a wall by now.
+                    operator.place(0)  # In twin time it may have reached a wall by now.
             else:
                 return
         raise AssertionError(f"Nothing moved, though {key} was held: {self.state_of_robot()}")
 
     def state_of_robot(self) -> str:
-        """What the robot itself says, for whoever wonders why it does not do as it is told."""
+        """Return the state of the robot and the log of the page, for error messages."""
         with self._robot.client(frames=False) as observer:
             seen = observer.ask().message
         log = self.page.locator("#log").inner_text().splitlines()
@@ -137,16 +139,16 @@ class Console:
         )
 
     def stop(self) -> None:
-        """Stop the robot, and see that it did."""
+        """Stop the robot, and wait until it has."""
         self.page.keyboard.press("Space")
         self.await_state(robot="emergency")
 
     def await_words(self, where: str, words: str) -> None:
-        """Wait until an element says something."""
+        """Wait until an element has a text."""
         self.page.locator(where, has_text=words).first.wait_for(timeout=60_000)
 
     def pixels(self) -> list[int]:
-        """What the canvas shows."""
+        """Return the pixels of the canvas."""
         return self.page.evaluate(
             "() => { const c = document.getElementById('picture');"
             " return Array.from(c.getContext('2d').getImageData(0, 0, c.width, c.height).data); }"
@@ -154,10 +156,10 @@ class Console:
 
 
 class Pins:
-    """What the outputs of a robot's twin do, by its ledger alone.
+    """Outputs of a robot's twin, by its ledger alone.
 
-    Unlike `read_ledger` this reads each line once, and of those before it only the last: it looks
-    often, and the ledger of a robot that many tests share gets long.
+    Unlike `read_ledger` this reads each line once, because it is called often and the ledger of a
+    shared robot gets long.
     """
 
     def __init__(self, robot: RunningRobot) -> None:
@@ -172,34 +174,34 @@ class Pins:
         self.forget()
 
     def propels(self) -> float:
-        """How much what propels does now, -1 to 1; 0 for at rest."""
+        """Return the propelling output now, -1 to 1; 0 at rest."""
         self._look()
         return self._push()
 
     def forget(self) -> None:
-        """Count motion from here on."""
+        """Count motion from now on."""
         now = self.propels()
         self._pushes = [now] if now else []
 
     def await_motion(self, way: float = 0.0) -> None:
-        """Wait until the robot was propelled, this way if one is given."""
+        """Wait until the robot was propelled, in a direction (the sign of `way`) or in any."""
         until(lambda: self.moves(way), 60.0)
 
     def moves(self, way: float = 0.0) -> bool:
-        """Whether it was propelled since it was last found at rest, this way if one is given.
+        """Return True if it was propelled since it was last at rest, in a direction or in any.
 
-        A busy machine looks so seldom that a robot in twin time may be at a wall by then.
+        A busy machine reads so seldom that a robot in twin time may be at a wall by then.
         """
         self._look()
         return any(push * (way or push) > 0.0 for push in self._pushes)
 
     def await_rest(self) -> None:
-        """Wait until nothing propels it."""
+        """Wait until the propelling outputs are at rest."""
         until(lambda: self.propels() == 0.0, 60.0)
         self.forget()
 
     def last_rest_ns(self) -> float:
-        """When it last came to rest, or will by what is in the ledger; infinite for never."""
+        """Return the time of the last rest in the ledger, ns; minus infinity for none."""
         self._look()
         ledger = sorted(self._lines, key=lambda line: line.t)
         return max((i.end_ns for i in propelled(ledger, self._wiring)), default=-math.inf)
@@ -208,7 +210,7 @@ class Pins:
         with self._path.open("rb") as file:
             file.seek(self._read)
             if self._read and not self._lines:
-                self._read += len(file.readline())  # What is left of a line.
+                self._read += len(file.readline())  # The rest of a line.
             whole, newline, _ = file.read().rpartition(b"\n")
         self._read += len(whole) + len(newline)
         for line in whole.splitlines():
@@ -223,7 +225,7 @@ class Pins:
                 self._pushes.append(push)
 
     def _push(self) -> float:
-        """What the outputs do after the last line that was read."""
+        """Return the propelling output after the last line."""
         if not self._lines:
             return 0.0
         outputs = self._wiring.read(self._levels, self._lines[-1].t)

@@ -19,7 +19,7 @@ from tests.robots import CAR, IN_A_ROOM, write_profile
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Browser]:
-    """A browser without a screen; it ends with the module, and with it Playwright's event loop."""
+    """A headless browser, which ends with the module, as does Playwright's event loop."""
     path = shutil.which("chromium") or shutil.which("google-chrome")
     if path is None:
         missing("There is no Chromium")
@@ -33,7 +33,7 @@ def chromium() -> Iterator[Browser]:
 def served_car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
     """A car with a camera on its twin, for all tests of a module.
 
-    Its time goes by while a page looks, so that a busy machine changes nothing.
+    Its time advances with the page's observations, so that a busy machine changes nothing.
     """
     with _served(tmp_path_factory.mktemp("car"), "twin") as robot:
         yield robot
@@ -41,7 +41,7 @@ def served_car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobo
 
 @pytest.fixture
 def car(served_car: RunningRobot) -> RunningRobot:
-    """The same, put back to the start: at a wall it refuses to drive on, and rightly so.
+    """The same car at its start, because at a wall it would not drive.
 
     Tests leave it disarmed or stopped.
     """
@@ -52,7 +52,7 @@ def car(served_car: RunningRobot) -> RunningRobot:
 
 @pytest.fixture
 def hasty_car(tmp_path: Path) -> Iterator[RunningRobot]:
-    """The same in real time, which waits for no page."""
+    """The same in real time, which does not wait for a page."""
     with _served(tmp_path, "real") as robot:
         yield robot
 
@@ -64,7 +64,7 @@ def _served(folder: Path, clock: Literal["twin", "real"]) -> RunningRobot:
 
 @pytest.fixture
 def visit(chromium: Browser) -> Iterator[Callable[..., Console]]:
-    """Open the console of a robot; the page ends with the test, and must not have complained."""
+    """Open the console of a robot; the page is closed after the test, without errors."""
     with contextlib.ExitStack() as stack:
         opened: list[Console] = []
 
@@ -74,10 +74,10 @@ def visit(chromium: Browser) -> Iterator[Callable[..., Console]]:
             return console
 
         yield made
-        assert [said for console in opened for said in console.complaints] == []
+        assert [error for console in opened for error in console.errors] == []
 
 
 @pytest.fixture
 def recordings(car: RunningRobot) -> Path:
-    """Where the car keeps its recordings."""
+    """Folder of the car's recordings."""
     return car.folder / "recordings"

@@ -54,7 +54,7 @@ def _again(console: Console, *packed: bytes) -> list[str]:
 
 
 def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> None:
-    """Each width of integers, texts, bytes, arrays and maps, to the last nanosecond."""
+    """Integers, texts, bytes, arrays and maps of every width, exactly."""
     console = visit(car, key="")
     packed = [msgspec.msgpack.encode(value) for value in _VALUES if abs(_number(value)) < 2**64]
     for one, text in zip(packed, _again(console, *packed), strict=True):
@@ -106,7 +106,7 @@ def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> 
 
 
 def test_the_page_has_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """It would be refused otherwise."""
+    """Another version would be refused."""
     console = visit(car, key="")
     version = "async () => (await import('/console/link.js')).VERSION"
     assert console.page.evaluate(version) == m.VERSION

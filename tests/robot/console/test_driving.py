@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 Visit = Callable[..., Console]
 
-# ms that the guard may be late: one of its ticks, and what the one-shot of the enable line adds.
+# Delay of the guard, ms: one of its ticks, and the one-shot of the enable line.
 _SLACK_MS = 60.0
 _DEADLINE_MS = 250.0
 _MINUS = "\N{MINUS SIGN}"
@@ -23,13 +23,13 @@ _MINUS = "\N{MINUS SIGN}"
 
 @pytest.fixture(autouse=True)
 def _at_the_start(car: RunningRobot) -> None:
-    """There is room ahead."""
+    """Put the car where it has room ahead."""
     with car.operator() as operator:
         operator.place(0)
 
 
-def test_the_picture_moves(car: RunningRobot, visit: Visit) -> None:
-    """The canvas shows the camera's picture, and another one soon after."""
+def test_the_live_picture_changes(car: RunningRobot, visit: Visit) -> None:
+    """The canvas shows one frame of the camera after the other."""
     console = visit(car)
     console.await_state(picture="live")
     before = console.pixels()
@@ -39,7 +39,7 @@ def test_the_picture_moves(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit) -> None:
-    """In each direction, and at rest at once after key-up."""
+    """In both directions; they rest at once after key-up."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for key, way in (("s", -1.0), ("ArrowDown", -1.0), ("w", 1.0)):
@@ -50,7 +50,7 @@ def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit
     console.stop()
 
 
-def test_a_page_that_loses_the_focus_drives_no_more(car: RunningRobot, visit: Visit) -> None:
+def test_a_page_that_loses_the_focus_stops_driving(car: RunningRobot, visit: Visit) -> None:
     """Held keys must be pressed again."""
     console, pins = visit(car), Pins(car)
     console.arm()
@@ -65,7 +65,7 @@ def test_a_page_that_loses_the_focus_drives_no_more(car: RunningRobot, visit: Vi
 
 
 def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> None:
-    """Its person cannot see the robot."""
+    """The person cannot see the robot."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -84,7 +84,7 @@ def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> Non
 def test_closing_the_tab_stops_the_robot_within_the_deadline(
     hasty_car: RunningRobot, visit: Visit, how: str
 ) -> None:
-    """By the ledger, counted from the last command; for any end of the page."""
+    """In the ledger, counted from the last command, however the page ends."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -95,7 +95,7 @@ def test_closing_the_tab_stops_the_robot_within_the_deadline(
         elif how == "leave":
             console.page.goto("about:blank")
         else:
-            # The process of the page is gone without a word.
+            # The process of the page dies without a message.
             with pytest.raises(Error, match="crash"):
                 console.page.goto("chrome://crash")
 
@@ -122,12 +122,12 @@ def test_space_and_escape_stop_the_robot_with_any_focus(
     console.page.focus(focus)
     console.page.keyboard.press(key)
     pins.await_rest()
-    console.await_state(robot="emergency", view="cockpit", driver="me")
+    console.await_state(robot="emergency", view="drive", driver="me")
     console.page.keyboard.up("w")
 
 
 def test_the_stop_button_stops_when_it_is_pressed_down(car: RunningRobot, visit: Visit) -> None:
-    """Not only when it is let go; and the click that follows is no second stop."""
+    """Not only when it is let go; the click that follows is not a second stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -146,7 +146,7 @@ def test_the_stop_button_stops_when_it_is_pressed_down(car: RunningRobot, visit:
 
 
 def test_a_mouse_and_a_finger_drive_with_the_stick(car: RunningRobot, visit: Visit) -> None:
-    """It springs back, and a finger on it scrolls nothing."""
+    """It springs back, and a finger on it does not scroll the page."""
     pins = Pins(car)
     for how in ({}, PHONE):
         console = visit(car, **how)
@@ -185,7 +185,7 @@ navigator.getGamepads = () => [globalThis.pad];
 def test_a_gamepad_drives_once_its_sticks_have_been_at_rest(
     car: RunningRobot, visit: Visit
 ) -> None:
-    """A stick that is held while the robot is armed moves nothing; its B stops everything."""
+    """A stick that is held while the robot is armed moves nothing; B stops the robot."""
     console, pins = visit(car, script=_PAD), Pins(car)
     console.await_state(link="open")
     console.page.evaluate("pad.axes[1] = 1")
@@ -204,7 +204,7 @@ def test_a_gamepad_drives_once_its_sticks_have_been_at_rest(
 
 
 def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
-    """How it is held at first is the middle; tilted away it drives forward, and back it rests."""
+    """Relative to how it is held at first: tilted away it drives forward."""
     console, pins = visit(car, **PHONE), Pins(car)
     console.arm()
     browser = console.page.context.new_cdp_session(console.page)
@@ -230,8 +230,8 @@ def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
     console.stop()
 
 
-def test_the_cap_limits_what_is_commanded(car: RunningRobot, visit: Visit) -> None:
-    """The robot shows the command times the cap; keys change it."""
+def test_the_cap_scales_commands(car: RunningRobot, visit: Visit) -> None:
+    """The robot reports the command times the cap; keys change the cap."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for _ in range(3):

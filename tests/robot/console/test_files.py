@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.console.files import ENTRY, console_files
+from shapechanger.robot.console import ENTRY, console_files
 
 
 def test_the_page_names_only_files_that_are_there() -> None:
     """Scripts, styles and what they import."""
     files = console_files()
-    for name, file in files.items():
-        text = file.body.decode()
+    for name, (_, body) in files.items():
+        text = body.decode()
         named = re.findall(r'(?:src|href)="([^"]+)"|from "([^"]+)"', text)
         for path in (one or other for one, other in named):
             assert path.startswith(("/console/", "./")), (name, path)
@@ -23,9 +23,9 @@ def test_the_page_names_only_files_that_are_there() -> None:
 
 
 def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
-    """The policy would forbid it in the browser; here it is seen without one."""
-    for name, file in console_files().items():
-        text = file.body.decode()
+    """The policy would forbid it in a browser; this needs none."""
+    for name, (_, body) in console_files().items():
+        text = body.decode()
         outside = set(re.findall(r"https?://[^\s\"'`)]+", text))
         assert outside <= {"http://127.0.0.1.", "http://www.w3.org/2000/svg"}, name
         if name == ENTRY:
@@ -34,8 +34,8 @@ def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
             assert "<style" not in text
 
 
-def test_a_page_that_is_not_there_is_said_in_words(tmp_path: Path) -> None:
-    """As after an installation that went wrong."""
+def test_a_missing_page_is_an_error(tmp_path: Path) -> None:
+    """As after a failed installation."""
     with pytest.raises(RobotError, match=r"has no index.html"):
         console_files(tmp_path)
     with pytest.raises(RobotError, match="Cannot read"):

@@ -21,14 +21,14 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 Visit = Callable[..., Console]
 
 
-def test_somebody_without_the_key_sees_the_form_and_the_name(
+def test_without_the_key_only_the_form_and_the_name_are_shown(
     car: RunningRobot, visit: Visit
 ) -> None:
-    """And nothing else of the robot."""
+    """The robot reveals nothing else."""
     console = visit(car, key="")
     console.await_words("#robot", "test-car")
     assert console.page.locator("#key-form").is_visible()
-    assert console.page.locator("#cockpit").is_hidden()
+    assert console.page.locator("#drive").is_hidden()
     assert console.page.evaluate("document.title") == "test-car"
     trusting = ssl._create_unverified_context()
     url = f"{console.address}console/robot.json"
@@ -40,23 +40,23 @@ def test_somebody_without_the_key_sees_the_form_and_the_name(
 def test_the_key_leaves_the_address_at_once_and_is_kept_only_if_asked(
     car: RunningRobot, visit: Visit
 ) -> None:
-    """A picture of the screen, or the history, shows no key."""
+    """No screenshot and no history shows the key."""
     console = visit(car)
-    console.await_state(link="open", view="cockpit")
+    console.await_state(link="open", view="drive")
     assert console.page.url == console.address
     assert console.page.evaluate("sessionStorage.length + localStorage.length") == 0
     console.page.focus("#keep")
     console.page.keyboard.press("Enter")
     console.page.reload()
-    console.await_state(link="open", view="cockpit")
+    console.await_state(link="open", view="drive")
     console.page.click("#leave")
     console.page.reload()
     console.await_words("#connection", "Not connected.")
     assert console.page.locator("#key-form").is_visible()
 
 
-def test_a_wrong_key_says_what_is_wrong_and_loses_nothing(car: RunningRobot, visit: Visit) -> None:
-    """Neither what is no key at all, nor the key of another robot; then the right one is taken."""
+def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Visit) -> None:
+    """For text that is not a key, and the key of another robot; then the right one connects."""
     console = visit(car, key="ABCD-EFGH")
     trouble = "#key-trouble"
     console.await_words(trouble, "A key has 26 letters and digits, got 8.")
@@ -73,19 +73,19 @@ def test_a_wrong_key_says_what_is_wrong_and_loses_nothing(car: RunningRobot, vis
     console.await_words(trouble, "only the letters A to Z and the digits 2 to 7")
     console.page.fill("#key", car.known.key.replace("-", " ").lower())
     console.page.click("#enter")
-    console.await_state(link="open", view="cockpit")
+    console.await_state(link="open", view="drive")
 
 
-def test_the_page_asks_nobody_but_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """No outside resource, and nothing that the policy forbids (the page would complain)."""
+def test_the_page_requests_only_the_robot(car: RunningRobot, visit: Visit) -> None:
+    """No outside resource; a breach of the policy would be an error of the page."""
     console = visit(car)
     console.await_state(picture="live")
-    assert console.asked
-    assert all(url.startswith(console.address) for url in console.asked)
+    assert console.requested
+    assert all(url.startswith(console.address) for url in console.requested)
 
 
 def test_every_control_has_a_name_and_a_place(car: RunningRobot, visit: Visit) -> None:
-    """As a screen reader hears it; with landmarks, and STOP first in the order of the focus."""
+    """In the accessibility tree, with landmarks; STOP is first in the focus order."""
     console = visit(car)
     console.await_state(picture="live")
     session = console.page.context.new_cdp_session(console.page)
@@ -112,14 +112,14 @@ def test_every_control_has_a_name_and_a_place(car: RunningRobot, visit: Visit) -
 def test_nothing_overlaps_and_targets_are_large(
     car: RunningRobot, visit: Visit, size: dict[str, Any]
 ) -> None:
-    """At the sizes of a desk and of a phone; nothing is wider than the screen."""
+    """On a desktop and on a phone; nothing is wider than the screen."""
     console = visit(car, **size)
     console.await_state(picture="live")
     page = console.page
     width = size["viewport"]["width"]
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     boxes = page.evaluate(
-        """() => [...document.querySelectorAll('#cockpit button, #cockpit input, #picture, #pad')]
+        """() => [...document.querySelectorAll('#drive button, #drive input, #picture, #pad')]
           .filter((e) => e.checkVisibility())
           .map((e) => [e.id, ...Object.values(e.getBoundingClientRect().toJSON()).slice(0, 4)])"""
     )
@@ -127,7 +127,7 @@ def test_nothing_overlaps_and_targets_are_large(
     for name, _, _, w, h in boxes:
         assert (w >= 40 and h >= 32) or name == "", name
     if size is not PHONE_ON_ITS_SIDE and size is not DESK:
-        # What sticks to the edge of an upright phone lies over what is scrolled below it.
+        # Sticky elements of an upright phone cover what is scrolled below them.
         boxes = [box for box in boxes if box[0] not in ("stop", "arm", "hand")]
     for (one, x, y, w, h), (other, u, v, s, t) in itertools.combinations(boxes, 2):
         apart = x + w <= u + 1 or u + s <= x + 1 or y + h <= v + 1 or v + t <= y + 1
@@ -137,8 +137,8 @@ def test_nothing_overlaps_and_targets_are_large(
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_words_can_be_read(car: RunningRobot, visit: Visit, scheme: str) -> None:
-    """A contrast of 4.5 at least between each text and what is behind it (WCAG 2.2, 1.4.3)."""
+def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str) -> None:
+    """At least 4.5 between each text and its background (WCAG 2.2, 1.4.3)."""
     console = visit(car, color_scheme=scheme, reduced_motion="reduce")
     console.await_state(picture="live")
     poor = console.page.evaluate(
@@ -167,16 +167,16 @@ def test_words_can_be_read(car: RunningRobot, visit: Visit, scheme: str) -> None
     assert poor == []
 
 
-def test_less_motion_is_no_motion(car: RunningRobot, visit: Visit) -> None:
-    """Whoever asks for less sees nothing that moves by itself, besides the picture."""
+def test_reduced_motion_stops_all_animations(car: RunningRobot, visit: Visit) -> None:
+    """Only the picture moves."""
     console = visit(car, reduced_motion="reduce")
-    console.await_state(link="open", view="cockpit")
+    console.await_state(link="open", view="drive")
     console.page.evaluate("document.body.dataset.recording = 'true'")
     assert console.page.evaluate("document.getAnimations().length") == 0
 
 
-def test_a_part_that_does_not_come_is_asked_for_again(chromium: Browser, car: RunningRobot) -> None:
-    """By loading the page anew, with the key still in hand."""
+def test_a_file_that_fails_to_load_is_requested_again(chromium: Browser, car: RunningRobot) -> None:
+    """The page is reloaded, and still has the key."""
     context = chromium.new_context(ignore_https_errors=True)
     page = context.new_page()
     lost: list[str] = []
@@ -190,6 +190,6 @@ def test_a_part_that_does_not_come_is_asked_for_again(chromium: Browser, car: Ru
 
     page.route("**/codec.js", lose_once)
     page.goto(f"https://127.0.0.1:{car.port}/#key={car.known.key}")
-    page.locator("body[data-link='open'][data-view='cockpit']").wait_for()
+    page.locator("body[data-link='open'][data-view='drive']").wait_for()
     assert len(lost) == 1
     context.close()

@@ -33,14 +33,14 @@ _SHIPPED = Path(load.__file__).parent / "shipped"
 
 @pytest.fixture(autouse=True)
 def _at_the_start(car: RunningRobot) -> None:
-    """There is room ahead."""
+    """Put the car where it has room ahead."""
     with car.operator() as operator:
         operator.place(0)
 
 
 @contextlib.contextmanager
 def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
-    """A program that commands whenever it may; whether it drives now."""
+    """Run a program that commands whenever it has control; the event is set while it drives."""
     drives, ended = threading.Event(), threading.Event()
 
     def run() -> None:
@@ -67,7 +67,7 @@ def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
 
 
 def _is_given(client: RobotClient) -> bool:
-    """Whether a program may command: not until the robot heard that a page has left."""
+    """Return True once a program gets control, after the robot noticed that a page has left."""
     with contextlib.suppress(RobotRefused):
         client.take()
         return True
@@ -77,7 +77,7 @@ def _is_given(client: RobotClient) -> bool:
 def test_a_second_person_cannot_take_the_robot_from_the_first(
     car: RunningRobot, visit: Visit
 ) -> None:
-    """They are told who has it; but they can stop it."""
+    """The second one sees who has control, and can stop the robot."""
     first, second, pins = visit(car), visit(car), Pins(car)
     first.arm()
     second.await_state(link="open", driver="person")
@@ -93,7 +93,7 @@ def test_a_second_person_cannot_take_the_robot_from_the_first(
 
 
 def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit: Visit) -> None:
-    """At once, without arming again; what the program wants is seen, and it can have it back."""
+    """At once and without arming again; the page shows what the program suggests."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.page.keyboard.press("x")
@@ -114,10 +114,10 @@ def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit:
         console.stop()
 
 
-def test_a_slow_page_stops_its_robot_and_delays_nobody(
+def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
     hasty_car: RunningRobot, visit: Visit
 ) -> None:
-    """While its main thread hangs for two seconds, others are served; then nothing goes on."""
+    """Its main thread hangs for two seconds; afterwards held keys must be pressed again."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -135,7 +135,7 @@ def test_a_slow_page_stops_its_robot_and_delays_nobody(
         until(rests, 60.0)
         late_ms = (pins.last_rest_ns() - max(commands)) / 1e6
         assert late_ms <= _DEADLINE_MS + _SLACK_MS
-        # Whoever else looks gets as many observations as ever: some before the page comes back.
+        # Another client still gets observations, some before the page recovers.
         while seen < 10:
             observer.ask()
             seen += 1
@@ -148,10 +148,10 @@ def test_a_slow_page_stops_its_robot_and_delays_nobody(
     console.stop()
 
 
-def test_a_page_comes_back_after_a_restart_and_drives_nothing(
+def test_a_page_reconnects_after_a_restart_and_moves_nothing(
     chromium: Browser, tmp_path: Path
 ) -> None:
-    """It says so, tries again by itself, and waits to be armed."""
+    """It reports the loss, reconnects by itself, and waits to be armed."""
     with socket.create_server(("127.0.0.1", 0)) as found:
         port = found.getsockname()[1]
     arguments = (*IN_A_ROOM, "--port", str(port))
@@ -183,7 +183,7 @@ def test_a_page_comes_back_after_a_restart_and_drives_nothing(
 def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
     car: RunningRobot, visit: Visit, recordings: Path
 ) -> None:
-    """The steps are on the robot's disk, with pictures, and the page shows them again."""
+    """The steps and frames are on the robot's disk, and the page shows them again."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.page.keyboard.press("r")
@@ -227,7 +227,7 @@ def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
 
 
 def test_a_finger_is_driven_by_sliders_that_hold(chromium: Browser, tmp_path: Path) -> None:
-    """Seven tendons begin where they are, and each goes where its slider is put."""
+    """Each of the seven tendons starts where it is, and follows its slider."""
     (tmp_path / "finger.toml").write_text((_SHIPPED / "finger-pwm.toml").read_text())
     with (
         run_robot(tmp_path / "finger.toml", folder=tmp_path, arguments=IN_A_ROOM) as robot,

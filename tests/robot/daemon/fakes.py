@@ -61,7 +61,7 @@ class FakeGuard:
         self.state = dataclasses.replace(self.state, refused="", refused_seq=None)
 
     def kinds(self) -> list[str]:
-        """The kinds of the orders so far."""
+        """Return the kinds of the orders so far."""
         return [order.kind for order in self.orders]
 
     def _obey(self, order: Order) -> None:

@@ -1,4 +1,4 @@
-"""A small car, its pictures and its plan, for the tests of the daemon."""
+"""Plan, frames and guard states of a car, for tests of the daemon."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STATE = Layout(
 
 
 def car_plan(**changes: Any) -> DaemonPlan:
-    """A car with a camera on this machine only, without TLS."""
+    """Return the plan of a car with a camera, served on loopback without TLS."""
     fields: dict[str, Any] = {
         "robot": "test car",
         "body": "car",
@@ -34,7 +34,7 @@ def car_plan(**changes: Any) -> DaemonPlan:
 
 
 def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
-    """A JPEG that differs from that of every other number."""
+    """Return a JPEG that differs from that of every other number."""
     rng = np.random.default_rng(number)
     # Coarse blocks, as a street has them, and not noise, which no JPEG is small for.
     coarse = rng.integers(0, 256, (size[1] // 8, size[0] // 8, 3), dtype=np.uint8)
@@ -42,7 +42,7 @@ def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
 
 
 def guard_state(**changes: Any) -> GuardState:
-    """What a guard at rest says."""
+    """Return the state of a guard at rest."""
     fields: dict[str, Any] = {
         "at_ns": 0,
         "armed": False,

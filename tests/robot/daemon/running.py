@@ -52,7 +52,7 @@ async def until(condition: Callable[[], object], what: str) -> None:
             while not condition():
                 await asyncio.sleep(0.002)
     except TimeoutError:
-        raise AssertionError(f"Waited in vain until {what}.") from None
+        raise AssertionError(f"Timed out waiting until {what}.") from None
 
 
 class Client:

@@ -6,12 +6,10 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from tests.robot.daemon.fakes import FakeCamera
 from tests.robot.daemon.plans import SIZE, picture
 
@@ -19,19 +17,19 @@ NOW_NS = 10_000_000_000
 
 
 class Watched:
-    """A reader of a fake camera, and everything that came of it."""
+    """A reader of a fake camera, with the frames and reports that it delivered."""
 
     def __init__(self, camera: FakeCamera) -> None:
         self.frames: list[Frame] = []
         self.reports: list[str] = []
         self._changed = threading.Condition()
-        checks = FrameChecks(SIZE, lambda: NOW_NS)
+        checks = FrameChecks(lambda: NOW_NS)
         plan = CameraPlan("pattern", SIZE, fps=500.0)
         self.reader = FrameReader(plan, checks, self._frame, self._report, camera.open)
         self.reader.start()
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until something holds."""
+        """Wait for a condition."""
         with self._changed:
             assert self._changed.wait_for(condition, 20.0), (self.frames, self.reports)
 
@@ -48,21 +46,21 @@ class Watched:
 
 @pytest.fixture
 def camera() -> FakeCamera:
-    """A camera that gives what is put in."""
+    """A camera that returns the frames that a test puts in."""
     return FakeCamera()
 
 
 @pytest.fixture
 def watched(camera: FakeCamera) -> Iterator[Watched]:
-    """A reader of it."""
+    """A reader of that camera."""
     watched = Watched(camera)
     yield watched
     watched.reader.close()
 
 
-def test_good_and_new_pictures_pass() -> None:
-    """As they are."""
-    checks = FrameChecks(SIZE, lambda: NOW_NS)
+def test_valid_new_frames_are_accepted() -> None:
+    """In order of their capture times."""
+    checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert checks.refusal(Frame(picture(2), 2)) == ""
 
@@ -73,29 +71,27 @@ GOOD = picture(3)
 @pytest.mark.parametrize(
     ("jpeg", "captured_ns", "words"),
     [
-        (b"", 2, "an incomplete JPEG"),
-        (b"garbage" * 100, 2, "an incomplete JPEG"),
-        (GOOD[: len(GOOD) // 2], 2, "an incomplete JPEG"),
-        (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "Corrupt|Premature|JPEG"),
-        (picture(3, (80, 64)), 2, "80 by 64 pixels"),
+        (b"", 2, "cannot be decoded"),
+        (b"garbage" * 100, 2, "cannot be decoded"),
+        (GOOD[: len(GOOD) // 2], 2, "cannot be decoded"),
+        (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "cannot be decoded"),
         (picture(1), 2, "same frame"),
         (GOOD, 1, "older than the one before"),
         (GOOD, NOW_NS + 60_000_000, "from the future"),
     ],
 )
-def test_bad_pictures_do_not(jpeg: bytes, captured_ns: int, words: str) -> None:
-    """In words; and they do not move the time of what was seen last."""
-    checks = FrameChecks(SIZE, lambda: NOW_NS)
+def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, words: str) -> None:
+    """With a reason; a rejected frame does not change the newest capture time."""
+    checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
-    refusal = checks.refusal(Frame(jpeg, captured_ns))
-    assert any(word in refusal for word in words.split("|"))
+    assert words in checks.refusal(Frame(jpeg, captured_ns))
     assert checks.refusal(Frame(picture(4), 3)) == ""
 
 
-def test_a_camera_that_freezes_gives_nothing_and_says_so_once(
+def test_a_frozen_camera_delivers_nothing_and_is_reported_once(
     camera: FakeCamera, watched: Watched
 ) -> None:
-    """New times on an old picture fool nobody; a new picture mends it."""
+    """A repeated frame with a new time is rejected; the next new frame ends the failure."""
     for at in range(1, 6):
         camera.put(Frame(picture(1), at))
     camera.put(Frame(picture(2), 6))
@@ -106,8 +102,8 @@ def test_a_camera_that_freezes_gives_nothing_and_says_so_once(
     assert watched.reader.errors == 4
 
 
-def test_a_camera_that_fails_is_opened_again(camera: FakeCamera, watched: Watched) -> None:
-    """After a pause, and in words."""
+def test_a_camera_that_fails_is_reopened(camera: FakeCamera, watched: Watched) -> None:
+    """After a pause; failure and recovery are reported."""
     camera.put(Frame(picture(1), 1))
     camera.fail("The camera was unplugged.")
     camera.put(Frame(picture(2), 2))
@@ -118,7 +114,7 @@ def test_a_camera_that_fails_is_opened_again(camera: FakeCamera, watched: Watche
 def test_a_camera_that_cannot_be_opened_is_tried_again(
     camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A robot serves without a picture until there is one."""
+    """The robot is served without frames meanwhile."""
     opens: list[int] = []
 
     def reluctant(plan: CameraPlan) -> FakeCamera:
@@ -135,57 +131,18 @@ def test_a_camera_that_cannot_be_opened_is_tried_again(
     watched.reader.close()
 
 
-def test_garbage_without_end_opens_the_camera_again(camera: FakeCamera, watched: Watched) -> None:
-    """Ten bad pictures in a row, and it is worth a try."""
+def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watched: Watched) -> None:
+    """After ten invalid frames in a row."""
     for at in range(10):
         camera.put(Frame(b"garbage", at))
     camera.put(Frame(picture(1), 100))
     watched.until(lambda: len(watched.frames) == 1)
     assert camera.opened == 2
-    assert len([text for text in watched.reports if "an incomplete JPEG" in text]) == 1
+    assert len([text for text in watched.reports if "cannot be decoded" in text]) == 1
 
 
-def test_closing_ends_a_camera_that_gives_nothing(watched: Watched) -> None:
+def test_closing_ends_a_camera_without_frames(watched: Watched) -> None:
     """A camera that hangs must not keep the daemon from ending."""
     watched.reader.close()
     assert not watched.reader._thread.is_alive()
     assert watched.reports == []
-
-
-@given(moves=st.lists(st.booleans(), max_size=60))
-def test_the_mailbox_gives_only_the_newest_item_and_only_once(moves: list[bool]) -> None:
-    """In any order of puts and takes; the items that come out only rise."""
-    box: Latest[int] = Latest()
-    waiting: int | None = None
-    taken: list[int] = []
-    for number, put in enumerate(moves):
-        if put:
-            box.put(number)
-            waiting = number
-        else:
-            got = box.take()
-            assert got == waiting
-            waiting = None
-            if got is not None:
-                taken.append(got)
-    assert taken == sorted(set(taken))
-
-
-def test_two_threads_never_take_an_item_twice() -> None:
-    """One thread puts and one takes: numbers rise, and the last one is not lost."""
-    box: Latest[int] = Latest()
-    last = 20_000
-
-    def put() -> None:
-        for number in range(last + 1):
-            box.put(number)
-
-    writer = threading.Thread(target=put)
-    writer.start()
-    taken: list[int] = []
-    while not taken or taken[-1] != last:
-        got = box.take()
-        if got is not None:
-            taken.append(got)
-    writer.join()
-    assert taken == sorted(set(taken))

@@ -1,4 +1,4 @@
-"""Control lease and pending commands."""
+"""Control lease, and how long commands and suggestions are in force."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.control import ClientIdentity, ControlLease, PendingCommands
+from shapechanger.link.messages import Command
+from shapechanger.robot.daemon.control import ClientIdentity, ControlLease
+from shapechanger.robot.daemon.hub import SessionHub
+from tests.robot.daemon.plans import car_plan, guard_state
 
 ANN = ClientIdentity(1, "Ann", "person")
 BOB = ClientIdentity(2, "Bob", "person")
@@ -79,29 +82,30 @@ def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, Client
 @given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
 def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
     """The limits are its own time to live and the robot's deadline."""
-    pending = PendingCommands(deadline_ms=250)
-    pending.command(ANN, (0.5,), ttl_ms, now_ns=0)
-    assert pending.commanded(age_ms * MS) == ((0.5,) if age_ms <= min(ttl_ms, 250) else ())
+    now_ns = 0
+    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    assert hub.commanded() == ()
+    hub.on_state(guard_state(armed=True))
+    hub.lease.take(ANN)
+    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms), now_ns)
+    now_ns = age_ms * MS
+    assert hub.commanded() == ((0.0, 0.5) if age_ms <= min(ttl_ms, 250) else ())
+    now_ns = 0
+    hub.halt()
+    assert hub.commanded() == ()
 
 
-def test_a_cleared_command_is_gone() -> None:
-    """Its time to live does not matter."""
-    pending = PendingCommands(deadline_ms=250)
-    assert pending.commanded(0) == ()
-    pending.command(ANN, (0.5,), 1_000, now_ns=0)
-    pending.clear_command()
-    assert pending.commanded(0) == ()
-
-
-def test_the_newest_suggestion_counts_until_it_expires_or_its_sender_leaves() -> None:
-    """The departure of another client changes nothing."""
-    pending = PendingCommands(deadline_ms=250)
-    pending.suggest(ANN, (0.1,), now_ns=0)
-    pending.suggest(SAC, (0.2,), now_ns=10 * MS)
-    pending.forget(ANN.session)
-    shown = pending.suggested(260 * MS)
+def test_the_newest_suggestion_counts_until_it_expires() -> None:
+    """It replaces that of another client; its departure is tested in `test_session_stateful`."""
+    now_ns = 0
+    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    assert hub.suggested() is None
+    hub.suggest(ANN, (0.1, 0.0))
+    now_ns = 10 * MS
+    hub.suggest(SAC, (0.2, 0.0))
+    now_ns = 260 * MS
+    shown = hub.suggested()
     assert shown is not None
-    assert (shown.client, shown.values) == (SAC, (0.2,))
-    assert pending.suggested(261 * MS) is None
-    pending.forget(SAC.session)
-    assert pending.suggested(20 * MS) is None
+    assert (shown.client, shown.values) == (SAC, (0.2, 0.0))
+    now_ns = 260 * MS + 1
+    assert hub.suggested() is None

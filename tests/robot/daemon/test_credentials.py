@@ -59,14 +59,14 @@ def test_tls_is_the_newest(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_said_with_the_way_out(tmp_path: Path) -> None:
-    """The command that makes it."""
+    """The message names the command that makes it."""
     with pytest.raises(RobotError, match="shapechanger robot init"):
         load_credentials(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.key"])
 def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> None:
-    """With the command that mends it."""
+    """The message has the command that fixes it."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).chmod(0o640)
     with pytest.raises(RobotError, match="chmod 600"):
@@ -75,7 +75,7 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> Non
 
 @pytest.mark.parametrize("name", ["key", "certificate.pem", "certificate.key"])
 def test_half_of_it_is_not_made_up(tmp_path: Path, name: str) -> None:
-    """What is left may be known to somebody."""
+    """The remaining file may have been copied."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).unlink()
     with pytest.raises(RobotError, match="only some"):
@@ -109,7 +109,7 @@ def test_a_certificate_of_another_key_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
-    """As everything of the file system."""
+    """As for every error of the file system."""
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="Cannot write"):
         make_credentials(tmp_path / "file" / "car", "car")

@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.link.address import SERVICE
 from shapechanger.robot.daemon import discovery
-from shapechanger.robot.daemon.discovery import Announcement
+from shapechanger.robot.daemon.discovery import announce, withdraw
 from tests.robot.daemon.plans import car_plan
 
 
@@ -41,8 +41,8 @@ def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -
 
     async def play() -> None:
         plan = car_plan(robot="New Bright v1.0", host="192.0.2.7")
-        announcement = Announcement(plan, 5001, b"\xab" * 32)
-        assert await announcement.start()
+        zeroconf = await announce(plan, 5001, b"\xab" * 32)
+        assert zeroconf is fake
         (info,) = fake.announced
         assert info.type == SERVICE
         assert info.name == f"New Bright v1 0.{SERVICE}"
@@ -53,7 +53,7 @@ def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -
             b"v": b"1",
             b"fp": b"ab" * 32,
         }
-        await announcement.close()
+        await withdraw(zeroconf)
         assert fake.closed
 
     asyncio.run(play())
@@ -69,6 +69,6 @@ def test_a_failed_announcement_is_only_a_warning(
 
     monkeypatch.setattr(discovery, "AsyncZeroconf", broken)
     with caplog.at_level(logging.WARNING):
-        assert not asyncio.run(Announcement(car_plan(), 5001, b"").start())
+        assert not asyncio.run(announce(car_plan(), 5001, b""))
     assert "cannot be announced" in caplog.text
     assert "Network is unreachable" in caplog.text

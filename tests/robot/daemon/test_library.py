@@ -26,8 +26,8 @@ from shapechanger.robot.daemon.library import (
     Answer,
     LineIndex,
     Question,
+    RecordingFolder,
     RecordingLibrary,
-    Summaries,
 )
 from tests.robot.daemon.plans import ACTIONS, picture
 
@@ -109,12 +109,12 @@ def test_a_summary_agrees_with_the_whole_episode(
     """After each judgement too."""
     folder = tmp_path_factory.mktemp("kept")
     path = record(folder, count, "time")
-    summaries = Summaries(folder)
+    recordings = RecordingFolder(folder)
     for good, one, other in [(True, 0, 0), *said]:
         first, last = sorted((one, other))
         if last < count:
             (keep if good else drop)(path, first, last, "bad")
-        episode, summary = read_episode(path), summaries.summary(path.name)
+        episode, summary = read_episode(path), recordings.summary(path.name)
         assert (summary.steps, summary.kept) == (len(episode.steps), len(episode.kept))
         assert summary.seconds == episode.seconds
         assert (summary.closed, summary.outcome) == (episode.closed, episode.outcome)

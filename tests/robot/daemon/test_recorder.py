@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import EpisodeHeader, Step, episodes_of, read_episode, repair
-from shapechanger.link.messages import Observation
+from shapechanger.link.messages import Mark, Observation, Undo
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
@@ -24,7 +24,6 @@ from shapechanger.robot.daemon.recorder import (
     DISK_TOO_SLOW,
     EpisodeThread,
     StepBuilder,
-    StepWithFrame,
 )
 from tests.robot.daemon.plans import ACTIONS, picture
 
@@ -34,9 +33,9 @@ HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
 WITHIN_S = 20.0
 
 
-def step(number: int) -> StepWithFrame:
-    """A step that tells its number."""
-    return StepWithFrame(
+def step(number: int) -> tuple[Step, bytes]:
+    """A step that tells its number, and its picture."""
+    return (
         Step(action=(0.0, number / 1e6), driver="person", captured_ns=number * 50_000_000),
         picture(number % 5),
     )
@@ -46,26 +45,21 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     """The episode is closed with its outcome."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
-    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
-    scribe.mark("too early", answers.append)
-    scribe.undo(5.0, answers.append)
-    assert all(scribe.add(step(number)) for number in range(40))
-    scribe.mark("here", answers.append)
-    scribe.undo(0.5, answers.append)
-    scribe.end("time")
-    assert scribe.add(step(41))  # Too late: it has ended well, and this is no trouble.
-    assert scribe.join(WITHIN_S)
+    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
+    thread.edit(Mark(text="too early"), answers.append)
+    thread.edit(Undo(), answers.append)
+    assert all(thread.add(*step(number)) for number in range(40))
+    thread.edit(Mark(text="here"), answers.append)
+    thread.edit(Undo(seconds=0.5), answers.append)
+    thread.end("time")
+    assert thread.add(*step(41))  # Too late: it has ended well, and this is no trouble.
+    assert thread.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
-    assert answers == [
-        "There is no step to mark yet.",
-        "There is nothing to undo.",
-        "",
-        "",
-    ]
-    episode = read_episode(tmp_path / scribe.progress.episode)
+    assert answers == ["There is no step to mark yet.", "There is nothing to undo.", "", ""]
+    episode = read_episode(tmp_path / thread.progress.episode)
     assert (episode.closed, episode.outcome) == (True, "time")
     assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
-    assert (len(episode.kept), scribe.progress.dropped) == (30, 10)
+    assert (len(episode.kept), thread.progress.dropped) == (30, 10)
     assert [mark.step for mark in episode.marks] == [39]
 
 
@@ -74,16 +68,16 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_
     """Queued steps and bytes are bounded; here the disk is busy elsewhere."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
-    scribe = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
+    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
     taken = 0
     large = b"\xff\xd8" + bytes(bytes_each)
-    while scribe.add(StepWithFrame(step(taken).step, large)):
+    while thread.add(step(taken)[0], large):
         taken += 1
         assert taken < 10_000
     busy.end()
-    assert scribe.join(WITHIN_S)
+    assert thread.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
-    episode = read_episode(tmp_path / scribe.progress.episode)
+    episode = read_episode(tmp_path / thread.progress.episode)
     assert episode.outcome == DISK_TOO_SLOW
     assert len(episode.steps) == taken == (15 if bytes_each else 256)
 
@@ -92,10 +86,10 @@ def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
     """Once, and the episode does not begin."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
-    scribe = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
-    assert scribe.join(WITHIN_S)
+    thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
+    assert thread.join(WITHIN_S)
     ((what, trouble),) = reports
-    assert (what, scribe.progress.episode) == ("ended", "")
+    assert (what, thread.progress.episode) == ("ended", "")
     assert "Cannot write" in trouble
 
 
@@ -105,13 +99,13 @@ from pathlib import Path
 from tests.robot.daemon.test_recorder import HEADER, step
 from shapechanger.robot.daemon.recorder import EpisodeThread
 
-scribe, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
+thread, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
 while True:
-    if scribe.progress.steps >= number - 100:
-        scribe.add(step(number))
+    if thread.progress.steps >= number - 100:
+        thread.add(*step(number))
         number += 1
     if number % 20 == 0:
-        print(scribe.progress.steps, flush=True)
+        print(thread.progress.steps, flush=True)
 """
 
 
@@ -174,51 +168,64 @@ def frame(seq: int) -> NumberedFrame:
     return NumberedFrame(seq, Frame(b"jpeg %d" % seq, seq))
 
 
-def test_the_next_observation_brings_the_applied_outputs() -> None:
+class Built:
+    """A builder, and the steps that it has written with their frames."""
+
+    def __init__(self) -> None:
+        self.written: list[tuple[Step, bytes | None]] = []
+        self.builder = StepBuilder(
+            [(-1.0, 1.0)], lambda *step: self.written.append(step), lambda: 7
+        )
+
+
+@pytest.fixture
+def built() -> Built:
+    """A new builder."""
+    return Built()
+
+
+def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
     """With the reason of a stop."""
-    pairing = StepBuilder(lambda: 7)
-    assert pairing.observed(1, seen(1, 100, suggested=(0.9,)), frame(1)) is None
-    assert pairing.decided(ADA, 1, (0.5,), 110) is None
-    done = pairing.observed(1, seen(2, 120, stop_reason="A bump."), frame(2))
-    assert done is not None
-    assert done.jpeg == b"jpeg 1"
-    step = done.step
+    built.builder.observed(1, seen(1, 100, suggested=(0.9,)), frame(1))
+    built.builder.decided(ADA, 1, (0.5,), 110)
+    assert built.written == []
+    built.builder.observed(1, seen(2, 120, stop_reason="A bump."), frame(2))
+    built.builder.complete()
+    ((step, jpeg),) = built.written
+    assert jpeg == b"jpeg 1"
     assert (step.action, step.applied, step.wanted) == ((0.5,), (0.25,), (0.9,))
     assert (step.captured_ns, step.decided_ns, step.wall_ns) == (100, 110, 7)
     assert (step.driver, step.state, step.stop_reason) == ("person", (100.0,), "A bump.")
-    assert pairing.complete() is None
 
 
-def test_of_two_decisions_on_one_observation_the_later_one_counts() -> None:
+def test_of_two_decisions_on_one_observation_the_later_one_counts(built: Built) -> None:
     """As when a key is let go at once."""
-    pairing = StepBuilder()
-    pairing.observed(1, seen(1, 100), None)
-    pairing.decided(ADA, 1, (0.5,), 110)
-    assert pairing.decided(ADA, 1, (0.0,), 115) is None
-    done = pairing.complete()
-    assert done is not None
-    assert (done.step.action, done.step.decided_ns, done.step.applied) == ((0.0,), 115, None)
+    built.builder.observed(1, seen(1, 100), None)
+    built.builder.decided(ADA, 1, (0.5,), 110)
+    built.builder.decided(ADA, 1, (0.0,), 115)
+    built.builder.complete()
+    ((step, _),) = built.written
+    assert (step.action, step.decided_ns, step.applied) == ((0.0,), 115, None)
 
 
-def test_a_command_that_answers_no_known_observation_is_no_step() -> None:
+def test_a_command_that_answers_no_known_observation_is_no_step(built: Built) -> None:
     """Such as one from before the recording, or of another client."""
-    pairing = StepBuilder()
-    pairing.observed(1, seen(1, 100), None)
+    built.builder.observed(1, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
-        pairing.decided(who, answers, (0.5,), 110)
-    pairing.forget(1)
-    pairing.decided(ADA, 1, (0.5,), 110)
-    assert pairing.complete() is None
+        built.builder.decided(who, answers, (0.5,), 110)
+    built.builder.forget(1)
+    built.builder.decided(ADA, 1, (0.5,), 110)
+    built.builder.complete()
+    assert built.written == []
 
 
-def test_a_client_without_control_does_not_complete_applied_outputs() -> None:
+def test_a_client_without_control_does_not_complete_applied_outputs(built: Built) -> None:
     """The outputs then follow another client."""
-    pairing = StepBuilder()
-    pairing.observed(2, seen(1, 100), None)
-    pairing.decided(NET, 1, (0.5,), 110)
-    done = pairing.observed(2, seen(2, 120, mine=False), None)
-    assert done is not None
-    assert done.step.applied is None
+    built.builder.observed(2, seen(1, 100), None)
+    built.builder.decided(NET, 1, (0.5,), 110)
+    built.builder.observed(2, seen(2, 120, mine=False), None)
+    ((step, _),) = built.written
+    assert step.applied is None
 
 
 @given(
@@ -230,25 +237,23 @@ def test_time_never_runs_backwards_and_no_frame_repeats(
     said: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
     """For any order of observations and commands."""
-    pairing = StepBuilder()
-    steps: list[StepWithFrame | None] = []
+    built = Built()
     newest = {ADA.session: 0, NET.session: 0}
     for now_ns, (looks, who, back) in enumerate(said):
         if looks:
             newest[who.session] += 1
             picture = frame(1 + now_ns // 3)  # Each picture is seen a few times.
             sent = seen(newest[who.session], picture.seq)
-            steps.append(pairing.observed(who.session, sent, picture))
+            built.builder.observed(who.session, sent, picture)
         else:
-            steps.append(pairing.decided(who, newest[who.session] - back, (0.5,), now_ns))
-    steps.append(pairing.complete())
-    made = [step for step in steps if step is not None]
+            built.builder.decided(who, newest[who.session] - back, (0.5,), now_ns)
+    built.builder.complete()
     for times in ("captured_ns", "decided_ns"):
-        found = [getattr(one.step, times) for one in made]
+        found = [getattr(step, times) for step, _ in built.written]
         assert found == sorted(found)
-    pictures = [one.jpeg for one in made if one.jpeg is not None]
+    pictures = [jpeg for _, jpeg in built.written if jpeg is not None]
     assert len(pictures) == len(set(pictures))
     shown = b""
-    for one in made:
-        shown = one.jpeg or shown
-        assert shown == b"jpeg %d" % one.step.captured_ns  # Its own, or the one before it.
+    for step, jpeg in built.written:
+        shown = jpeg or shown
+        assert shown == b"jpeg %d" % step.captured_ns  # Its own, or the one before it.

@@ -40,8 +40,8 @@ _places = st.integers(0, 3)
 _numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
 
 
-class Told:
-    """What a reference remembers of one client; written without looking at the daemon's code."""
+class ClientModel:
+    """State of one client in the reference model, which shares no code with the daemon."""
 
     def __init__(self, role: str) -> None:
         self.role = role
@@ -51,7 +51,7 @@ class Told:
 
 
 class Robot(RuleBasedStateMachine):
-    """Four clients that do whatever they like, and a reference of the rules."""
+    """Four clients that send anything at any time, and a reference model of the rules."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,32 +60,32 @@ class Robot(RuleBasedStateMachine):
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
         self.hub = SessionHub(car_plan(), lambda: self.now_ns, self.orders.append)
         self.sessions: dict[int, Session] = {}
-        self.told: dict[int, Told] = {}
+        self.models: dict[int, ClientModel] = {}
         self.holder: int | None = None
         self.numbers = 0
         self.commanded_ns = 0
         self.stops = 0
         self.halts = 0
-        # Where a suggestion that counts comes from, its values, and when it is forgotten.
+        # Place, values and expiry (ns) of the newest suggestion.
         self.suggestion: tuple[int, tuple[float, ...], int] | None = None
 
     def connected(self) -> bool:
-        """Whether there is anybody."""
+        """Return True if any client is connected."""
         return bool(self.sessions)
 
     @rule(place=_places, role=st.sampled_from(("person", "program")))
     def connect(self, place: int, role: Any) -> None:
-        """Somebody comes."""
+        """A client connects."""
         if place in self.sessions:
             return
         self.numbers += 1
         session = Session(self.numbers, self.hub, Authenticator())
         session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
-        self.sessions[place], self.told[place] = session, Told(role)
+        self.sessions[place], self.models[place] = session, ClientModel(role)
 
     @rule(place=_places)
     def leave(self, place: int) -> None:
-        """Somebody goes; if they commanded, the robot is disarmed."""
+        """A client leaves; if it had control, the robot is disarmed."""
         if place not in self.sessions:
             return
         self.sessions.pop(place).close()
@@ -96,56 +96,56 @@ class Robot(RuleBasedStateMachine):
 
     @rule(place=_places)
     def take(self, place: int) -> None:
-        """Somebody wants the command."""
-        if not self.say(place, Take()):
+        """A client asks for control."""
+        if not self.send(place, Take()):
             return
-        held = None if self.holder is None else self.told[self.holder].role
-        if held is None or (held == "program" and self.told[place].role == "person"):
+        held = None if self.holder is None else self.models[self.holder].role
+        if held is None or (held == "program" and self.models[place].role == "person"):
             self.halts += held is not None
             self.holder = place
             self.forget_suggestion(place)
 
     @rule(place=_places)
     def release(self, place: int) -> None:
-        """Somebody gives it back, whether or not they have it."""
-        if self.say(place, Release()) and self.holder == place:
+        """A client gives control back, whether or not it has it."""
+        if self.send(place, Release()) and self.holder == place:
             self.holder = None
             self.stops += 1
 
     @rule(place=_places, emergency=st.integers(0, 2), back=st.integers(-1, 3))
     def arm(self, place: int, emergency: int, back: int) -> None:
-        """Somebody arms: only a person who sees the robot, and only if anybody commands."""
+        """Only a person who sees the robot can arm it, and only if a client has control."""
         if place not in self.sessions:
             return
         before, answers = len(self.orders), self.answers(place, back)
-        self.say(place, Arm(answers=answers, emergency=emergency))
-        may = self.told[place].role == "person" and self.holder is not None
+        self.send(place, Arm(answers=answers, emergency=emergency))
+        may = self.models[place].role == "person" and self.holder is not None
         orders = [(order.kind, order.person) for order in self.orders[before:]]
         assert orders == ([("arm", True)] if may and self.is_fresh(place, answers) else [])
 
     @rule(place=_places)
     def stop(self, place: int) -> None:
-        """Anybody may stop everything."""
+        """Any client can stop the robot."""
         before = len(self.orders)
-        if self.say(place, EmergencyStop(reason="because")):
+        if self.send(place, EmergencyStop(reason="because")):
             assert [order.kind for order in self.orders[before:]] == ["emergency"]
 
     @rule(place=_places)
     def disarm(self, place: int) -> None:
-        """A person, or who commands."""
+        """A person can disarm the robot, and so can the client in control."""
         before = len(self.orders)
-        if self.say(place, Disarm()):
-            may = self.told[place].role == "person" or self.holder == place
+        if self.send(place, Disarm()):
+            may = self.models[place].role == "person" or self.holder == place
             assert [order.kind for order in self.orders[before:]] == (["disarm"] if may else [])
 
     @precondition(connected)
     @rule(place=_places)
     def observe(self, place: int) -> None:
-        """An observation leaves."""
+        """An observation is sent."""
         if place in self.sessions:
             observation = self.sessions[place].observe()
             assert observation.mine == (self.holder == place)
-            self.told[place].sent[observation.seq] = self.now_ns
+            self.models[place].sent[observation.seq] = self.now_ns
 
     @precondition(connected)
     @rule(
@@ -158,20 +158,20 @@ class Robot(RuleBasedStateMachine):
     def command(
         self, place: int, seq: int, back: int, values: tuple[float, ...], scale: float
     ) -> None:
-        """Somebody commands: new, old, twice, in answer to anything, nonsense."""
+        """A client sends a command: new, old, repeated, in answer to any number, or invalid."""
         if place not in self.sessions:
             return
-        told = self.told[place]
+        model = self.models[place]
         answers = self.answers(place, back)
         message = Command(seq=seq, answers=answers, values=values, scale=scale)
-        if self.holder == place and seq > told.newest_command:
+        if self.holder == place and seq > model.newest_command:
             if len(values) != 2 or not all(map(math.isfinite, values)):
                 self.halts += 1
             elif self.is_fresh(place, answers):
                 self.allowed.append((seq, tuple(scale * value for value in values)))
                 self.commanded_ns = self.now_ns
-        told.newest_command = max(told.newest_command, seq)
-        assert self.say(place, message)
+        model.newest_command = max(model.newest_command, seq)
+        assert self.send(place, message)
 
     @precondition(connected)
     @rule(
@@ -181,21 +181,21 @@ class Robot(RuleBasedStateMachine):
         values=st.lists(_numbers, min_size=1, max_size=3).map(tuple),
     )
     def suggest(self, place: int, seq: int, back: int, values: tuple[float, ...]) -> None:
-        """Somebody says what they would do: it counts if they do not command, and moves nothing."""
+        """A suggestion counts if its sender does not have control, and moves nothing."""
         if place not in self.sessions:
             return
-        before, told, answers = len(self.orders), self.told[place], self.answers(place, back)
-        new = seq > told.newest_suggestion
-        told.newest_suggestion = max(told.newest_suggestion, seq)
+        before, model, answers = len(self.orders), self.models[place], self.answers(place, back)
+        new = seq > model.newest_suggestion
+        model.newest_suggestion = max(model.newest_suggestion, seq)
         good = len(values) == 2 and all(map(math.isfinite, values))
-        self.say(place, Suggest(seq=seq, answers=answers, values=values))
+        self.send(place, Suggest(seq=seq, answers=answers, values=values))
         if self.holder != place and new and good and self.is_fresh(place, answers):
             self.suggestion = place, values, self.now_ns + DEADLINE_NS
         assert len(self.orders) == before
 
     @rule(
         place=_places,
-        wish=st.sampled_from(
+        request=st.sampled_from(
             (
                 Record(on=True),
                 Record(on=False),
@@ -207,21 +207,21 @@ class Robot(RuleBasedStateMachine):
             )
         ),
     )
-    def wish(self, place: int, wish: Any) -> None:
-        """Somebody wants something recorded or shown, which this robot cannot; nothing moves."""
+    def ask_about_recordings(self, place: int, request: Any) -> None:
+        """A robot without a folder refuses requests about recordings, and nothing moves."""
         before = len(self.orders)
-        if self.say(place, wish):
+        if self.send(place, request):
             assert len(self.orders) == before
             assert not self.hub.recorder.on
 
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
-        """Time goes by."""
+        """Time passes."""
         self.now_ns += milliseconds * 1_000_000
 
     @rule(garbage=st.binary(max_size=20), place=_places)
     def garbage(self, garbage: bytes, place: int) -> None:
-        """Somebody talks nonsense, and is thrown out."""
+        """A client that sends invalid bytes is disconnected."""
         if place not in self.sessions:
             return
         before = len(self.orders)
@@ -232,41 +232,41 @@ class Robot(RuleBasedStateMachine):
             self.leave(place)
 
     @rule()
-    def news(self) -> None:
-        """The guard and the camera say something."""
+    def report(self) -> None:
+        """A state of the guard and a frame arrive."""
         self.hub.on_state(guard_state(at_ns=self.now_ns, armed=True))
         self.hub.on_frame(Frame(b"jpeg", self.now_ns))
 
     @invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
-        """Exactly those of the reference, in order, with lease and number rising."""
+        """Exactly those that the model allows, in order, with increasing lease and number."""
         commands = [order for order in self.orders if order.kind == "command"]
         assert [(order.seq, order.values) for order in commands] == self.allowed
         numbers = [(order.session, order.seq) for order in commands]
         assert numbers == sorted(set(numbers))
 
     @invariant()
-    def who_commanded_and_left_has_stopped_the_robot(self) -> None:
-        """Each loss of the command is one disarm order, with its reason."""
+    def the_loss_of_control_disarms_the_robot(self) -> None:
+        """Each client that had control and left caused one order to disarm, with its reason."""
         lost = [o for o in self.orders if o.kind == "disarm" and not o.reason.endswith("disarmed")]
         assert len(lost) == self.stops
         assert all(order.reason for order in lost)
 
     @invariant()
-    def only_nonsense_and_another_driver_halt_the_robot(self) -> None:
-        """Not what is late, comes twice or is said by somebody else."""
+    def only_invalid_commands_and_a_new_holder_halt_the_robot(self) -> None:
+        """Late, repeated and foreign commands do not."""
         assert sum(order.kind == "halt" for order in self.orders) == self.halts
 
     @invariant()
-    def there_is_one_who_commands(self) -> None:
-        """The same as in the reference."""
+    def the_lease_has_the_expected_holder(self) -> None:
+        """That of the model."""
         held = self.hub.lease.holder
         place = next((p for p, s in self.sessions.items() if s.client == held), None)
         assert place == self.holder
 
     @invariant()
-    def the_newest_suggestion_is_shown_as_long_as_it_counts(self) -> None:
-        """The same as in the reference, with its sender."""
+    def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
+        """That of the model, with its sender."""
         shown, expected = self.hub.suggested(), self.suggestion
         if expected is None or self.now_ns > expected[2]:
             assert shown is None
@@ -276,29 +276,29 @@ class Robot(RuleBasedStateMachine):
             assert shown.client == self.sessions[expected[0]].client
 
     @invariant()
-    def no_command_is_in_force_unless_somebody_commands(self) -> None:
-        """And not for longer than the deadline."""
+    def no_command_is_in_force_without_a_holder(self) -> None:
+        """Nor after the deadline."""
         if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
             assert self.hub.commanded() == ()
         elif self.hub.commanded():
             assert self.hub.commanded() == self.allowed[-1][1]
 
     def forget_suggestion(self, place: int) -> None:
-        """What was suggested there does not count any more."""
+        """Drop the suggestion of the client at a place."""
         if self.suggestion is not None and self.suggestion[0] == place:
             self.suggestion = None
 
     def answers(self, place: int, back: int) -> int:
-        """Number of an observation: the last one that was sent there, or so many before it."""
-        return max(0, max(self.told[place].sent, default=0) - back)
+        """Return the number of the last observation sent there, or of one `back` before it."""
+        return max(0, max(self.models[place].sent, default=0) - back)
 
     def is_fresh(self, place: int, answers: int) -> bool:
-        """Whether an observation was sent there a short time ago."""
-        sent_ns = self.told[place].sent.get(answers)
+        """Return True if the observation was sent there within the age limit."""
+        sent_ns = self.models[place].sent.get(answers)
         return sent_ns is not None and self.now_ns - sent_ns <= MAX_AGE_NS
 
-    def say(self, place: int, message: Any) -> bool:
-        """Say something, if there is somebody at that place."""
+    def send(self, place: int, message: Any) -> bool:
+        """Send a message from a place. Return False if no client is there."""
         if place not in self.sessions:
             return False
         self.sessions[place].receive(encode(message))

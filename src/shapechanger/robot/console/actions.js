@@ -1,7 +1,7 @@
 // Commanded, applied and suggested values: a line for each action, and marks on the stick.
 
-import { find, make, tell } from "./dom.js";
-import { inWords, signed } from "./layout.js";
+import { find, make, setText } from "./dom.js";
+import { displayName, formatSigned } from "./layout.js";
 import { Pilot } from "./pilot.js";
 import { place } from "./stick.js";
 
@@ -23,7 +23,7 @@ export class Actions {
     find("actions").replaceChildren(...this.#rows.map(({ element }) => element));
     find("pad").hidden = !pilot.hasStick;
     this.#unmoved = features.map(() => 0);
-    tell(find("pad-info"), "");
+    setText(find("pad-info"), "");
   }
 
   /** Show the command of the person on the stick, from any device. */
@@ -44,7 +44,7 @@ export class Actions {
       if (each.slider && !driving) each.follow(this.#pilot.held(index));
     });
     find("legend-wanted").hidden = !wanted.length;
-    if (wanted.length) tell(find("wanted-by"), by || "program");
+    if (wanted.length) setText(find("wanted-by"), by || "program");
     this.#hint(observation);
     this.#mark(this.#appliedDot, applied);
     this.#mark(this.#wantedDot, wanted);
@@ -59,9 +59,9 @@ export class Actions {
       const isUnmoved = isQuiet && asked !== 0 && applied[i] === 0 && !Pilot.hasSlider(name);
       this.#unmoved[i] = isUnmoved ? this.#unmoved[i] + 1 : 0;
       if (this.#unmoved[i] < UNMOVED_LOOKS) return;
-      hint = `A ${name} of ${signed(asked)} moves nothing here: raise the cap.`;
+      hint = `A ${name} of ${formatSigned(asked)} moves nothing here: raise the cap.`;
     });
-    tell(find("pad-info"), hint);
+    setText(find("pad-info"), hint);
   }
 
   #mark(dot, values) {
@@ -75,7 +75,7 @@ export class Actions {
 function row({ name, unit, low, high }, index, pilot, changed) {
   const least = Number.isFinite(low) ? low : -1;
   const most = Number.isFinite(high) ? high : 1;
-  const words = inWords(name);
+  const words = displayName(name);
   const marks = Object.fromEntries(
     ["you", "applied", "wanted"].map((kind) => [kind, make("span", { class: `mark ${kind}`, hidden: "" })]),
   );
@@ -106,9 +106,9 @@ function row({ name, unit, low, high }, index, pilot, changed) {
         const share = Math.max(0, Math.min(1, (value - least) / (most - least)));
         marks[kind].style.left = `${100 * share}%`;
       }
-      const parts = [you, applied].map(signed);
+      const parts = [you, applied].map(formatSigned);
       const text = `${parts[0]} → ${parts[1]}${unit ? ` ${unit}` : ""}`;
-      tell(numbers, wanted === undefined ? text : `${text} ◇ ${signed(wanted)}`);
+      setText(numbers, wanted === undefined ? text : `${text} ◇ ${formatSigned(wanted)}`);
     },
   };
 }

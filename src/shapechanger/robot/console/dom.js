@@ -16,7 +16,7 @@ export function make(name, attributes = {}, ...inside) {
 }
 
 /** Set a text, unless it is the same: a screen reader would read it again. */
-export function tell(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 

@@ -47,7 +47,7 @@ export class Driver extends EventTarget {
     this.mine = false;
     this.#isTaking = false;
     this.#pilot.letGo();
-    this.#link.say("acknowledge");
+    this.#link.send("acknowledge");
   }
 
   /** Handle an observation, and answer it. */
@@ -64,7 +64,7 @@ export class Driver extends EventTarget {
     }
     if (!this.isDriving) this.#pilot.follow(observation.action_applied);
     if (this.isDriving) this.#command();
-    else this.#link.say("acknowledge", { seq: observation.seq });
+    else this.#link.send("acknowledge", { seq: observation.seq });
   }
 
   /** Handle a change of control. */
@@ -88,15 +88,15 @@ export class Driver extends EventTarget {
   /** Stop the robot, without control too. */
   stop(reason) {
     this.#pilot.letGo();
-    this.#link.say("emergencystop", { reason });
+    this.#link.send("emergencystop", { reason });
   }
 
   /** Take control; resolves to true if the robot gave it. */
   async take() {
     if (this.mine) return true;
     this.#isTaking = true;
-    const lease = heard(this.#link, "lease", LEASE_MS);
-    this.#link.say("take");
+    const lease = nextMessage(this.#link, "lease", LEASE_MS);
+    this.#link.send("take");
     if (!(await lease)) this.#note("The robot did not answer in time: try again.");
     this.#isTaking = false;
     return this.mine;
@@ -105,31 +105,31 @@ export class Driver extends EventTarget {
   /** Take control, and arm the robot. */
   async arm() {
     this.#pilot.letGo();
-    if (await this.take()) this.armAsItIs();
+    if (await this.take()) this.armForHolder();
   }
 
   /** Arm the robot for the client in control. */
-  armAsItIs() {
+  armForHolder() {
     if (!this.seen) return;
-    this.#link.say("arm", { answers: this.seen.seq, emergency: this.seen.emergencies });
+    this.#link.send("arm", { answers: this.seen.seq, emergency: this.seen.emergencies });
   }
 
   /** Disarm the robot. */
   disarm() {
     this.#pilot.letGo();
     if (this.isDriving) this.#command();
-    this.#link.say("disarm");
+    this.#link.send("disarm");
   }
 
   /** Give control to a waiting program, and arm the robot for it. */
   async handOver() {
     this.#pilot.letGo();
-    if (this.mine) this.#link.say("release");
+    if (this.mine) this.#link.send("release");
     const untilMs = performance.now() + TAKEN_WITHIN_MS;
     while (performance.now() < untilMs) {
-      const observation = await heard(this.#link, "observation", TAKEN_WITHIN_MS);
+      const observation = await nextMessage(this.#link, "observation", TAKEN_WITHIN_MS);
       if (observation?.holder_role === "program") {
-        this.armAsItIs();
+        this.armForHolder();
         this.#note(`${observation.holder} drives from now on. Space stops it, E takes it back.`);
         return;
       }
@@ -155,7 +155,7 @@ export class Driver extends EventTarget {
     this.#saidMs = performance.now();
     const { scale } = this;
     const values = this.#pilot.values(scale);
-    this.#link.say("command", { seq: this.#seq, answers: this.seen.seq, values, scale });
+    this.#link.send("command", { seq: this.#seq, answers: this.seen.seq, values, scale });
   }
 
   #note(text) {
@@ -164,7 +164,7 @@ export class Driver extends EventTarget {
 }
 
 /** Resolve to the next message of a type, or null after the time limit. */
-function heard(link, kind, withinMs) {
+function nextMessage(link, kind, withinMs) {
   return new Promise((resolve) => {
     const done = (event) => {
       clearTimeout(timer);

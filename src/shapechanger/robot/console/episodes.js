@@ -1,8 +1,8 @@
 // Recordings: shows an episode, and marks a range of it as bad or good again.
 
-import { find, label, make, tell } from "./dom.js";
+import { find, label, make, setText } from "./dom.js";
 import { Episode } from "./episode.js";
-import { inWords, signed } from "./layout.js";
+import { displayName, formatSigned } from "./layout.js";
 import { draw } from "./picture.js";
 
 const PLAY_MS = 50;
@@ -41,7 +41,7 @@ export class Episodes {
     link.addEventListener("refused", ({ detail }) => {
       if (!this.#dialog.open || detail.seq !== null) return;
       this.#isFetching = false;
-      tell(find("episodes-state"), detail.reason);
+      setText(find("episodes-state"), detail.reason);
     });
   }
 
@@ -61,9 +61,9 @@ export class Episodes {
     this.#summaries = [];
     find("episode-list").replaceChildren();
     find("viewer").hidden = true;
-    tell(find("episodes-state"), "Looking…");
+    setText(find("episodes-state"), "Looking…");
     this.#dialog.showModal();
-    this.#link.say("browse");
+    this.#link.send("browse");
   }
 
   #forget() {
@@ -86,7 +86,7 @@ export class Episodes {
     if (!judged) {
       const count = this.#summaries.length;
       const words = count === 1 ? "1 episode." : `${count} episodes, newest first.`;
-      tell(find("episodes-state"), count ? words : "No episodes yet.");
+      setText(find("episodes-state"), count ? words : "No episodes yet.");
     }
   }
 
@@ -104,7 +104,7 @@ export class Episodes {
 
   #older() {
     const button = make("button", { type: "button" }, "Older episodes");
-    button.addEventListener("click", () => this.#link.say("browse", { before: this.#summaries.at(-1).id }));
+    button.addEventListener("click", () => this.#link.send("browse", { before: this.#summaries.at(-1).id }));
     return button;
   }
 
@@ -126,7 +126,7 @@ export class Episodes {
   #fetch() {
     const missing = this.#episode?.missing(this.#scrub.valueAsNumber);
     if (!missing || this.#isFetching || !this.#dialog.open) return;
-    this.#isFetching = this.#link.say("fetch", { episode: this.#episode.id, ...missing });
+    this.#isFetching = this.#link.send("fetch", { episode: this.#episode.id, ...missing });
   }
 
   #take(piece) {
@@ -134,7 +134,7 @@ export class Episodes {
     if (piece.episode !== this.#episode?.id || !piece.lines.length) return;
     this.#episode.add(piece);
     const share = Math.floor(100 * this.#episode.share);
-    tell(find("episodes-state"), share < 100 ? `Loading, ${share} %.` : "Loaded.");
+    setText(find("episodes-state"), share < 100 ? `Loading, ${share} %.` : "Loaded.");
     this.#scrub.max = Math.max(this.#scrub.max, this.#episode.steps.length - 1);
     this.#look();
     this.#fetch();
@@ -144,23 +144,23 @@ export class Episodes {
     const episode = this.#episode;
     if (!episode) return;
     const step = this.#scrub.valueAsNumber;
-    tell(find("scrub-label"), `Step ${step} of ${Number(this.#scrub.max) + 1}`);
+    setText(find("scrub-label"), `Step ${step} of ${Number(this.#scrub.max) + 1}`);
     this.#showRange();
     const seen = episode.steps[step];
     if (!seen) {
-      tell(find("step-state"), "Loading…");
+      setText(find("step-state"), "Loading…");
       this.#fetch();
       return;
     }
     const action = (values) =>
-      values?.map((value, i) => `${inWords(episode.actions[i] ?? `${i}`)} ${signed(value)}`).join(", ");
+      values?.map((value, i) => `${displayName(episode.actions[i] ?? `${i}`)} ${formatSigned(value)}`).join(", ");
     const parts = [`${seen.driver}: ${action(seen.action)}`];
     if (seen.applied) parts.push(`applied: ${action(seen.applied)}`);
     if (seen.wanted) parts.push(`policy wanted: ${action(seen.wanted)}`);
     if (episode.isBad(step)) parts.push("bad");
     if (episode.marks.has(step)) parts.push(`marked ${episode.marks.get(step)}`.trim());
     if (seen.stop_reason) parts.push(seen.stop_reason);
-    tell(find("step-state"), parts.join(" · "));
+    setText(find("step-state"), parts.join(" · "));
     await this.#draw(episode.picture(step));
   }
 
@@ -173,7 +173,7 @@ export class Episodes {
       if (mine === this.#drawing) draw(this.#canvas, this.#context, bitmap);
       else bitmap.close();
     } catch {
-      tell(find("step-state"), "The picture of this step is damaged.");
+      setText(find("step-state"), "The picture of this step is damaged.");
     }
   }
 
@@ -200,7 +200,7 @@ export class Episodes {
 
   #showRange() {
     const [first, last] = this.#range;
-    tell(find("range-text"), `Range: steps ${first} to ${last}.`);
+    setText(find("range-text"), `Range: steps ${first} to ${last}.`);
     const most = Math.max(1, Number(this.#scrub.max) + 1);
     const span = (element, from, to) => {
       element.style.left = `${(100 * from) / most}%`;
@@ -219,8 +219,8 @@ export class Episodes {
     const { id } = this.#episode ?? {};
     if (!id) return;
     const [first, last] = this.#range;
-    if (!this.#link.say("judge", { episode: id, first, last, keep })) return;
-    tell(find("episodes-state"), `Steps ${first} to ${last} are ${keep ? "good again" : "bad"}.`);
+    if (!this.#link.send("judge", { episode: id, first, last, keep })) return;
+    setText(find("episodes-state"), `Steps ${first} to ${last} are ${keep ? "good again" : "bad"}.`);
     // The robot appends a line for that, which makes the episode longer.
     this.#link.addEventListener("recordings", () => this.#again(id), { once: true });
   }

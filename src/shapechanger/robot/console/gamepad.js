@@ -5,7 +5,7 @@ const POLL_MS = 20;
 const ARM = 0; // Of the standard mapping: A.
 const STOP = 1; // B.
 
-function alive(value) {
+function withDeadZone(value) {
   const size = Math.abs(value);
   return size < DEAD ? 0 : (Math.sign(value) * (size - DEAD)) / (1 - DEAD);
 }
@@ -60,9 +60,9 @@ export class Gamepads {
 
   #read(pad) {
     const triggers = (pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0);
-    const ways = [triggers, -(pad.axes[3] ?? 0), -(pad.axes[1] ?? 0)].map(alive);
+    const ways = [triggers, -(pad.axes[3] ?? 0), -(pad.axes[1] ?? 0)].map(withDeadZone);
     const throttle = ways.reduce((most, way) => (Math.abs(way) > Math.abs(most) ? way : most), 0);
-    const value = { steering: alive(pad.axes[0] ?? 0), throttle };
+    const value = { steering: withDeadZone(pad.axes[0] ?? 0), throttle };
     if (this.#mustRest) this.#mustRest = value.steering !== 0 || value.throttle !== 0;
     if (!this.#mustRest) this.value = value;
     const now = pad.buttons.map((button) => button.pressed);

@@ -15,12 +15,12 @@ export function features(json) {
 }
 
 /** Return a display name: "wheel_speed" is "wheel speed". */
-export function inWords(name) {
+export function displayName(name) {
   return name.replace(/[_/]+/g, " ");
 }
 
 /** Format a changing number with few digits; "–" for NaN. */
-export function shown(value, unit = "") {
+export function formatNumber(value, unit = "") {
   if (value === null || !Number.isFinite(value)) return "–";
   const digits = Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : 2;
   const text = value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
@@ -28,9 +28,9 @@ export function shown(value, unit = "") {
 }
 
 /** Format a value with its sign. */
-export function signed(value) {
+export function formatSigned(value) {
   if (value === undefined || !Number.isFinite(value)) return "–";
-  const text = shown(value);
+  const text = formatNumber(value);
   return value > 0 && /[1-9]/.test(text) ? `+${text}` : text;
 }
 

@@ -11,17 +11,19 @@ const LONGEST_WAIT_MS = 5_000;
 const PING_MS = 1_000;
 const SILENCE_MS = 6_000; // A longer silence means that the connection is lost.
 const GREETING_MS = 8_000;
+const REMEMBERED = 5; // Round trips.
 
 /** Fetch the description of the robot before authentication; throws if it does not answer. */
-export async function introduction() {
+export async function describeRobot() {
   const answer = await fetch("/console/robot.json", { cache: "no-store" });
   if (!answer.ok) throw new Error(`The robot answered ${answer.status}.`);
   return answer.json();
 }
 
 /**
- * Fires `state` (detail: {state, text, waitMs?}) with the states connecting, open, waiting and
- * refused, and for each message of the robot an event of its type, with the message as detail.
+ * Fires `state` (detail: {state, text}) with the states connecting, open, waiting and refused;
+ * `invalid` (detail: a sentence) for bytes that are no message; and for each other message of the
+ * robot, but for pongs, an event of its type, with the message as detail.
  */
 export class Link extends EventTarget {
   #socket = null;
@@ -34,14 +36,15 @@ export class Link extends EventTarget {
   #token = 0;
   #key = "";
   #name = "";
-  #frames = true;
+  #trips = [];
 
   /** Description of the robot; null without a connection. */
   welcome = null;
 
-  constructor({ frames = true } = {}) {
-    super();
-    this.#frames = frames;
+  /** Median of the last round trips, ms, or null. */
+  get roundTripMs() {
+    if (!this.#trips.length) return null;
+    return [...this.#trips].sort((a, b) => a - b)[this.#trips.length >> 1];
   }
 
   /** Connect with a key, and reconnect until `close`. Throws an Error for an invalid key. */
@@ -65,7 +68,7 @@ export class Link extends EventTarget {
   }
 
   /** Send a message; returns false without a connection. */
-  say(kind, fields = {}) {
+  send(kind, fields = {}) {
     if (!this.welcome || this.#socket?.readyState !== WebSocket.OPEN) return false;
     this.#socket.send(encode({ kind, ...fields }));
     return true;
@@ -76,14 +79,15 @@ export class Link extends EventTarget {
     clearInterval(this.#pinging);
     this.#timer = 0;
     this.#pings.clear();
+    this.#trips = [];
     this.welcome = null;
     const socket = this.#socket;
     this.#socket = null;
     socket?.close();
   }
 
-  #tell(state, text, more = {}) {
-    this.dispatchEvent(new CustomEvent("state", { detail: { state, text, ...more } }));
+  #report(state, text) {
+    this.dispatchEvent(new CustomEvent("state", { detail: { state, text } }));
   }
 
   async #connect() {
@@ -91,10 +95,10 @@ export class Link extends EventTarget {
     this.#attempt += 1;
     const attempt = this.#attempt;
     const isOver = () => attempt !== this.#attempt;
-    this.#tell("connecting", "Connecting…");
+    this.#report("connecting", "Connecting…");
     let known;
     try {
-      known = await introduction();
+      known = await describeRobot();
     } catch {
       if (!isOver()) this.#wait("The robot does not answer.");
       return;
@@ -111,7 +115,7 @@ export class Link extends EventTarget {
       if (isOver()) return;
       const was = this.welcome;
       this.#drop();
-      if (refused && !was && /key/i.test(refused)) this.#tell("refused", refused);
+      if (refused && !was && /key/i.test(refused)) this.#report("refused", refused);
       else this.#wait(refused || (was ? "The connection is lost." : "The robot does not answer."));
     };
     socket.onmessage = async ({ data }) => {
@@ -126,12 +130,12 @@ export class Link extends EventTarget {
           : await makeProof(key, message.nonce, fromHex(known.certificate), "person");
         if (isOver()) return;
         const hello = { version: VERSION, proof, name: this.#name, role: "person" };
-        socket.send(encode({ kind: "hello", ...hello, frames: this.#frames }));
+        socket.send(encode({ kind: "hello", ...hello }));
       } else if (message.kind === "welcome") {
         clearTimeout(greeting);
         this.welcome = message;
         this.#waitMs = FIRST_WAIT_MS;
-        this.#tell("open", "Connected.");
+        this.#report("open", "Connected.");
         this.dispatchEvent(new CustomEvent("welcome", { detail: message }));
         this.#pinging = setInterval(() => this.#check(), PING_MS);
         this.ping();
@@ -148,7 +152,7 @@ export class Link extends EventTarget {
     try {
       return decode(new Uint8Array(data));
     } catch (error) {
-      this.dispatchEvent(new CustomEvent("nonsense", { detail: `Invalid message: ${error.message}` }));
+      this.dispatchEvent(new CustomEvent("invalid", { detail: `Invalid message: ${error.message}` }));
       return null;
     }
   }
@@ -157,13 +161,13 @@ export class Link extends EventTarget {
     const waitMs = this.#waitMs * (0.75 + 0.5 * Math.random()); // Spread the pages over time.
     this.#waitMs = Math.min(2 * this.#waitMs, LONGEST_WAIT_MS);
     this.#timer = setTimeout(() => this.#connect(), waitMs);
-    this.#tell("waiting", text, { waitMs });
+    this.#report("waiting", text);
   }
 
-  /** Measure the round trip; fires `pong`. */
+  /** Measure the round trip. */
   ping() {
     this.#token += 1;
-    if (this.say("ping", { token: this.#token })) this.#pings.set(this.#token, performance.now());
+    if (this.send("ping", { token: this.#token })) this.#pings.set(this.#token, performance.now());
   }
 
   #check() {
@@ -177,12 +181,11 @@ export class Link extends EventTarget {
     this.ping();
   }
 
-  #pong({ token, now_ns: robotNs }) {
+  #pong({ token }) {
     const sentMs = this.#pings.get(token);
     this.#pings.delete(token);
     if (sentMs === undefined) return;
-    const arrivedMs = performance.now();
-    const detail = { sentMs, arrivedMs, robotNs, roundTripMs: arrivedMs - sentMs };
-    this.dispatchEvent(new CustomEvent("pong", { detail }));
+    this.#trips.push(performance.now() - sentMs);
+    if (this.#trips.length > REMEMBERED) this.#trips.shift();
   }
 }

@@ -14,7 +14,7 @@ export class Log {
   }
 
   /** Return true if this text was the last one. */
-  said(text) {
+  isLast(text) {
     return text === this.#last.text;
   }
 

@@ -1,16 +1,16 @@
 // Assembles the page.
 
 import { Actions } from "./actions.js";
-import { find, tell } from "./dom.js";
-import { Door, keepKey, keptKey, keyFromAddress, someName } from "./door.js";
+import { find, setText } from "./dom.js";
 import { Driver } from "./driver.js";
 import { Episodes } from "./episodes.js";
 import { Gamepads } from "./gamepad.js";
+import { defaultName, keepKey, KeyForm, keyFromAddress, keptKey } from "./key_form.js";
 import { Keys } from "./keys.js";
-import { features, shown } from "./layout.js";
-import { introduction, Link } from "./link.js";
+import { features, formatNumber } from "./layout.js";
+import { describeRobot, Link } from "./link.js";
 import { Log } from "./log.js";
-import { Picture } from "./picture.js";
+import { ageOnArrivalMs, Picture } from "./picture.js";
 import { Pilot } from "./pilot.js";
 import { Readings } from "./readings.js";
 import { Recorder } from "./recorder.js";
@@ -18,7 +18,6 @@ import { listen } from "./shortcuts.js";
 import { Status } from "./status.js";
 import { Stick } from "./stick.js";
 import { Tilt } from "./tilt.js";
-import { ageOnArrivalMs, RoundTrips } from "./timing.js";
 
 const CAP_STEP = 10; // %
 const PRESS_MS = 1_000; // The click after a press is the same press.
@@ -27,10 +26,9 @@ const OLD_MS = 500; // An older picture is marked as old.
 const link = new Link();
 const log = new Log(find("log"));
 const picture = new Picture(find("picture"));
-const trips = new RoundTrips();
 const status = new Status();
 const recorder = new Recorder(link, log);
-const door = new Door(enter);
+const keyForm = new KeyForm(connect);
 
 const changed = () => driver?.changed();
 const keys = new Keys(changed);
@@ -45,17 +43,17 @@ let driver = null; // Depends on the robot's actions, so it is made for each con
 let actions = null;
 let readings = null;
 let key = "";
-let hasBeenIn = false;
+let wasConnected = false;
 
 function view(name) {
   if (document.body.dataset.view !== name) scrollTo(0, 0);
   document.body.dataset.view = name;
-  find("door").hidden = name !== "door";
-  find("cockpit").hidden = name !== "cockpit";
-  find("facts").hidden = name !== "cockpit";
+  find("login").hidden = name !== "login";
+  find("drive").hidden = name !== "drive";
+  find("facts").hidden = name !== "drive";
 }
 
-function enter(typed, name) {
+function connect(typed, name) {
   key = typed;
   link.open(key, name);
 }
@@ -65,28 +63,27 @@ function enter(typed, name) {
 link.addEventListener("state", ({ detail: { state, text } }) => {
   document.body.dataset.link = state;
   const again = state === "waiting" ? " Trying again…" : "";
-  tell(find("connection"), text + again);
+  setText(find("connection"), text + again);
   find("enter").disabled = state === "connecting";
   if (state === "open") return;
   if (state === "refused") {
-    view("door");
+    view("login");
     keepKey("");
-    door.show(key);
-    door.complain(text);
+    keyForm.show(key);
+    keyForm.showError(text);
   }
-  if (state === "waiting" && hasBeenIn) log.add(text, "trouble");
-  if (state !== "connecting") lose(text);
+  if (state === "waiting" && wasConnected) log.add(text, "trouble");
+  if (state !== "connecting") disconnected(text);
 });
 
-function lose(text) {
+function disconnected(text) {
   driver = null;
   for (const device of [keys, pads, stick, tilt]) device.letGo();
   showTilt();
   picture.forget();
-  tell(find("picture-state"), "Not connected.");
-  trips.clear();
+  setText(find("picture-state"), "Not connected.");
   episodes.close();
-  status.lose(`${text} The robot stops by itself without commands.`);
+  status.showLost(`${text} The robot stops by itself without commands.`);
 }
 
 link.addEventListener("welcome", ({ detail: welcome }) => {
@@ -100,14 +97,14 @@ link.addEventListener("welcome", ({ detail: welcome }) => {
   recorder.begin(welcome.can_record);
   episodes.begin(moves.map(({ name }) => name));
   document.title = welcome.robot;
-  tell(find("robot"), welcome.robot);
+  setText(find("robot"), welcome.robot);
   find("tilt").hidden = !(Tilt.isThere && pilot.hasStick);
   find("steer").dataset.stick = String(pilot.hasStick);
-  tell(find("picture-state"), welcome.image_size ? "No picture yet." : "This robot has no camera.");
-  view("cockpit");
-  if (!hasBeenIn) find("stage").focus({ preventScroll: true });
-  log.add(hasBeenIn ? "Connected again. Nothing moves until you arm it." : `Connected to ${welcome.robot}.`);
-  hasBeenIn = true;
+  setText(find("picture-state"), welcome.image_size ? "No picture yet." : "This robot has no camera.");
+  view("drive");
+  if (!wasConnected) find("stage").focus({ preventScroll: true });
+  log.add(wasConnected ? "Connected again. Nothing moves until you arm it." : `Connected to ${welcome.robot}.`);
+  wasConnected = true;
   driver.hide(document.hidden);
   driver.begin();
 });
@@ -118,7 +115,7 @@ link.addEventListener("observation", ({ detail: seen }) => {
   driver.observe(seen);
   // A hidden page draws nothing.
   if (document.hidden) return;
-  if (seen.frame) picture.show(seen.frame, ageOnArrivalMs(seen, trips.typicalMs), nowMs);
+  if (seen.frame) picture.show(seen.frame, ageOnArrivalMs(seen, link.roundTripMs), nowMs);
   status.show(seen, driver.mine, nowMs);
   actions.show(seen, driver.isDriving);
   readings.show(seen);
@@ -129,12 +126,11 @@ link.addEventListener("lease", ({ detail: lease }) => {
   if (lease.reason) log.add(lease.reason);
 });
 link.addEventListener("event", ({ detail: { text, name } }) => {
-  if (name === "disarmed" && log.said(text)) return; // An emergency stop also disarms, with the same text.
+  if (name === "disarmed" && log.isLast(text)) return; // An emergency stop also disarms, with the same text.
   log.add(text, name === "emergency" || name === "bump" ? "trouble" : "event");
 });
 link.addEventListener("refused", ({ detail: { reason } }) => log.add(reason, "refused"));
-link.addEventListener("nonsense", ({ detail }) => log.add(detail, "trouble"));
-link.addEventListener("pong", ({ detail }) => trips.add(detail.roundTripMs));
+link.addEventListener("invalid", ({ detail }) => log.add(detail, "trouble"));
 
 // Input of the person.
 
@@ -151,14 +147,14 @@ function disarm() {
 }
 
 function handOver() {
-  if (driver?.byProgram) driver.armAsItIs();
+  if (driver?.byProgram) driver.armForHolder();
   else driver?.handOver();
 }
 
 function setCap(percent) {
   const cap = find("cap");
   cap.value = percent;
-  tell(find("cap-shown"), `${cap.value} %`);
+  setText(find("cap-shown"), `${cap.value} %`);
   cap.setAttribute("aria-valuetext", `${cap.value} percent`);
   if (!driver) return;
   driver.scale = cap.valueAsNumber / 100;
@@ -182,7 +178,7 @@ for (const id of ["stop", "episodes-stop"]) {
 }
 find("arm").addEventListener("click", () => {
   if (driver?.seen?.armed) disarm();
-  else if (driver?.byProgram && !driver.seen.emergency) driver.armAsItIs();
+  else if (driver?.byProgram && !driver.seen.emergency) driver.armForHolder();
   else arm();
 });
 find("hand").addEventListener("click", () => {
@@ -209,11 +205,11 @@ find("leave").addEventListener("click", () => {
   driver?.hide(true);
   link.close();
   keepKey("");
-  lose("Disconnected.");
-  tell(find("connection"), "Not connected.");
-  hasBeenIn = false;
-  view("door");
-  door.show();
+  disconnected("Disconnected.");
+  setText(find("connection"), "Not connected.");
+  wasConnected = false;
+  view("login");
+  keyForm.show();
 });
 
 listen(stop, () => driver !== null, {
@@ -245,7 +241,7 @@ addEventListener("pagehide", () => {
   link.close();
 });
 addEventListener("pageshow", ({ persisted }) => {
-  if (persisted && hasBeenIn) link.open(key, find("name").value.trim() || someName());
+  if (persisted && wasConnected) link.open(key, find("name").value.trim() || defaultName());
 });
 addEventListener("online", () => link.retry());
 
@@ -258,32 +254,32 @@ function refresh() {
   const ageMs = picture.ageMs(nowMs);
   const isOld = ageMs === null || ageMs > OLD_MS;
   document.body.dataset.picture = ageMs === null ? "none" : isOld ? "old" : "live";
-  tell(find("age"), ageMs === null ? "–" : ageMs < 10_000 ? `${Math.round(ageMs / 10) * 10} ms` : "old");
-  tell(find("rate"), `${picture.rate(nowMs).toFixed(0)} /s`);
-  tell(find("trip"), trips.typicalMs === null ? "–" : shown(trips.typicalMs, "ms"));
+  setText(find("age"), ageMs === null ? "–" : ageMs < 10_000 ? `${Math.round(ageMs / 10) * 10} ms` : "old");
+  setText(find("rate"), `${picture.rate(nowMs).toFixed(0)} /s`);
+  setText(find("trip"), formatNumber(link.roundTripMs, "ms"));
   if (ageMs !== null) {
     const words = `The picture is ${(ageMs / 1000).toFixed(1)} s old, and not the current view.`;
-    tell(find("picture-state"), isOld ? words : "");
+    setText(find("picture-state"), isOld ? words : "");
   }
 }
 
 async function begin() {
-  view("door");
+  view("login");
   setCap(find("cap").valueAsNumber);
   requestAnimationFrame(refresh);
   key = keyFromAddress();
   let known;
   try {
-    known = await introduction();
+    known = await describeRobot();
   } catch {
-    tell(find("connection"), "The robot does not answer. Load this page again once it runs.");
+    setText(find("connection"), "The robot does not answer. Load this page again once it runs.");
     return;
   }
   document.title = known.robot;
-  tell(find("robot"), known.robot);
-  tell(find("connection"), "Not connected.");
+  setText(find("robot"), known.robot);
+  setText(find("connection"), "Not connected.");
   if (!globalThis.isSecureContext) {
-    door.bar(
+    keyForm.block(
       "The browser does not trust this page enough to prove the key: open it by https, or on the " +
         "robot itself at http://127.0.0.1.",
     );
@@ -292,12 +288,12 @@ async function begin() {
   key ||= keptKey();
   find("keep").setAttribute("aria-pressed", String(keptKey() !== ""));
   find("keep").hidden = known.open;
-  door.show(key);
+  keyForm.show(key);
   if (!key && !known.open) return;
   try {
-    enter(key, find("name").value);
+    connect(key, find("name").value);
   } catch (error) {
-    door.complain(error.message);
+    keyForm.showError(error.message);
   }
 }
 

@@ -1,14 +1,13 @@
 // Live picture: only the newest JPEG. One that arrives during decoding replaces the waiting one.
 
+import { msBetween } from "./layout.js";
+
 export class Picture {
   #canvas;
   #context;
   #waiting = null;
   #busy = false;
   #drawnMs = [];
-
-  /** Number of pictures skipped for newer ones. */
-  dropped = 0;
 
   constructor(canvas) {
     this.#canvas = canvas;
@@ -21,7 +20,6 @@ export class Picture {
    * `ageMs` is its age at `atMs` of this page's clock.
    */
   show(jpeg, ageMs, atMs) {
-    if (this.#waiting) this.dropped += 1;
     // A copy, because a view would keep the whole message in memory.
     this.#waiting = { blob: new Blob([jpeg], { type: "image/jpeg" }), ageMs, atMs };
     if (!this.#busy) this.#work();
@@ -59,7 +57,7 @@ export class Picture {
         this.newest = { ageMs, atMs };
         this.#drawnMs.push(performance.now());
       } catch {
-        this.dropped += 1; // An invalid JPEG; the age of the picture shows it.
+        // An invalid JPEG: the age of the picture shows it.
       }
     }
     this.#busy = false;
@@ -74,4 +72,13 @@ export function draw(canvas, context, bitmap) {
   }
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
+}
+
+/**
+ * Return the age of an observation on arrival, ms: on the robot, plus half a round trip.
+ *
+ * Clocks of two machines are never subtracted.
+ */
+export function ageOnArrivalMs(observation, roundTripMs) {
+  return msBetween(observation.captured_ns, observation.sent_ns) + (roundTripMs ?? 0) / 2;
 }

@@ -1,7 +1,7 @@
 // Numbers of the state, with their units and sources.
 
-import { find, make, tell } from "./dom.js";
-import { inWords, shown } from "./layout.js";
+import { find, make, setText } from "./dom.js";
+import { displayName, formatNumber } from "./layout.js";
 
 export class Readings {
   #features;
@@ -14,7 +14,7 @@ export class Readings {
     features.forEach(({ name }, index) => {
       if (name.endsWith("/applied")) return; // Shown with the actions.
       const value = make("dd");
-      list.append(make("div", {}, make("dt", {}, inWords(name)), value));
+      list.append(make("div", {}, make("dt", {}, displayName(name)), value));
       this.#cells.set(index, value);
     });
     find("sensed").hidden = this.#cells.size === 0;
@@ -23,19 +23,19 @@ export class Readings {
   show({ state, sources }) {
     for (const [index, cell] of this.#cells) {
       const { name } = this.#features[index];
-      tell(cell, inFew(state[index], this.#features[index]));
+      setText(cell, formatValue(state[index], this.#features[index]));
       const source = sources[name] ?? "";
       cell.dataset.source = source;
       cell.title = source === "absent" ? "Not measured." : source && `from ${source}`;
     }
     const battery = this.#features.findIndex(({ name }) => name === "battery");
     find("battery-fact").hidden = battery < 0;
-    if (battery >= 0) tell(find("battery"), shown(state[battery], this.#features[battery].unit));
+    if (battery >= 0) setText(find("battery"), formatNumber(state[battery], this.#features[battery].unit));
   }
 }
 
 /** Format a number with its unit, and a yes-or-no value as a word. */
-function inFew(value, { unit, low, high }) {
+function formatValue(value, { unit, low, high }) {
   if (!unit && low === 0 && high === 1 && (value === 0 || value === 1)) return value ? "yes" : "no";
-  return shown(value, unit);
+  return formatNumber(value, unit);
 }

@@ -1,6 +1,6 @@
 // Recorder: on and off, marks, and undo of the last five seconds.
 
-import { find, label, tell } from "./dom.js";
+import { find, label, setText } from "./dom.js";
 
 const UNDO_S = 5;
 
@@ -25,15 +25,15 @@ export class Recorder {
   }
 
   toggle() {
-    if (!find("recording").hidden) this.#link.say("record", { on: !this.#state.recording });
+    if (!find("recording").hidden) this.#link.send("record", { on: !this.#state.recording });
   }
 
   mark() {
-    if (this.#state?.recording) this.#link.say("mark");
+    if (this.#state?.recording) this.#link.send("mark");
   }
 
   undo() {
-    if (this.#state?.recording) this.#link.say("undo", { seconds: UNDO_S });
+    if (this.#state?.recording) this.#link.send("undo", { seconds: UNDO_S });
   }
 
   #show(state) {
@@ -51,6 +51,6 @@ export class Recorder {
     if (state.dropped) counts.push(`${state.dropped} undone`);
     if (state.marks) counts.push(state.marks === 1 ? "1 mark" : `${state.marks} marks`);
     const what = state.recording ? "Recording" : state.episode ? "Recorded" : "";
-    tell(find("recorder-state"), what ? `${what}: ${counts.join(" · ")}` : "Not recording.");
+    setText(find("recorder-state"), what ? `${what}: ${counts.join(" · ")}` : "Not recording.");
   }
 }

@@ -1,6 +1,6 @@
 // State of the robot and its driver in a sentence, and the buttons that can change it.
 
-import { find, label, tell } from "./dom.js";
+import { find, label, setText } from "./dom.js";
 
 const STOPPED_MS = 400; // A shorter reason would only flicker.
 
@@ -19,15 +19,15 @@ export class Status {
     const { body } = document;
     body.dataset.robot = seen.emergency ? "emergency" : seen.armed ? "armed" : "disarmed";
     body.dataset.driver = mine ? "me" : seen.holder_role || "nobody";
-    tell(find("holder"), mine ? "you" : seen.holder || "none");
-    tell(find("state"), sentence(seen, mine, reason));
-    if (seen.emergency && !this.#wasEmergency) tell(find("alert"), `Emergency stop. ${seen.stop_reason}`);
-    if (!seen.emergency) tell(find("alert"), "");
+    setText(find("holder"), mine ? "you" : seen.holder || "none");
+    setText(find("state"), sentence(seen, mine, reason));
+    if (seen.emergency && !this.#wasEmergency) setText(find("alert"), `Emergency stop. ${seen.stop_reason}`);
+    if (!seen.emergency) setText(find("alert"), "");
     this.#wasEmergency = seen.emergency;
     const isByProgram = !mine && seen.holder_role === "program";
     const arm = seen.emergency ? "End the stop, arm" : isByProgram ? `Arm for ${seen.holder}` : "Arm";
     label(find("arm"), seen.armed ? "Disarm" : arm);
-    tell(find("arm").lastElementChild, seen.armed ? "X" : isByProgram ? "P" : "E");
+    setText(find("arm").lastElementChild, seen.armed ? "X" : isByProgram ? "P" : "E");
     find("arm").setAttribute("aria-keyshortcuts", seen.armed ? "X" : isByProgram ? "P" : "E");
     const isOthers = !mine && seen.holder !== "";
     label(find("hand"), isOthers ? "Take over" : "Let a program drive");
@@ -35,12 +35,12 @@ export class Status {
   }
 
   /** Show a lost connection. */
-  lose(text) {
+  showLost(text) {
     const { body } = document;
     body.dataset.robot = "lost";
     body.dataset.driver = "nobody";
-    tell(find("holder"), "unknown");
-    tell(find("state"), text);
+    setText(find("holder"), "unknown");
+    setText(find("state"), text);
   }
 }
 

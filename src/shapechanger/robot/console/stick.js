@@ -54,13 +54,13 @@ export class Stick {
     // The knob's centre travels a third of the pad to each side, as in `place`.
     const steering = clip(((event.clientX - left) / width - 0.5) / 0.33);
     const throttle = clip((0.5 - (event.clientY - top) / height) / 0.33);
-    this.value = { steering: calm(steering), throttle: calm(throttle) };
+    this.value = { steering: withDeadZone(steering), throttle: withDeadZone(throttle) };
     this.#changed();
   }
 }
 
 /** Dead zone in the middle, so that a finger straight ahead does not steer. */
-function calm(value) {
+function withDeadZone(value) {
   const size = Math.abs(value);
   return size < 0.08 ? 0 : (Math.sign(value) * (size - 0.08)) / 0.92;
 }

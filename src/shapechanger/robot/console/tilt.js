@@ -45,8 +45,8 @@ export class Tilt {
     if (beta === null || gamma === null) return;
     const { across, along } = asHeld(beta, gamma, screen.orientation?.angle ?? 0);
     this.#middle ??= { across, along };
-    const steering = wish(across - this.#middle.across);
-    const throttle = wish(this.#middle.along - along);
+    const steering = deflection(across - this.#middle.across);
+    const throttle = deflection(this.#middle.along - along);
     this.value = { steering, throttle };
     this.#changed();
   }
@@ -60,7 +60,7 @@ function asHeld(beta, gamma, angle) {
   return { across: gamma, along: beta };
 }
 
-function wish(deg) {
+function deflection(deg) {
   const size = Math.abs(deg);
   if (size < DEAD_DEG) return 0;
   return Math.sign(deg) * Math.min(1, (size - DEAD_DEG) / (FULL_DEG - DEAD_DEG));

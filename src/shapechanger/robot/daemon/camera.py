@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Final, Generic, TypeVar
+from typing import Final
 
 import simplejpeg
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
-from shapechanger.robot.cameras.jpeg import FreezeDetector, check_jpeg
-
-_T = TypeVar("_T")
+from shapechanger.robot.cameras.jpeg import FreezeDetector
 
 _FUTURE_NS: Final = 50_000_000  # Two readings of one clock may be seen in the other order.
 _FIRST_PAUSE_S: Final = 0.1
@@ -21,41 +19,15 @@ _BAD_UNTIL_REOPENED: Final = 10
 _JOIN_S: Final = 2.0
 
 
-class Latest(Generic[_T]):
-    """Mailbox with one slot: a newer item replaces one that was not taken.
-
-    One thread may put and another may take; a race can only lose an item to a newer one.
-    """
-
-    __slots__ = ("_slot",)
-
-    def __init__(self) -> None:
-        self._slot: list[_T] = []
-
-    def put(self, item: _T) -> None:
-        """Replace the item."""
-        self._slot = [item]
-
-    def take(self) -> _T | None:
-        """Remove and return the item, or None if there is none."""
-        slot = self._slot
-        try:
-            return slot.pop()  # The first to pop has it; `put` makes a new list.
-        except IndexError:
-            return None
-
-
 class FrameChecks:
     """Rejects frames that fail to decode, repeat the last one or have an impossible time.
 
     Args:
-        size: Required width and height, pixels.
         now_ns: Returns the robot's time, to reject frames from the future; None where time moves
             in steps, and a frame may arrive before its time is known here.
     """
 
-    def __init__(self, size: tuple[int, int], now_ns: Callable[[], int] | None = None) -> None:
-        self._size = size
+    def __init__(self, now_ns: Callable[[], int] | None = None) -> None:
         self._now_ns = now_ns
         self._freeze = FreezeDetector()
         self._newest_ns = -1
@@ -64,11 +36,11 @@ class FrameChecks:
         """Return the reason to reject a frame, or "" if it is valid and new."""
         if not frame.encoded_here:
             try:
-                check_jpeg(frame.jpeg, self._size)
-                # To the last block: strict rejects data that a decoder would fill up with grey.
+                # The driver has checked the header. Strict rejects data that a decoder would fill
+                # up with grey.
                 simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
-            except (RobotError, ValueError) as error:
-                return str(error)
+            except ValueError as error:
+                return f"The camera sent a JPEG that cannot be decoded: {error}."
         if not self._freeze.is_new(frame.jpeg):
             return "The camera repeats the same frame."
         if frame.captured_ns <= self._newest_ns:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Final
 
 import aiohttp
@@ -20,7 +20,7 @@ from shapechanger.link.messages import (
     encode,
 )
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import Session
+from shapechanger.robot.daemon.session import NOT_READING, Session
 from shapechanger.robot.hardware import Clock
 
 HELLO_TIMEOUT_S: Final = 3.0
@@ -30,9 +30,8 @@ _log = logging.getLogger(__name__)
 
 _SEND_S: Final = 2.0  # A client that does not read for so long is disconnected.
 _CLOSE_S: Final = 1.0
-_HEARTBEAT_S: Final = (
-    4.0  # A dead radio sends nothing: the connection ends 6 s after it fell silent.
-)
+# A dead radio sends nothing: the connection ends 6 s after it fell silent.
+_HEARTBEAT_S: Final = 4.0
 _FRAME_WAIT_S: Final = 2.0  # Real time that a frame may spend in the camera's driver.
 
 # A camera that is about as fast as the commands sets the pace, so that each observation has a new
@@ -48,23 +47,21 @@ class Timekeeper:
         clock: The robot's clock.
         hub: State that all connections share.
         drain: Reads all states that the guard has sent.
+
+    Attributes:
+        in_steps: True if time stands still between calls of `step`.
     """
 
     def __init__(self, clock: Clock, hub: SessionHub, drain: Callable[[], None]) -> None:
         self._clock = clock
         self._hub = hub
         self._drain = drain
-        self._in_steps = hub.plan.clock == "twin"
+        self.in_steps = hub.plan.clock == "twin"
         self._one_at_a_time = asyncio.Lock()
-
-    @property
-    def in_steps(self) -> bool:
-        """True if time stands still between calls of `step`."""
-        return self._in_steps
 
     async def step(self, seconds: float) -> None:
         """Let `seconds` pass."""
-        if not self._in_steps:
+        if not self.in_steps:
             await self._clock.sleep(seconds)
             self._drain()
             return
@@ -73,7 +70,7 @@ class Timekeeper:
 
     async def settle(self) -> None:
         """Let the guard handle an order that was just given; a real clock needs no help."""
-        if self._in_steps and self._hub.unsettled:
+        if self.in_steps and self._hub.unsettled:
             self._hub.unsettled = False
             await self.step(1.0 / self._hub.plan.tick_hz)
 
@@ -139,7 +136,7 @@ class ObservationPacer:
     async def _wait_until_due(self) -> None:
         """Wait until one period after the last observation was due, or for its frame."""
         loop = asyncio.get_running_loop()
-        while (not self._comes_with_frame()) and loop.time() < self._due_s:
+        while not (self._by_frames and self._session.has_new_frame) and loop.time() < self._due_s:
             self._session.updated.clear()
             try:
                 async with asyncio.timeout_at(self._due_s):
@@ -154,9 +151,6 @@ class ObservationPacer:
             # was away gets no burst.
             was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
             self._due_s = was_s + self._period_s
-
-    def _comes_with_frame(self) -> bool:
-        return self._by_frames and self._session.has_new_frame
 
 
 def new_socket() -> web.WebSocketResponse:
@@ -243,16 +237,19 @@ class ClientConnection:
             _log.info("The connection of %s was cut.", self._session.client.name or "a client")
 
     async def _send(self, message: RobotMessage) -> None:
-        """Send a message.
+        await self._in_time(self._socket.send_bytes(encode(message)))
+
+    async def _in_time(self, sending: Awaitable[None]) -> None:
+        """Wait for a message to be sent.
 
         Raises:
             LinkError: If the client does not read it in time.
         """
         try:
             async with asyncio.timeout(_SEND_S):
-                await self._socket.send_bytes(encode(message))
+                await sending
         except TimeoutError:
-            raise LinkError("The client does not read its messages.") from None
+            raise LinkError(NOT_READING) from None
         except (ConnectionError, RuntimeError) as error:
             raise LinkError(f"The connection ended: {error}") from error
 
@@ -270,8 +267,8 @@ class ClientConnection:
             session.posted.clear()
             while (message := session.outbox.take()) is not None:
                 await self._send(message)
-            if session.overflow:
-                raise LinkError(session.overflow)
+            if session.outbox.is_full:
+                raise LinkError(NOT_READING)
 
     async def _observe(self) -> None:
         while True:
@@ -288,7 +285,8 @@ class ClientConnection:
             if message.type is WSMsgType.BINARY:
                 return message.data
             if message.type is WSMsgType.PING:
-                await self._pong(message.data)
+                self._session.count()
+                await self._in_time(self._socket.pong(message.data))
             elif message.type is WSMsgType.PONG:
                 self._session.count()
             elif message.type is WSMsgType.TEXT:
@@ -297,11 +295,3 @@ class ClientConnection:
                 raise LinkError(f"The message cannot be read: {message.data}.")
             else:
                 return None
-
-    async def _pong(self, data: bytes) -> None:
-        self._session.count()
-        try:
-            async with asyncio.timeout(_SEND_S):
-                await self._socket.pong(data)
-        except (TimeoutError, ConnectionError, RuntimeError) as error:
-            raise LinkError("The client does not read its messages.") from error

@@ -7,23 +7,21 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Command, Event, Lease, Refused, RobotMessage
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.control import (
-    ClientIdentity,
-    ControlLease,
-    PendingCommand,
-    PendingCommands,
-)
+from shapechanger.robot.daemon.control import ClientIdentity, ControlLease, PendingCommand
 from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
+
+if TYPE_CHECKING:
+    from shapechanger.robot.daemon.session import Session
 
 _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
@@ -31,24 +29,8 @@ _MAX_CLIENTS: Final = 8
 _MAX_PROGRAMS: Final = 6
 """Most programs among them, so that a person can always connect and stop the robot."""
 
+_NS_PER_MS: Final = 1_000_000
 _ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
-
-
-class ConnectedClient(Protocol):
-    """An authenticated connection, as the hub sees it."""
-
-    @property
-    def client(self) -> ClientIdentity:
-        """Identity of the client."""
-        ...
-
-    def post(self, message: RobotMessage) -> None:
-        """Queue a message."""
-        ...
-
-    def notify(self) -> None:
-        """Report a new state or frame."""
-        ...
 
 
 class SessionHub:
@@ -92,14 +74,15 @@ class SessionHub:
         self.unsettled = False
         self.now_ns = now_ns
         self._order = order
-        self._clients: dict[int, ConnectedClient] = {}
+        self._clients: dict[int, Session] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._pending = PendingCommands(plan.deadline_ms)
+        self._command: PendingCommand | None = None
+        self._suggestion: PendingCommand | None = None
         self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
 
-    def join(self, member: ConnectedClient) -> None:
-        """Add an authenticated client.
+    def join(self, member: Session) -> None:
+        """Add the session of an authenticated client.
 
         Raises:
             RobotRefused: If too many clients are connected.
@@ -119,10 +102,11 @@ class SessionHub:
         member = self._clients.pop(session, None)
         if member is None:
             return
-        self._pending.forget(session)
+        self._drop_suggestion(session)
         self.release(member.client, f"the connection to {member.client.name} ended")
-        self.recorder.forget(session)
         people = any(other.client.role == "person" for other in self._clients.values())
+        if self.recorder.builder is not None:
+            self.recorder.builder.forget(session)
         if self.recorder.on and not people:
             self.recorder.end("The last person disconnected, which ended the recording.")
             self._broadcast(self.recorder.state())
@@ -131,17 +115,16 @@ class SessionHub:
         """Give control to a client and report it to all, or report the refusal to the client."""
         refusal = self.lease.refusal(client)
         if refusal:
-            held = self.lease.holder
-            name = "" if held is None else held.name
-            self._clients[client.session].post(Lease(mine=False, holder=name, reason=refusal))
+            lease = Lease(mine=False, holder=self.lease.holder_name, reason=refusal)
+            self._clients[client.session].post(lease)
             return
         lost = self.lease.take(client)
-        self._pending.forget(client.session)
+        self._drop_suggestion(client.session)
         reason = f"{client.name} has control."
         if lost is not None:
             # The last command of the previous holder must not stay in force.
             self.give_order(Order(kind="halt"))
-            self._pending.clear_command()
+            self._command = None
             reason = f"{client.name}, a person, took control from {lost.name}."
         self._broadcast_lease(reason)
 
@@ -155,13 +138,14 @@ class SessionHub:
         if not self.lease.release(client.session):
             return
         self.give_order(Order(kind="disarm", reason=why))
-        self._pending.clear_command()
+        self._command = None
         self._broadcast_lease(f"No client has control: {why}.")
 
-    def command(self, command: Command, now_ns: int) -> None:
+    def command(self, client: ClientIdentity, command: Command, now_ns: int) -> None:
         """Pass a valid command of the lease holder to the guard.
 
         Args:
+            client: The lease holder.
             command: The command.
             now_ns: Its arrival time, ns.
         """
@@ -169,10 +153,11 @@ class SessionHub:
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
         values = tuple(command.scale * value for value in command.values)
-        if (held := self.lease.holder) is not None:
-            self._pending.command(held, values, command.ttl_ms, now_ns)
-            if self.state is not None and self.state.armed:
-                self.recorder.decided(held, command.answers, values, now_ns)
+        until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.deadline_ms)
+        self._command = PendingCommand(client, values, until_ns)
+        builder = self.recorder.builder
+        if builder is not None and self.state is not None and self.state.armed:
+            builder.decided(client, command.answers, values, now_ns)
         self._order(
             Order(
                 kind="command",
@@ -188,7 +173,7 @@ class SessionHub:
     def halt(self) -> None:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
         # Not `give_order`: the sender waits for an observation anyway, so time need not step.
-        self._pending.clear_command()
+        self._command = None
         self._order(Order(kind="halt", issued_ns=self.now_ns()))
 
     def give_order(self, order: Order) -> None:
@@ -200,20 +185,23 @@ class SessionHub:
         """Store the suggestion of a client without the lease.
 
         Args:
-            client: Who suggests.
-            values: What it would command, one value for each action.
+            client: The client that sent it.
+            values: One number for each action of the robot.
         """
-        self._pending.suggest(client, values, self.now_ns())
+        until_ns = self.now_ns() + _NS_PER_MS * self.plan.deadline_ms
+        self._suggestion = PendingCommand(client, values, until_ns)
 
     def commanded(self) -> tuple[float, ...]:
         """Return the values of the command in force, or () if there is none."""
-        if self.state is None or not self.state.armed:
+        command = self._command
+        if command is None or self.state is None or not self.state.armed:
             return ()
-        return self._pending.commanded(self.now_ns())
+        return command.values if self.now_ns() <= command.until_ns else ()
 
     def suggested(self) -> PendingCommand | None:
         """Return the unexpired suggestion, or None."""
-        return self._pending.suggested(self.now_ns())
+        pending = self._suggestion
+        return None if pending is None or self.now_ns() > pending.until_ns else pending
 
     def command_ns(self) -> int | None:
         """Return the arrival time of the command that the outputs follow, ns, or None."""
@@ -251,10 +239,14 @@ class SessionHub:
             member.post(message)
 
     def _broadcast_lease(self, reason: str) -> None:
-        held = self.lease.holder
-        name = "" if held is None else held.name
         for session, member in list(self._clients.items()):
-            member.post(Lease(mine=self.lease.holds(session), holder=name, reason=reason))
+            mine = self.lease.holds(session)
+            member.post(Lease(mine=mine, holder=self.lease.holder_name, reason=reason))
+
+    def _drop_suggestion(self, session: int) -> None:
+        """Drop the suggestion of a client that left or took the lease."""
+        if self._suggestion is not None and self._suggestion.client.session == session:
+            self._suggestion = None
 
     def _post_refused(self, state: GuardState) -> None:
         """Report a refused command to the lease holder, and any other refused order to all."""
@@ -267,7 +259,7 @@ class SessionHub:
 
     def _notify(self) -> None:
         for member in self._clients.values():
-            member.notify()
+            member.updated.set()
 
 
 def _state_events(before: GuardState | None, now: GuardState) -> list[tuple[str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import queue
 import re
@@ -10,7 +9,10 @@ import threading
 from array import array
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO, Final, cast
+from typing import Annotated, Any, BinaryIO, Final, Literal
+
+import msgspec
+from msgspec import Meta
 
 from shapechanger.demos.episodes import drop, keep
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode
@@ -34,12 +36,30 @@ Question = Browse | Fetch | Judge
 Answer = Recordings | Piece | Refused
 
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
-_FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")  # Never leads to another folder.
 # The start of `Step.to_json`. Steps are matched without parsing the JSON: there are 1200 a minute.
 _STEP: Final = re.compile(rb'\{"kind":"step","step":(\d{1,15}),')
 _MAX_TEXT: Final = 200
 _CHUNK: Final = 1 << 16
 _JOIN_S: Final = 2.0
+
+
+class _FrameOfLine(msgspec.Struct):
+    """The frame that a line of `steps.jsonl` names: file, size and checksum; None for none."""
+
+    # Such a name never leads to another folder.
+    frame: tuple[Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")], Any, Any] | None = None
+
+
+class _EditLine(msgspec.Struct):
+    """A line of `steps.jsonl` that drops or keeps steps."""
+
+    kind: Literal["drop", "keep"]
+    first: int
+    last: int
+
+
+_FRAME_DECODER: Final = msgspec.json.Decoder(_FrameOfLine)
+_EDIT_DECODER: Final = msgspec.json.Decoder(_EditLine)
 
 
 class RecordingLibrary:
@@ -51,10 +71,8 @@ class RecordingLibrary:
     """
 
     def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
-        self._folder = folder
+        self._recordings = None if folder is None else RecordingFolder(folder)
         self._call = call
-        self._summaries = Summaries(Path() if folder is None else folder)
-        self._index: LineIndex | None = None
         self._work: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
@@ -65,13 +83,13 @@ class RecordingLibrary:
             question: The question; a judgement must come from a person.
             then: Called with the answer, in the event loop's thread.
         """
-        folder = self._folder
-        if folder is None:
+        recordings = self._recordings
+        if recordings is None:
             then(Refused(reason="This robot was served without a folder for recordings."))
             return
 
         def work() -> None:
-            answer = self._answer(folder, question)
+            answer = recordings.answer(question)
             self._call(lambda: then(answer))
 
         if self._thread is None:
@@ -89,22 +107,70 @@ class RecordingLibrary:
         while (work := self._work.get()) is not None:
             work()
 
-    def _answer(self, folder: Path, question: Question) -> Answer:
+
+class RecordingFolder:
+    """Folder of episodes; an unchanged episode is read once for the list.
+
+    Args:
+        folder: The folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._known: dict[str, tuple[tuple[int, ...], EpisodeSummary]] = {}
+        self._index: LineIndex | None = None
+
+    def answer(self, question: Question) -> Answer:
+        """Answer a question; errors of the disk are refusals."""
         try:
             match question:
                 case Browse():
-                    return self._summaries.newest(question.before)
+                    return self._newest(question.before)
                 case Fetch():
-                    return self._piece(_episode(folder, question.episode), question)
+                    return self._piece(self._path(question.episode), question)
                 case Judge():
-                    path = _episode(folder, question.episode)
+                    path = self._path(question.episode)
                     if question.keep:
                         keep(path, question.first, question.last)
                     else:
                         drop(path, question.first, question.last, "bad")
-                    return Recordings(episodes=(self._summaries.summary(question.episode),))
+                    return Recordings(episodes=(self.summary(question.episode),))
         except (ShapechangerError, OSError, ValueError) as error:
             return Refused(reason=str(error))
+
+    def summary(self, name: str) -> EpisodeSummary:
+        """Summarise one episode; the outcome of an unreadable one is the error."""
+        path = self._folder / name
+        try:
+            stamp = _stamp(path)
+            known = self._known.get(name)
+            if known is not None and known[0] == stamp:
+                return known[1]
+            summary = _summary(path)
+        except (DemosError, OSError) as error:
+            return EpisodeSummary(id=name, outcome=str(error)[:_MAX_TEXT])
+        self._known[name] = stamp, summary
+        return summary
+
+    def _newest(self, before: str) -> Recordings:
+        """List the newest episodes with ids before `before`, or all for ""; newest first."""
+        paths = list(self._folder.iterdir()) if self._folder.exists() else []
+        found = sorted((path.name for path in paths if _is_listed(path)), reverse=True)
+        self._known = {name: self._known[name] for name in found if name in self._known}
+        found = [name for name in found if not before or name < before]
+        listed = tuple(self.summary(name) for name in found[:MAX_EPISODES])
+        return Recordings(episodes=listed, more=len(found) > MAX_EPISODES)
+
+    def _path(self, name: str) -> Path:
+        """Return the folder of an episode, directly inside that of the recordings.
+
+        Raises:
+            DemosError: If it does not exist.
+        """
+        path = self._folder / name
+        if not _EPISODE_ID.fullmatch(name) or not _is_listed(path):
+            raise DemosError(f"There is no episode {name!r} on this robot.")
+        return path
 
     def _piece(self, path: Path, question: Fetch) -> Piece:
         """Read a part of an episode.
@@ -146,61 +212,6 @@ class RecordingLibrary:
         if size > MAX_PIECE and len(encode(piece)) > MAX_ROBOT_MESSAGE:
             raise DemosError(f"Line {question.first + 1} of {steps} is too large to send.")
         return piece
-
-
-class Summaries:
-    """List of the episodes in a folder; an unchanged episode is read once.
-
-    Args:
-        folder: Folder of the recordings.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._known: dict[str, tuple[tuple[int, ...], EpisodeSummary]] = {}
-
-    def newest(self, before: str) -> Recordings:
-        """List the newest episodes, newest first.
-
-        Args:
-            before: Only episodes whose id sorts before this one; "" for all.
-
-        Raises:
-            OSError: If the folder cannot be read.
-        """
-        found = sorted(self._ids(), reverse=True)
-        self._known = {name: self._known[name] for name in found if name in self._known}
-        found = [name for name in found if not before or name < before]
-        listed = tuple(self.summary(name) for name in found[:MAX_EPISODES])
-        return Recordings(episodes=listed, more=len(found) > MAX_EPISODES)
-
-    def summary(self, name: str) -> EpisodeSummary:
-        """Summarise one episode; the outcome of an unreadable one is the error."""
-        path = self._folder / name
-        try:
-            stamp = _stamp(path)
-            known = self._known.get(name)
-            if known is not None and known[0] == stamp:
-                return known[1]
-            summary = _summary(path)
-        except (DemosError, OSError) as error:
-            return EpisodeSummary(
-                id=name,
-                steps=0,
-                kept=0,
-                seconds=0.0,
-                closed=False,
-                created="",
-                driver="",
-                outcome=str(error)[:_MAX_TEXT],
-            )
-        self._known[name] = stamp, summary
-        return summary
-
-    def _ids(self) -> list[str]:
-        if not self._folder.exists():
-            return []
-        return [path.name for path in self._folder.iterdir() if _is_listed(path)]
 
 
 class LineIndex:
@@ -259,18 +270,6 @@ def _is_listed(path: Path) -> bool:
     return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)
 
 
-def _episode(folder: Path, name: str) -> Path:
-    """Return the folder of an episode, directly inside that of the recordings.
-
-    Raises:
-        DemosError: If it does not exist.
-    """
-    path = folder / name
-    if not _EPISODE_ID.fullmatch(name) or not _is_listed(path):
-        raise DemosError(f"There is no episode {name!r} on this robot.")
-    return path
-
-
 def _frame(path: Path, name: str) -> bytes:
     """Read a frame of an episode.
 
@@ -292,16 +291,10 @@ def _frame_name(line: str, steps: Path, number: int) -> str:
         DemosError: If the line is damaged.
     """
     try:
-        fields = json.loads(line)
-    except ValueError as error:
+        frame = _FRAME_DECODER.decode(line).frame
+    except msgspec.MsgspecError as error:
         raise DemosError(f"Line {number + 1} of {steps} is damaged: {error}.") from error
-    frame = cast("dict[str, Any]", fields).get("frame") if isinstance(fields, dict) else None
-    if frame is None:
-        return ""
-    name = cast("list[Any]", frame)[0] if isinstance(frame, list) and frame else None
-    if not isinstance(name, str) or not _FRAME_NAME.fullmatch(name):
-        raise DemosError(f"Line {number + 1} of {steps} is damaged: its frame is {name!r}.")
-    return name
+    return "" if frame is None else frame[0]
 
 
 def _stamp(path: Path) -> tuple[int, ...]:
@@ -337,7 +330,7 @@ def _steps(file: Path) -> tuple[set[int], set[int]]:
     """
     steps: set[int] = set()
     dropped: set[int] = set()
-    edits: list[dict[str, Any]] = []
+    edits: list[_EditLine] = []
     with file.open("rb") as lines:
         for line in lines:
             step = _STEP.match(line)
@@ -347,19 +340,14 @@ def _steps(file: Path) -> tuple[set[int], set[int]]:
                 edits.append(edit)
     for edit in edits:
         # Only existing steps, whatever range the line names.
-        reach = {index for index in steps if edit["first"] <= index <= edit["last"]}
-        (dropped.difference_update if edit["kind"] == "keep" else dropped.update)(reach)
+        reach = {index for index in steps if edit.first <= index <= edit.last}
+        (dropped.difference_update if edit.kind == "keep" else dropped.update)(reach)
     return steps, dropped
 
 
-def _edit(line: bytes) -> dict[str, Any] | None:
+def _edit(line: bytes) -> _EditLine | None:
     """Return a line that drops or keeps steps, or None for any other or incomplete line."""
     try:
-        fields = json.loads(line)
-    except ValueError:
+        return _EDIT_DECODER.decode(line)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
         return None
-    if not isinstance(fields, dict):
-        return None
-    edit = cast("dict[str, Any]", fields)
-    numbers = isinstance(edit.get("first"), int) and isinstance(edit.get("last"), int)
-    return edit if edit.get("kind") in ("drop", "keep") and numbers else None

@@ -16,7 +16,7 @@ import socket
 import ssl
 from collections import Counter
 from collections.abc import Callable, Hashable
-from typing import Final, Protocol
+from typing import Final
 
 from shapechanger.errors import RobotError
 
@@ -30,24 +30,6 @@ _MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two p
 _BACKLOG: Final = 32
 _SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few frames.
 _ACCEPT_PAUSE_S: Final = 0.05  # After a failed accept, most likely for want of descriptors.
-
-
-class PreAuthConnection(Protocol):
-    """An accepted socket."""
-
-    @property
-    def address(self) -> str:
-        """The address of the other end."""
-        ...
-
-    @property
-    def is_gone(self) -> bool:
-        """True once the connection has closed by itself."""
-        ...
-
-    def drop(self) -> None:
-        """Close the connection without a message."""
-        ...
 
 
 class PreAuthConnections:
@@ -72,13 +54,13 @@ class PreAuthConnections:
         self._max_per_address = max_per_address
         self._timeout_s = timeout_s
         # Oldest first.
-        self._waiting: dict[Hashable, tuple[PreAuthConnection, asyncio.TimerHandle]] = {}
+        self._waiting: dict[Hashable, tuple[AcceptedSocket, asyncio.TimerHandle]] = {}
 
     def __len__(self) -> int:
         """Return the number of connections."""
         return len(self._waiting)
 
-    def add(self, key: Hashable, connection: PreAuthConnection) -> None:
+    def add(self, key: Hashable, connection: AcceptedSocket) -> None:
         """Add a connection, and drop another one if there are too many.
 
         Args:
@@ -112,10 +94,9 @@ class PreAuthConnections:
 
     def drop_one(self) -> None:
         """Drop the oldest connection of the address that has the most."""
-        counts = self._counts()
-        if counts:
-            # Of addresses with equal counts, `max` picks the one that connected first.
-            self._drop_oldest(max(counts, key=lambda address: counts[address]))
+        # Of addresses with equal counts, this is the one that connected first.
+        for address, _ in self._counts().most_common(1):
+            self._drop_oldest(address)
 
     def close(self) -> None:
         """Drop all connections."""
@@ -125,7 +106,7 @@ class PreAuthConnections:
     def _counts(self) -> Counter[str]:
         return Counter(connection.address for connection, _ in self._waiting.values())
 
-    def _insert(self, key: Hashable, connection: PreAuthConnection) -> None:
+    def _insert(self, key: Hashable, connection: AcceptedSocket) -> None:
         timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
         self._waiting[key] = connection, timer
 
@@ -218,13 +199,19 @@ class Listener:
             fails = False
             protocol = self._protocol()
             self._connections.add(
-                protocol, _AcceptedSocket(accepted, address[0], protocol, self._tls)
+                protocol, AcceptedSocket(accepted, address[0], protocol, self._tls)
             )
             await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
 
 
-class _AcceptedSocket:
+class AcceptedSocket:
     """A connection from its acceptance on, through the TLS handshake.
+
+    Args:
+        accepted: The socket, which this object owns.
+        address: The address of the other end.
+        protocol: Handles the connection once it is open.
+        tls: The TLS context, or None for plain TCP.
 
     Attributes:
         address: The address of the other end.

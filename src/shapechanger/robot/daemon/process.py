@@ -10,6 +10,7 @@ import logging
 import os
 import queue
 import signal
+from collections import deque
 from collections.abc import Callable, Sequence
 from logging.handlers import QueueHandler, QueueListener
 from pathlib import Path
@@ -19,10 +20,10 @@ from shapechanger.errors import ShapechangerError
 from shapechanger.link.address import Address, is_loopback
 from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.daemon.camera import FrameChecks, FrameReader, Latest
+from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from shapechanger.robot.daemon.connection import Timekeeper
 from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
-from shapechanger.robot.daemon.discovery import Announcement
+from shapechanger.robot.daemon.discovery import announce, withdraw
 from shapechanger.robot.daemon.guard_link import GuardLink, send_heartbeats, send_lifeline
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -41,7 +42,7 @@ _MAX_LOG_LINES: Final = 1000
 
 
 class Daemon:
-    """The daemon of a robot, from start to end.
+    """The daemon of a robot, from start to end; make it in the event loop that runs it.
 
     Args:
         plan: Settings of the daemon.
@@ -62,14 +63,14 @@ class Daemon:
         self._plan = plan
         self._clock = clock
         self._ended = asyncio.Event()
-        self._guard_heard = asyncio.Event()  # The guard has reported, or never will.
+        self._guard_reported = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
         self._guard = GuardLink(
             guard_fd,
             on_state=self._on_state,
             on_lost=lambda: self.end("The guard is gone."),
         )
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop = asyncio.get_running_loop()
         self._hub = SessionHub(plan, clock.now_ns, self._guard.send, self._call)
         self._heartbeat_fd = heartbeat_fd
         self._ready_fd = ready_fd
@@ -84,7 +85,6 @@ class Daemon:
             RobotError: If it cannot start.
         """
         plan = self._plan
-        loop = self._loop = asyncio.get_running_loop()
         check_exposure(plan)
         key = read_key(Path(plan.key_file)) if plan.key_file else b""
         tls, fingerprint = None, b""
@@ -95,20 +95,22 @@ class Daemon:
         tasks = [
             asyncio.create_task(work) for work in (self._heartbeats(), self._report_recorder())
         ]
-        self._guard.attach(loop)
+        self._guard.attach(self._loop)
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
             # The first client must not see a robot of unknown state. Where time moves in steps,
             # the guard reports nothing before the first step.
             if not time.in_steps:
-                await self._guard_heard.wait()
+                await self._guard_reported.wait()
             if not self._ended.is_set():
                 port = await server.start()
                 self._report_ready(port, fingerprint)
-                announcement = self._announcement(port, fingerprint)
-                if announcement is not None:
-                    await announcement.start()
+                if plan.discovery and is_loopback(plan.host):
+                    words = "%s is not announced: only this machine reaches %s."
+                    _log.info(words, plan.robot, plan.host)
+                elif plan.discovery:
+                    announcement = await announce(plan, port, fingerprint)
             await self._ended.wait()
         finally:
             # First of all the guard stops the robot, when it sees this socket close.
@@ -118,7 +120,7 @@ class Daemon:
                 await asyncio.to_thread(camera.close)
             await server.close()
             if announcement is not None:
-                await announcement.close()
+                await withdraw(announcement)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -130,11 +132,11 @@ class Daemon:
         """Stop serving; the first reason counts."""
         self._why = self._why or why
         self._ended.set()
-        self._guard_heard.set()
+        self._guard_reported.set()
 
     def _on_state(self, state: GuardState) -> None:
         self._hub.on_state(state)
-        self._guard_heard.set()
+        self._guard_reported.set()
 
     async def _heartbeats(self) -> None:
         if self._heartbeat_fd is not None:
@@ -148,21 +150,19 @@ class Daemon:
 
     def _call(self, work: Callable[[], None]) -> None:
         """Run a function in the event loop's thread, from any other thread."""
-        if self._loop is not None:
-            with contextlib.suppress(RuntimeError):  # The loop ended before the thread.
-                self._loop.call_soon_threadsafe(work)
+        with contextlib.suppress(RuntimeError):  # The loop ended before the thread.
+            self._loop.call_soon_threadsafe(work)
 
     def _camera(self, plan: CameraPlan) -> FrameReader:
         """Start to read the camera. While the loop is busy, only the newest frame is kept."""
-        newest: Latest[Frame] = Latest()
+        newest: deque[Frame] = deque(maxlen=1)
 
         def collect() -> None:
-            frame = newest.take()
-            if frame is not None:
-                self._hub.on_frame(frame)
+            if newest:
+                self._hub.on_frame(newest.pop())
 
         def deliver(frame: Frame) -> None:
-            newest.put(frame)
+            newest.append(frame)
             self._call(collect)
 
         def report(text: str) -> None:
@@ -170,19 +170,9 @@ class Daemon:
             self._call(lambda: self._hub.event("camera", text))
 
         now_ns = self._clock.now_ns if self._plan.clock == "real" else None
-        reader = FrameReader(plan, FrameChecks(plan.size, now_ns), deliver, report)
+        reader = FrameReader(plan, FrameChecks(now_ns), deliver, report)
         reader.start()
         return reader
-
-    def _announcement(self, port: int, fingerprint: bytes) -> Announcement | None:
-        """Return the announcement on the network, or None where it is unwanted or pointless."""
-        plan = self._plan
-        if not plan.discovery:
-            return None
-        if is_loopback(plan.host):
-            _log.info("%s is not announced: only this machine reaches %s.", plan.robot, plan.host)
-            return None
-        return Announcement(plan, port, fingerprint)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
         """Report the port in the log, and to the process that started this one."""

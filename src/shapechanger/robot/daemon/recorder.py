@@ -7,7 +7,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -17,7 +17,7 @@ import msgspec
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation, RecorderState, Refused, RobotMessage
+from shapechanger.link.messages import Mark, Observation, RecorderState, Refused, RobotMessage, Undo
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -34,17 +34,8 @@ _NOT_RECORDING: Final = "Nothing is being recorded."
 
 _Post = Callable[[RobotMessage], None]
 
-
-class StepWithFrame(NamedTuple):
-    """A step and its frame.
-
-    Attributes:
-        step: The step.
-        jpeg: The frame; None if it is that of the step before, or there is no camera.
-    """
-
-    step: Step
-    jpeg: bytes | None
+_Write = Callable[[Step, bytes | None], object]
+"""Writes a step and its frame, which is None if it is that of the step before."""
 
 
 class _Seen(NamedTuple):
@@ -71,33 +62,38 @@ class StepBuilder:
     backwards in an episode.
 
     Args:
+        limits: Range of each action, to which the guard clips.
+        write: Called with each complete step, and its frame as JPEG; None if the frame is that of
+            the step before, or there is no camera.
         wall_ns: Returns the Unix time, ns.
     """
 
-    def __init__(self, wall_ns: Callable[[], int] = time.time_ns) -> None:
+    def __init__(
+        self,
+        limits: Sequence[tuple[float, float]],
+        write: _Write,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._limits = limits
+        self._write = write
         self._wall_ns = wall_ns
         self._seen: dict[int, deque[_Seen]] = {}
         self._decided: _Decided | None = None
         self._newest: _Decided | None = None
         self._frame_seq = 0
 
-    def observed(
-        self, session: int, observation: Observation, frame: NumberedFrame | None
-    ) -> StepWithFrame | None:
-        """Note an observation that is sent to a client.
+    def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
+        """Note an observation that is sent to a client, and complete the step before it.
 
         Args:
             session: Number of the connection.
             observation: The observation.
             frame: The newest frame, whether or not it was sent to this client.
-
-        Returns:
-            The step that this completes, or None.
         """
         self._seen.setdefault(session, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
         decided = self._decided
         if decided is None or decided.session != session:
-            return None
+            return
         if observation.mine:
             step = replace(
                 decided.step,
@@ -105,31 +101,31 @@ class StepBuilder:
                 stop_reason=observation.stop_reason,
             )
             self._decided = decided._replace(step=step)
-        return self.complete()
+        self.complete()
 
     def decided(
-        self, client: ClientIdentity, answers: int, action: tuple[float, ...], now_ns: int
-    ) -> StepWithFrame | None:
-        """Note a command of a client.
+        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
+    ) -> None:
+        """Note a command of a client, and complete a step that answers another observation.
 
         Args:
             client: The client.
             answers: `seq` of the observation that the command answers.
-            action: The values of the command.
+            values: The values of the command.
             now_ns: Arrival time on the robot's clock, ns.
-
-        Returns:
-            The previous step, which this completes, or None.
         """
         window = self._seen.get(client.session, ())
         seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
         if seen is None or self._is_past(client.session, seen):
-            return None
+            return
         before = self._decided
-        again = before is not None and before.session == client.session and before.seen is seen
-        completed = None if again else self.complete()
+        if before is None or before.session != client.session or before.seen is not seen:
+            self.complete()
         step = Step(
-            action=action,
+            action=tuple(
+                min(max(value, low), high)
+                for value, (low, high) in zip(values, self._limits, strict=True)
+            ),
             driver=client.role,
             wanted=seen.observation.suggested or None,
             state=seen.observation.state,
@@ -138,17 +134,16 @@ class StepBuilder:
             wall_ns=self._wall_ns(),
         )
         self._decided = self._newest = _Decided(client.session, seen, step)
-        return completed
 
-    def complete(self) -> StepWithFrame | None:
-        """Return the pending step with the outputs known so far, or None."""
+    def complete(self) -> None:
+        """Write the pending step, if there is one, with the outputs known so far."""
         decided, self._decided = self._decided, None
         if decided is None:
-            return None
+            return
         frame, jpeg = decided.seen.frame, None
         if frame is not None and frame.seq != self._frame_seq:
             self._frame_seq, jpeg = frame.seq, frame.frame.jpeg
-        return StepWithFrame(decided.step, jpeg)
+        self._write(decided.step, jpeg)
 
     def forget(self, session: int) -> None:
         """Drop the observations of a client that left."""
@@ -198,45 +193,43 @@ class EpisodeThread:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def add(self, step: StepWithFrame) -> bool:
-        """Write a step. Return False if the disk is too slow, which ends the episode."""
-
-        def write(writer: EpisodeWriter) -> None:
-            writer.add(step.step, step.jpeg)
-            self._note(writer)
-
-        return self._put(write, len(step.jpeg or b""))
-
-    def mark(self, text: str, then: Callable[[str], None]) -> None:
-        """Mark the newest step.
+    def add(self, step: Step, jpeg: bytes | None) -> bool:
+        """Write a step.
 
         Args:
-            text: Text of the mark.
-            then: Called in the thread with the reason for a refusal, or "".
+            step: The step.
+            jpeg: Its frame; None if it is that of the step before, or there is no camera.
+
+        Returns:
+            False if the disk is too slow, which ends the episode.
         """
 
         def write(writer: EpisodeWriter) -> None:
-            if writer.steps:
-                writer.mark(text)
+            writer.add(step, jpeg)
             self._note(writer)
-            then("" if writer.steps else "There is no step to mark yet.")
 
-        self._put(write, len(text))
+        return self._put(write, len(jpeg or b""))
 
-    def undo(self, seconds: float, then: Callable[[str], None]) -> None:
-        """Drop the newest steps.
+    def edit(self, request: Mark | Undo, then: Callable[[str], None]) -> None:
+        """Mark the newest step, or drop the newest ones.
 
         Args:
-            seconds: How far back, s.
+            request: The mark's text, or how far back to drop.
             then: Called in the thread with the reason for a refusal, or "".
         """
 
-        def write(writer: EpisodeWriter) -> None:
-            dropped = writer.undo(seconds)
+        def edit(writer: EpisodeWriter) -> None:
+            refusal = ""
+            if isinstance(request, Undo):
+                refusal = "" if writer.undo(request.seconds) else "There is nothing to undo."
+            elif writer.steps:
+                writer.mark(request.text)
+            else:
+                refusal = "There is no step to mark yet."
             self._note(writer)
-            then("" if dropped else "There is nothing to undo.")
+            then(refusal)
 
-        self._put(write, 0)
+        self._put(edit, 0)
 
     def end(self, outcome: str = "") -> None:
         """Close the episode once all steps are written."""
@@ -324,6 +317,9 @@ class Recorder:
         plan: Settings of the daemon.
         broadcast: Sends a message to all clients.
         call: Runs a function in the event loop's thread, from any other thread.
+
+    Attributes:
+        builder: Makes the steps of the episode; None while nothing is recorded.
     """
 
     def __init__(
@@ -335,18 +331,13 @@ class Recorder:
         features = Layout.from_json(plan.action_layout).features
         self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
         self._thread: EpisodeThread | None = None
-        self._builder: StepBuilder | None = None
+        self.builder: StepBuilder | None = None
         self._text = ""
-
-    @property
-    def can_record(self) -> bool:
-        """True if there is a folder for recordings."""
-        return bool(self._plan.recordings)
 
     @property
     def on(self) -> bool:
         """True while an episode is recorded."""
-        return self._builder is not None
+        return self.builder is not None
 
     def state(self) -> RecorderState:
         """Return the state of the recorder."""
@@ -365,7 +356,7 @@ class Recorder:
         Returns:
             The reason for a refusal, or "".
         """
-        if not self.can_record:
+        if not self._plan.recordings:
             return "This robot was served without a folder for recordings."
         if self.on:
             return (
@@ -385,7 +376,7 @@ class Recorder:
             notes={"name": name, "recorded_by": client.name},
         )
         self._text = ""
-        self._builder = StepBuilder()
+        self.builder = StepBuilder(self._limits, self._write)
 
         def report(what: Literal["begun", "ended"], trouble: str) -> None:
             self._call(lambda: self._reported(thread, what, trouble, post))
@@ -404,53 +395,36 @@ class Recorder:
         Returns:
             The reason for a refusal, or "".
         """
-        if self._thread is None or self._builder is None:
+        if self._thread is None or self.builder is None:
             return _NOT_RECORDING
-        self._write(self._builder.complete())
-        self._builder = None
+        self.builder.complete()
+        self.builder = None
         self._text = self._text or text
         self._thread.end(text)
         return ""
 
-    def mark(self, text: str, post: _Post) -> str:
-        """Mark the newest step. Return the reason for a refusal, or "".
+    def edit(self, request: Mark | Undo, post: _Post) -> str:
+        """Mark the newest step, or drop the newest ones, after the pending step.
 
         Args:
-            text: The mark's text.
-            post: Called with the message that reports the outcome.
+            request: The mark's text, or how far back to drop.
+            post: Called with the message that reports a later refusal.
+
+        Returns:
+            The reason for a refusal, or "".
         """
-        return self._edit(lambda thread: thread.mark(text, self._then(post)))
+        if self._thread is None or self.builder is None:
+            return _NOT_RECORDING
+        self.builder.complete()
 
-    def undo(self, seconds: float, post: _Post) -> str:
-        """Drop the newest steps. Return the reason for a refusal, or "".
+        def answer(refusal: str) -> None:
+            if refusal:
+                post(Refused(reason=refusal))
+            else:
+                self._broadcast(self.state())
 
-        Args:
-            seconds: Time to drop, s.
-            post: Called with the message that reports the outcome.
-        """
-        return self._edit(lambda thread: thread.undo(seconds, self._then(post)))
-
-    def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
-        """Note an observation that is sent to a client; see `StepBuilder.observed`."""
-        if self._builder is not None:
-            self._write(self._builder.observed(session, observation, frame))
-
-    def decided(
-        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
-    ) -> None:
-        """Note a command, clipped as the guard clips it; see `StepBuilder.decided`."""
-        if self._builder is None:
-            return
-        action = tuple(
-            min(max(value, low), high)
-            for value, (low, high) in zip(values, self._limits, strict=True)
-        )
-        self._write(self._builder.decided(client, answers, action, now_ns))
-
-    def forget(self, session: int) -> None:
-        """Drop the observations of a client that left."""
-        if self._builder is not None:
-            self._builder.forget(session)
+        self._thread.edit(request, lambda refusal: self._call(lambda: answer(refusal)))
+        return ""
 
     def tick(self) -> None:
         """Report the state to all clients while recording; called once a second."""
@@ -463,31 +437,12 @@ class Recorder:
         if self._thread is not None:
             self._thread.join(_CLOSE_S)
 
-    def _edit(self, edit: Callable[[EpisodeThread], None]) -> str:
-        """Edit the episode after the pending step. Return the reason for a refusal, or ""."""
-        if self._thread is None or self._builder is None:
-            return _NOT_RECORDING
-        self._write(self._builder.complete())
-        edit(self._thread)
-        return ""
-
-    def _write(self, step: StepWithFrame | None) -> None:
-        if step is None or self._thread is None or self._thread.add(step):
+    def _write(self, step: Step, jpeg: bytes | None) -> None:
+        if self._thread is None or self._thread.add(step, jpeg):
             return
         # The thread reports this too, once the disk responds.
-        self._builder, self._text = None, DISK_TOO_SLOW
+        self.builder, self._text = None, DISK_TOO_SLOW
         self._broadcast(self.state())
-
-    def _then(self, post: _Post) -> Callable[[str], None]:
-        """Return a handler for the thread's answer to a request of one person."""
-
-        def answer(refusal: str) -> None:
-            if refusal:
-                post(Refused(reason=refusal))
-            else:
-                self._broadcast(self.state())
-
-        return lambda refusal: self._call(lambda: answer(refusal))
 
     def _reported(
         self, thread: EpisodeThread, what: Literal["begun", "ended"], trouble: str, post: _Post
@@ -497,7 +452,7 @@ class Recorder:
         if thread is not self._thread:
             return  # The next episode has begun already, and its state was reported.
         if what == "ended":
-            self._builder = None
+            self.builder = None
             self._text = self._text or trouble
             if trouble and not thread.progress.episode:
                 post(Refused(reason=trouble))  # The episode could not even begin.

@@ -17,7 +17,7 @@ from shapechanger.errors import LinkError, RobotError, ShapechangerError
 from shapechanger.link.address import is_loopback, parse_address
 from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import VERSION
-from shapechanger.robot.console.files import ENTRY, ConsoleFile, console_files
+from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.connection import (
     ClientConnection,
     ObservationPacer,
@@ -125,9 +125,9 @@ class Server:
     def _app(self) -> web.Application:
         app = web.Application(middlewares=[_add_headers, self._renew_timeout], client_max_size=1024)
         files = console_files()
-        app.router.add_get("/", _serve_file(files[ENTRY]))
+        app.router.add_get("/", _serve_file(*files[ENTRY]))
         for name, file in files.items():
-            app.router.add_get(f"{_CONSOLE}{name}", _serve_file(file))
+            app.router.add_get(f"{_CONSOLE}{name}", _serve_file(*file))
         app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
         app.router.add_get("/healthz", self._health)
         app.router.add_get("/link", self._link)
@@ -224,9 +224,9 @@ async def _add_headers(request: web.Request, handler: _Handler) -> web.StreamRes
     return response
 
 
-def _serve_file(file: ConsoleFile) -> _Handler:
+def _serve_file(content_type: str, body: bytes) -> _Handler:
     async def serve(_: web.Request) -> web.Response:
-        return web.Response(body=file.body, content_type=file.content_type, charset="utf-8")
+        return web.Response(body=body, content_type=content_type, charset="utf-8")
 
     return serve
 

@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import Final
 
@@ -52,6 +53,9 @@ from shapechanger.robot.guard.messages import Order
 MESSAGES_PER_S: Final = 500.0
 """Messages per second that a connection may send; a driver sends 50."""
 
+NOT_READING: Final = "The client does not read its messages."
+"""Reason to end the connection of a client that leaves its messages unread."""
+
 _MAX_EVENTS: Final = 32
 _MAX_MESSAGES: Final = 256
 _NS_PER_MS: Final = 1_000_000
@@ -64,27 +68,22 @@ class WrongKey(RobotRefused):
     """The client does not hold the key."""
 
 
+@dataclass(frozen=True, slots=True)
 class Authenticator:
     """Checks that a client holds the robot's key.
 
-    Args:
+    Attributes:
         key: The key; empty to accept every client.
         certificate: Fingerprint of the certificate; empty without TLS.
     """
 
-    def __init__(self, key: bytes = b"", certificate: bytes = b"") -> None:
-        self._key = key
-        self._certificate = certificate
-
-    @property
-    def certificate(self) -> bytes:
-        """Fingerprint of the certificate; empty without TLS."""
-        return self._certificate
+    key: bytes = field(default=b"", repr=False)  # It does not belong in a log.
+    certificate: bytes = b""
 
     @property
     def is_open(self) -> bool:
         """True if the robot has no key and accepts every client."""
-        return not self._key
+        return not self.key
 
     def accepts(self, hello: Hello, nonce: bytes) -> bool:
         """Return True if the proof in `hello` answers `nonce` with the right key.
@@ -95,7 +94,7 @@ class Authenticator:
         """
         if self.is_open:
             return True
-        return is_proof(hello.proof, self._key, nonce, self._certificate, hello.role)
+        return is_proof(hello.proof, self.key, nonce, self.certificate, hello.role)
 
 
 class MessageRate:
@@ -134,9 +133,13 @@ class Outbox:
 
     It keeps the newest lease, the newest recorder state and the newest 32 events. Other messages
     are accepted while fewer than 256 are queued.
+
+    Attributes:
+        is_full: True once a message did not fit, because the client does not read.
     """
 
     def __init__(self) -> None:
+        self.is_full = False
         self._messages: deque[RobotMessage] = deque()
 
     def __len__(self) -> int:
@@ -144,17 +147,14 @@ class Outbox:
         return len(self._messages)
 
     def put(self, message: RobotMessage) -> None:
-        """Add a message.
-
-        Raises:
-            LinkError: If the client does not read and the queue is full.
-        """
+        """Add a message; one that does not fit is lost, and sets `is_full`."""
         if isinstance(message, Lease | RecorderState):
             self._trim(type(message), keep=0)
         elif isinstance(message, Event):
             self._trim(Event, keep=_MAX_EVENTS - 1)
         elif len(self._messages) >= _MAX_MESSAGES:
-            raise LinkError("The client does not read its messages.")
+            self.is_full = True
+            return
         self._messages.append(message)
 
     def take(self) -> RobotMessage | None:
@@ -231,7 +231,8 @@ class Session:
         posted: Set when the outbox has a message.
         updated: Set when an observation may be due.
         credit: True while the client waits for an observation.
-        overflow: Reason to disconnect a client that does not read its messages; "" if it does.
+        client: Identity of the client; its name is empty before its hello.
+        pace: Whether the robot's clock or the client sets the pace.
     """
 
     def __init__(
@@ -245,14 +246,14 @@ class Session:
         self.posted = asyncio.Event()
         self.updated = asyncio.Event()
         self.credit = False
-        self.overflow = ""
-        self._number = number
+        self.client = ClientIdentity(number, "", "program")
+        self.pace: Pace = "realtime"
         self._hub = hub
         self._authenticator = authenticator
         self._rate = MessageRate() if rate is None else rate
         self._nonce = new_nonce()
-        self._hello: Hello | None = None
-        self._client = ClientIdentity(number, "", "program")
+        self._is_known = False
+        self._wants_frames = False
         self._sent = SentObservations(hub.plan.max_observation_age_ms)
         self._command_seq = -1
         self._suggestion_seq = -1
@@ -261,21 +262,10 @@ class Session:
         self._awaits_library = False
 
     @property
-    def client(self) -> ClientIdentity:
-        """Identity of the client; its name is empty before its hello."""
-        return self._client
-
-    @property
-    def pace(self) -> Pace:
-        """Return whether the robot's clock or the client sets the pace."""
-        return "realtime" if self._hello is None else self._hello.pace
-
-    @property
     def has_new_frame(self) -> bool:
         """True if there is a frame that the client wants and has not been sent."""
         newest = self._hub.newest
-        wants = self._hello is not None and self._hello.frames
-        return wants and newest is not None and newest.seq != self._frame_seq
+        return self._wants_frames and newest is not None and newest.seq != self._frame_seq
 
     def challenge(self) -> Challenge:
         """Return the first message to the client."""
@@ -290,7 +280,7 @@ class Session:
             LinkError: If the message is not a hello.
         """
         hello = decode_client_message(data)
-        if not isinstance(hello, Hello) or self._hello is not None:
+        if not isinstance(hello, Hello) or self._is_known:
             raise LinkError("The first message must be a hello.")
         if hello.version != VERSION:
             raise RobotRefused(
@@ -301,10 +291,10 @@ class Session:
             raise WrongKey(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
-        name = printable(hello.name) or f"{hello.role} {self._number}"
-        self._client = ClientIdentity(self._number, name, hello.role)
+        name = printable(hello.name) or f"{hello.role} {self.client.session}"
+        self.client = ClientIdentity(self.client.session, name, hello.role)
         self._hub.join(self)
-        self._hello = hello
+        self._is_known, self.pace, self._wants_frames = True, hello.pace, hello.frames
         if (recorded := self._hub.recorder.state()).episode:
             self.post(recorded)
         return self._welcome()
@@ -315,7 +305,7 @@ class Session:
         Raises:
             LinkError: If the connection must end, with the reason.
         """
-        if self._hello is None:
+        if not self._is_known:
             raise LinkError("The first message must be a hello.")
         self.count()
         message = decode_client_message(data)
@@ -325,9 +315,9 @@ class Session:
             case Acknowledge():
                 self._give_credit()
             case Take():
-                self._hub.take(self._client)
+                self._hub.take(self.client)
             case Release():
-                self._hub.release(self._client, f"{self._client.name} released it")
+                self._hub.release(self.client, f"{self.client.name} released it")
             case Arm():
                 self._arm(message)
             case Disarm():
@@ -342,8 +332,8 @@ class Session:
                 self._refuse(self._recording(message))
             case Hello():
                 raise LinkError("The hello was sent already.")
-        if self.overflow:
-            raise LinkError(self.overflow)
+        if self.outbox.is_full:
+            raise LinkError(NOT_READING)
 
     def count(self) -> None:
         """Count a message.
@@ -356,41 +346,34 @@ class Session:
 
     def close(self) -> None:
         """End the session."""
-        self._hub.leave(self._number)
+        self._hub.leave(self.client.session)
 
     def post(self, message: RobotMessage) -> None:
-        """Queue a message; a full queue sets `overflow`, which ends the connection."""
-        try:
-            self.outbox.put(message)
-        except LinkError as error:
-            self.overflow = str(error)
+        """Queue a message; if the queue is full, the connection ends."""
+        self.outbox.put(message)
         self.posted.set()
-
-    def notify(self) -> None:
-        """Handle a new state or frame."""
-        self.updated.set()
 
     def observe(self) -> Observation:
         """Build the observation to send now, which uses up the credit."""
         hub, now_ns = self._hub, self._hub.now_ns()
         self._observation_seq += 1
-        frames = self._hello is not None and self._hello.frames
         observation = build_observation(
             seq=self._observation_seq,
             now_ns=now_ns,
             reader=hub.reader,
             state=hub.state,
             newest=hub.newest,
-            frame_sent=self._frame_seq if frames else None,
+            frame_sent=self._frame_seq if self._wants_frames else None,
             lease=hub.lease.number,
             command_ns=hub.command_ns(),
             holder=hub.lease.holder,
-            mine=hub.lease.holds(self._number),
+            mine=hub.lease.holds(self.client.session),
             commanded=hub.commanded(),
             suggested=hub.suggested(),
         )
         self._sent.add(observation.seq, now_ns)
-        hub.recorder.observed(self._number, observation, hub.newest)
+        if hub.recorder.builder is not None:
+            hub.recorder.builder.observed(self.client.session, observation, hub.newest)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
@@ -410,7 +393,7 @@ class Session:
     def _command(self, command: Command) -> None:
         now_ns = self._hub.now_ns()
         refusal = ""
-        if not self._hub.lease.holds(self._number):
+        if not self._hub.lease.holds(self.client.session):
             refusal = "You do not have control; take it first."
         elif command.seq <= self._command_seq:
             refusal = f"Command {command.seq} is not newer than {self._command_seq}."
@@ -423,11 +406,11 @@ class Session:
         self._command_seq = max(self._command_seq, command.seq)
         self._refuse(refusal, command.seq)
         if not refusal:
-            self._hub.command(command, now_ns)
+            self._hub.command(self.client, command, now_ns)
         self._give_credit()
 
     def _suggest(self, suggestion: Suggest) -> None:
-        if self._hub.lease.holds(self._number):
+        if self._hub.lease.holds(self.client.session):
             refusal = "You have control: send a command in place of a suggestion."
         elif suggestion.seq <= self._suggestion_seq:
             refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
@@ -438,7 +421,7 @@ class Session:
         self._suggestion_seq = max(self._suggestion_seq, suggestion.seq)
         self._refuse(refusal, suggestion.seq)
         if not refusal:
-            self._hub.suggest(self._client, suggestion.values)
+            self._hub.suggest(self.client, suggestion.values)
         self._give_credit()
 
     def _values_refusal(self, values: tuple[float, ...]) -> str:
@@ -457,7 +440,7 @@ class Session:
             self._refuse(refusal)
             return
         # The guard knows every emergency stop; this process only those that were reported to it.
-        person = self._client.role == "person"
+        person = self.client.role == "person"
         self._hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _arm_refusal(self) -> str:
@@ -465,45 +448,44 @@ class Session:
         state = self._hub.state
         if self._hub.lease.holder is None:
             return "No client has control; take control first."
-        if self._client.role == "person":
+        if self.client.role == "person":
             return ""
         if self._hub.plan.arming != "anyone":
             return "Only a person can arm this robot."
         if state is not None and state.emergency:
             return "Only a person can end an emergency stop."
-        if not self._hub.lease.holds(self._number):
+        if not self._hub.lease.holds(self.client.session):
             return "Only the client in control, or a person, can arm this robot."
         return ""
 
     def _disarm(self) -> None:
-        if self._client.role != "person" and not self._hub.lease.holds(self._number):
+        if self.client.role != "person" and not self._hub.lease.holds(self.client.session):
             self._refuse(
                 "Only the client in control, or a person, can disarm this robot; any client can "
                 "stop it with an emergency stop."
             )
             return
-        self._hub.give_order(Order(kind="disarm", reason=f"{self._client.name} disarmed"))
+        self._hub.give_order(Order(kind="disarm", reason=f"{self.client.name} disarmed"))
 
     def _emergency(self, stop: EmergencyStop) -> None:
-        reason = f"{self._client.name}: {printable(stop.reason) or 'stop'}"
+        reason = f"{self.client.name}: {printable(stop.reason) or 'stop'}"
         self._hub.give_order(Order(kind="emergency", reason=reason))
 
     def _recording(self, message: Record | Mark | Undo | Browse | Fetch | Judge) -> str:
         """Handle a request about recordings. Return the reason for a refusal, or ""."""
-        if not isinstance(message, Browse | Fetch) and self._client.role != "person":
+        if not isinstance(message, Browse | Fetch) and self.client.role != "person":
             return "Only a person can record on this robot, and judge recordings."
         recorder = self._hub.recorder
         match message:
             case Record(on=False):
                 return recorder.end()
             case Record():
-                held = self._hub.lease.holder
-                driver = "" if held is None else held.name
-                return recorder.begin(self._client, printable(message.name), driver, self.post)
+                driver = self._hub.lease.holder_name
+                return recorder.begin(self.client, printable(message.name), driver, self.post)
             case Mark():
-                return recorder.mark(printable(message.text), self.post)
+                return recorder.edit(Mark(text=printable(message.text)), self.post)
             case Undo():
-                return recorder.undo(message.seconds, self.post)
+                return recorder.edit(message, self.post)
             case Browse() | Fetch() | Judge():
                 # An answer may be large, so the next question waits until it has left.
                 if self._awaits_library or self.outbox.holds(Recordings, Piece):
@@ -531,6 +513,6 @@ class Session:
             reset=plan.reset,
             arming=plan.arming,
             clock=plan.clock,
-            session=self._number,
-            can_record=self._hub.recorder.can_record,
+            session=self.client.session,
+            can_record=bool(plan.recordings),
         )

@@ -1,6 +1,6 @@
 // The form for the key, which may also come from the address or from this tab.
 
-import { find, tell } from "./dom.js";
+import { find, setText } from "./dom.js";
 import { parseKey } from "./proof.js";
 
 const KEPT = "shapechanger-key";
@@ -25,27 +25,27 @@ export function keepKey(key) {
 }
 
 /** Return the default name of the person. */
-export function someName() {
+export function defaultName() {
   const isPhone = matchMedia("(pointer: coarse)").matches;
   return isPhone ? "Phone" : "Computer";
 }
 
-export class Door {
+export class KeyForm {
   #key = find("key");
 
   /** `enter` is called with a key and a name; it may throw an Error to show. */
   constructor(enter) {
-    find("name").value = someName();
+    find("name").value = defaultName();
     find("key-form").addEventListener("submit", (event) => {
       event.preventDefault();
       const key = this.#key.value;
       try {
         parseKey(key);
-        tell(find("key-trouble"), "");
+        setText(find("key-trouble"), "");
         if (find("remember").checked) keepKey(key);
-        enter(key, find("name").value.trim() || someName());
+        enter(key, find("name").value.trim() || defaultName());
       } catch (error) {
-        this.complain(error.message);
+        this.showError(error.message);
       }
     });
   }
@@ -58,16 +58,16 @@ export class Door {
   }
 
   /** Show the error in the key. */
-  complain(text) {
-    tell(find("key-trouble"), text);
+  showError(text) {
+    setText(find("key-trouble"), text);
     this.#key.setAttribute("aria-invalid", "true");
     this.#key.focus();
   }
 
   /** Show why this page cannot connect at all. */
-  bar(text) {
+  block(text) {
     find("key-form").hidden = true;
-    find("no-way").hidden = false;
-    tell(find("no-way"), text);
+    find("blocked").hidden = false;
+    setText(find("blocked"), text);
   }
 }
