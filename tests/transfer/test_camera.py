@@ -10,8 +10,7 @@ from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import PolicyOrigin
-from shapechanger.transfer.learners.camera import CameraLearner
-from shapechanger.transfer.learners.cloning import DemonstrationFile
+from shapechanger.transfer.learners.cloning import CloneLearner, DemonstrationFile
 from shapechanger.transfer.learners.settings import CloningSettings, learner_settings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan
@@ -32,7 +31,7 @@ def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
 def test_a_callback_is_refused(tmp_path: Path) -> None:
     """Cloning does not learn with Stable-Baselines3."""
     with pytest.raises(StudyError, match="cloning takes no callback of Stable-Baselines3"):
-        CameraLearner("cloning", TINY_CLONING).train(
+        CloneLearner("cloning", TINY_CLONING).train(
             LANE,
             30,
             0,
@@ -48,5 +47,5 @@ def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
     settings = learner_settings("cloning")
     assert isinstance(settings, CloningSettings)
     env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})
-    origin = CameraLearner("cloning", settings).origin(CLONES[vehicle])
+    origin = CloneLearner("cloning", settings).origin(CLONES[vehicle])
     assert origin == PolicyOrigin(env, 12_000)

@@ -17,10 +17,9 @@ from shapechanger.reports.study import write_report
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import cloning
 from shapechanger.transfer.learners.cloning import (
+    CloneLearner,
     DemonstrationFile,
-    evaluate_clone,
     record_demonstrations,
-    train_clones,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings, learner_settings
@@ -30,6 +29,7 @@ from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG
 
 _FRAMING = TINY_CLONING.clone.framing
+_LEARNER = CloneLearner("cloning", TINY_CLONING)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -93,9 +93,8 @@ def _cloned(
     folder: Path, steps: int = 120, *, only_last: bool = False, start: CameraPolicy | None = None
 ) -> tuple[CameraPolicy, list[Evaluation]]:
     found: list[Evaluation] = []
-    policy = train_clones(
+    policy = _LEARNER.train(
         LANE,
-        TINY_CLONING,
         steps,
         5,
         demonstrations=DemonstrationFile(folder / "shown.npz", 6),
@@ -112,7 +111,7 @@ def test_a_clone_is_judged_at_each_budget_and_gets_better(tmp_path: Path) -> Non
     assert [one.steps for one in found] == [0, 30, 60, 120]
     assert found[-1].mean_return > found[0].mean_return + 2.0
     assert set(found[-1].terms) == {"reward_middle", "reward_speed"}
-    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+    assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
 
 
 def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
@@ -128,7 +127,7 @@ def test_a_clone_goes_on_from_another(tmp_path: Path) -> None:
     policy, found = _cloned(tmp_path)
     _, tuned = _cloned(tmp_path, 30, start=policy)
     assert tuned[0].mean_return == found[-1].mean_return
-    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+    assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
 
 
 def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,7 +172,7 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
     assert [e.steps for e in study.of("source")[0].curve] == [0, 60]
     assert set(study.summaries) == {"zero-shot", "fine-tune"}
     policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.safetensors")
-    again = evaluate_clone(SLIPPERY, policy, TINY_CLONING).mean_return
+    again = _LEARNER.evaluate(SLIPPERY, policy).mean_return
     assert again == study.of("scratch")[0].curve[-1].mean_return
 
 

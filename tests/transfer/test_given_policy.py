@@ -14,9 +14,9 @@ from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone, train_clones
+from shapechanger.transfer.learners.cloning import CloneLearner, DemonstrationFile
 from shapechanger.transfer.learners.policy_file import save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
@@ -36,9 +36,8 @@ def one_thread() -> Iterator[None]:
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A clone of the driver on the dry lane, as `train` writes it."""
     folder = tmp_path_factory.mktemp("clone")
-    policy = train_clones(
+    policy = CloneLearner("cloning", QUICK_CLONING).train(
         DRY,
-        QUICK_CLONING,
         40,
         3,
         demonstrations=DemonstrationFile(folder / "shown.npz", 3),
@@ -52,15 +51,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A policy of a pendulum trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
-    policy = train(
-        SMALL,
-        "tiny",
-        TINY,
-        32,
-        3,
-        on_evaluation=lambda evaluation: None,
-        on_steps=lambda steps: None,
-    )
+    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 3, on_evaluation=lambda evaluation: None)
     save_policy(policy, path)
     return path
 
@@ -79,7 +70,8 @@ def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> 
     assert not study.of("source")
     assert study.source_return == ()
     (unchanged,) = study.of("zero-shot")
-    worth = evaluate_clone(ICY, CameraPolicy.load(clone_file), QUICK_CLONING).mean_return
+    learner = CloneLearner("cloning", QUICK_CLONING)
+    worth = learner.evaluate(ICY, learner.load(clone_file)).mean_return
     assert unchanged.curve[0].mean_return == worth
     for tuned in study.of("fine-tune"):
         assert tuned.curve[0].mean_return == worth

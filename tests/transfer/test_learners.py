@@ -16,7 +16,7 @@ from stable_baselines3.sac.policies import MlpPolicy
 from shapechanger.errors import CorruptStudy, StudyError, UnknownName
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import Sb3Learner, train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import (
     ImportedSettings,
     OffPolicySettings,
@@ -90,7 +90,9 @@ def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluatio
     """A policy that has learned for a second."""
     settings = settings_of(learner)
     curve: list[Evaluation] = []
-    policy = train(SMALL, learner, settings, 64, 0, on_evaluation=curve.append, **options)
+    policy = Sb3Learner(learner, settings).train(
+        SMALL, 64, 0, on_evaluation=curve.append, **options
+    )
     return policy, curve, settings
 
 
@@ -127,14 +129,12 @@ def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
     policy, curve, settings = trained(learner)
     plan = tiny_plan(settings)
     moved: list[Evaluation] = []
-    train(
+    Sb3Learner(learner, settings).train(
         BIG,
-        learner,
-        settings,
         64,
         1,
         on_evaluation=moved.append,
-        source=policy,
+        start=policy,
         body_map=plan.body_map,
     )
     zero_shot = Sb3Learner(learner, settings).evaluate(BIG, policy, plan.body_map)
@@ -148,8 +148,8 @@ def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
     assert isinstance(settings, OffPolicySettings)
     plan = tiny_plan(settings)
     late = msgspec.structs.replace(settings, learning_starts=64)
-    moved = train(
-        SMALL, "sac", late, 64, 1, on_evaluation=_ignore, source=policy, body_map=plan.body_map
+    moved = Sb3Learner("sac", late).train(
+        SMALL, 64, 1, on_evaluation=_ignore, start=policy, body_map=plan.body_map
     )
     observations = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_allclose(moved.act(observations), policy.act(observations), rtol=1e-5)
@@ -222,7 +222,7 @@ def test_arguments_that_a_class_refuses_are_one_sentence() -> None:
     _, settings = resolve_learner("stable_baselines3:A2C", {"learning_rate": "fast"})
     assert isinstance(settings, ImportedSettings)
     with pytest.raises(StudyError, match="A2C refuses its arguments"):
-        train(SMALL, "mine", settings, 10_000, 0, on_evaluation=_ignore)
+        Sb3Learner("mine", settings).train(SMALL, 10_000, 0, on_evaluation=_ignore)
 
 
 def test_a_training_that_diverges_is_refused() -> None:

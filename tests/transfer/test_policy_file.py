@@ -15,12 +15,12 @@ import pytest
 from safetensors import numpy as safetensors
 
 import shapechanger
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import CorruptStudy
-from shapechanger.transfer.learners.cloning import load_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
@@ -28,7 +28,7 @@ from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[Evaluation]]:
     """A policy that has learned for a second."""
     curve: list[Evaluation] = []
-    policy = train(SMALL, "tiny", settings, 64, seed, on_evaluation=curve.append)
+    policy = Sb3Learner("tiny", settings).train(SMALL, 64, seed, on_evaluation=curve.append)
     return policy, curve
 
 
@@ -103,7 +103,7 @@ def test_shipped_policies_load(path: Path) -> None:
 )
 def test_shipped_clones_load(path: Path) -> None:
     """Their weights are read without unpickling."""
-    assert load_clone(path).card.framing.width > 0
+    assert CameraPolicy.load(path).card.framing.width > 0
 
 
 def test_loading_leaves_random_numbers_alone() -> None:

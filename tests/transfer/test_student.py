@@ -13,7 +13,7 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.learners.student import STUDENT_CLONING, train_student
 
@@ -33,7 +33,7 @@ _TINY = PpoSettings(
 
 def _teacher(vehicle: str = "Car") -> TrainedPolicy:
     env = EnvRef(f"shapechanger/{vehicle}Ranges-v1", {"courses": [0, 1]})
-    return train(env, "tiny", _TINY, 8, 0, on_evaluation=lambda _: None)
+    return Sb3Learner("tiny", _TINY).train(env, 8, 0, on_evaluation=lambda _: None)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.sb3 import ThreadVecEnv, training_vec_env
+from shapechanger.transfer.learners.vec_env import ThreadVecEnv, training_vec_env
 from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 
@@ -93,7 +93,7 @@ def test_envs_of_strangers_are_stepped_by_sb3() -> None:
     """They may share what they change."""
     for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
         envs = training_vec_env(EnvRef(env_id), 2, 1)
-        assert isinstance(envs, kind)
+        assert type(envs) is kind
         envs.close()
     envs = training_vec_env(EnvRef(f"shapechanger:{_PENDULUM}", {"max_episode_steps": 3}), 2, None)
     assert isinstance(envs, ThreadVecEnv)

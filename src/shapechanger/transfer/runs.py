@@ -19,8 +19,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import ReportSteps
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.learners import Learner
-from shapechanger.transfer.learners.camera import CameraLearner
-from shapechanger.transfer.learners.cloning import DemonstrationFile
+from shapechanger.transfer.learners.cloning import CloneLearner, DemonstrationFile
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
@@ -62,7 +61,7 @@ def learner_of(name: str, settings: Settings) -> Learner:
     """
     if isinstance(settings, Sb3Settings):
         return Sb3Learner(name, settings)
-    return CameraLearner(name, settings)
+    return CloneLearner(name, settings)
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:

@@ -25,8 +25,7 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
-from shapechanger.transfer.learners.sb3 import require_budget
-from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.learners.settings import Settings, require_budget
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, SOURCE, Plan, Run, TransferTask

@@ -13,7 +13,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import OffPolicySettings, resolve_learner
 from shapechanger.transfer.methods.replay import (
     DomainClassifiers,
@@ -81,7 +81,7 @@ def test_corrections_are_of_what_differs() -> None:
 
 def test_transitions_are_those_of_the_env() -> None:
     """Each starts where the last one went, unless the episode ended."""
-    policy = train(SMALL, "sac", short(), 32, 0, on_evaluation=_ignore)
+    policy = Sb3Learner("sac", short()).train(SMALL, 32, 0, on_evaluation=_ignore)
     seen = collect(SMALL, policy, 50, 3)
     assert seen.observations.shape == seen.next_observations.shape == (50, 4)
     goes_on = ~seen.terminated[:-1]

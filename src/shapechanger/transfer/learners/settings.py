@@ -72,10 +72,23 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
         """Round `steps` up to whole updates."""
         return -(-steps // self.update_steps) * self.update_steps
 
+    def for_one_env(self) -> Self:
+        """Return settings with as many steps per update in a single env.
+
+        Raises:
+            StudyError: If it is not known which setting that is.
+        """
+        raise NotImplementedError
+
     def for_budget(self, steps: int) -> Self:
         """Return the settings for a shorter budget: four evaluations, no source default."""
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
+
+    def _own(self) -> dict[str, Any]:
+        """The settings that not all learners share, by name."""
+        shared = _Sb3Base.__struct_fields__
+        return {name: getattr(self, name) for name in self.__struct_fields__ if name not in shared}
 
 
 class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
@@ -112,23 +125,19 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
-        return {
-            "policy_kwargs": {
-                "net_arch": list(self.net_arch),
-                "log_std_init": self.log_std_init,
-                # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python,
-                # for equal numbers.
-                "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
-            },
-            "n_steps": self.n_steps,
-            "batch_size": self.batch_size,
-            "n_epochs": self.n_epochs,
-            "learning_rate": self.learning_rate,
-            "gamma": self.gamma,
-            "gae_lambda": self.gae_lambda,
-            "clip_range": self.clip_range,
-            "ent_coef": self.ent_coef,
+        arguments = self._own()
+        arguments["policy_kwargs"] = {
+            "net_arch": list(self.net_arch),
+            "log_std_init": arguments.pop("log_std_init"),
+            # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python, for
+            # equal numbers.
+            "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
         }
+        return arguments
+
+    def for_one_env(self) -> PpoSettings:
+        """Return settings with as many steps per update in a single env."""
+        return msgspec.structs.replace(self, n_envs=1, n_steps=self.update_steps)
 
 
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
@@ -169,21 +178,12 @@ class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
-        return {
-            "policy_kwargs": {
-                "net_arch": list(self.net_arch),
-                "optimizer_kwargs": {"foreach": True},
-            },
-            "learning_rate": self.learning_rate,
-            "batch_size": self.batch_size,
-            "buffer_size": self.buffer_size,
-            "learning_starts": self.learning_starts,
-            "train_freq": self.train_freq,
-            "gradient_steps": self.gradient_steps,
-            "gamma": self.gamma,
-            "tau": self.tau,
-            "ent_coef": self.ent_coef,
-        }
+        policy = {"net_arch": list(self.net_arch), "optimizer_kwargs": {"foreach": True}}
+        return {"policy_kwargs": policy, **self._own()}
+
+    def for_one_env(self) -> OffPolicySettings:
+        """Return settings with as many steps per update in a single env."""
+        return msgspec.structs.replace(self, n_envs=1, train_freq=self.update_steps)
 
 
 class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
@@ -213,6 +213,14 @@ class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class or function besides policy, env and seed."""
         return self.arguments
+
+    def for_one_env(self) -> ImportedSettings:
+        """Refuse more than one env: which argument is the steps of an update is not known."""
+        if self.n_envs > 1:
+            raise StudyError(
+                f"Only one instance of this env can exist: set n_envs=1, not {self.n_envs}."
+            )
+        return self
 
 
 class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
@@ -288,6 +296,26 @@ Settings = Sb3Settings | CloningSettings
 
 _Kind = TypeVar("_Kind", bound=msgspec.Struct)
 
+
+def require_budget(steps: int, settings: Settings, which: str = "") -> None:
+    """Refuse a budget that ends before the first evaluation.
+
+    Args:
+        steps: The budget.
+        settings: Settings of the learner.
+        which: "target" or "source", where there are two budgets.
+
+    Raises:
+        StudyError: If it does.
+    """
+    if steps < settings.eval_every:
+        budget = f"{steps} {which} steps" if which else f"{steps} steps"
+        raise StudyError(
+            f"A budget of {budget} is smaller than one evaluation, which comes every "
+            f"{settings.eval_every} steps: give at least that."
+        )
+
+
 # Tuned on the reaching finger only: each of four seeds ends with 200 of 200
 # targets reached (`python -m benchmarks.run finger-learned`).
 _FINGER: Final = PpoSettings(
@@ -322,7 +350,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         learning_rate=1e-3,
         steps=24_576,
         eval_every=3072,
-        eval_episodes=5,
     ),
     "ppo-run": PpoSettings(
         n_envs=64,
@@ -334,7 +361,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
     "ppo-planar": PpoSettings(
         n_envs=16,
@@ -345,7 +371,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
     # A stroke takes long: the learner looks farther ahead than for those that run.
     "ppo-swim": PpoSettings(
@@ -359,7 +384,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
     "ppo-finger": _FINGER,
     # Ten minutes of a rig's motion; source steps in simulation are cheap.
@@ -376,7 +400,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=81_920,
         eval_every=20_480,
-        eval_episodes=5,
     ),
     # Half a minute, and 1, 2, 5 and 10 minutes, at 20 steps a second.
     "cloning": CloningSettings(
