@@ -1,4 +1,4 @@
-"""An env of which there is but one, as of a robot."""
+"""Training in an env of which only one instance can exist."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _STEPS = 100  # Of an episode.
 
 
 def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Made once; each rollout begins an episode of its own, and the budget is what it was."""
+    """Training and evaluation share the env; each rollout starts an episode."""
     called: dict[int, list[int | str | None]] = {}
     reset, step = FingerReachEnv.reset, FingerReachEnv.step
 

@@ -1,4 +1,4 @@
-"""Camera students of teachers that see distances."""
+"""Camera policies that learn from a teacher with distances."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def teacher() -> TrainedPolicy:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -> None:
-    """It says which teacher it had, and acts like it: this one hardly moves, so it just rolls."""
+    """Its card names the teacher, and it acts like it."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
@@ -61,7 +61,7 @@ def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -
 
 
 def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
-    """Another vehicle's policy, another env, or no time for lessons."""
+    """Policies of other envs, envs without teachers and too few steps are refused."""
     with pytest.raises(StudyError, match=r"A teacher for shapechanger/Car-v1 is a policy of"):
         train_student(_CAR, _teacher("Tank"), 10, 0)
     with pytest.raises(StudyError, match=r"CarRanges-v1 has no teachers"):
@@ -73,7 +73,7 @@ def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
 def test_the_command_line_refuses_in_sentences(
     teacher: TrainedPolicy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before anything is trained."""
+    """Wrong arguments are refused before the training."""
     path = tmp_path / "teacher.safetensors"
     save_policy(teacher, path)
     for arguments, sentence in (

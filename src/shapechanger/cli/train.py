@@ -159,7 +159,8 @@ def _learn_to_drive(
     progress: StudyProgress,
 ) -> None:
     """Clone the demonstrator of an env, and write the policy and its demonstrations."""
-    from shapechanger.transfer.learners.cloning import CloneLearner, DemonstrationFile
+    from shapechanger.transfer.learners import DemonstrationFile
+    from shapechanger.transfer.learners.cloning import CloneLearner
 
     policy = CloneLearner(learner, settings).train(
         env,

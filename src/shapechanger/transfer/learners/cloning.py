@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -18,9 +19,9 @@ from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.tensor_file import kind_of
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasDemonstrator
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
 from shapechanger.transfer.files import make_folder
-from shapechanger.transfer.learners import PolicyOrigin
+from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
@@ -56,19 +57,13 @@ class Demonstrations(NamedTuple):
             if left > 0:
                 episodes.append(min(length, left))
                 left -= length
-        return Demonstrations(*(column[:steps] for column in self[:-1]), tuple(episodes))  # pyright: ignore[reportArgumentType]
-
-
-class DemonstrationFile(NamedTuple):
-    """File of demonstrations, shared by the runs that learn from them.
-
-    Attributes:
-        path: The file.
-        seed: Seed of the recording.
-    """
-
-    path: Path
-    seed: int
+        return Demonstrations(
+            self.pictures[:steps],
+            self.actions[:steps],
+            self.done[:steps],
+            self.rewards[:steps],
+            tuple(episodes),
+        )
 
 
 def record_demonstrations(
@@ -90,8 +85,7 @@ def record_demonstrations(
     Raises:
         StudyError: If the env has no demonstrator.
     """
-    made = env.make(max_episode_steps=episode_steps)
-    try:
+    with closing(env.make(max_episode_steps=episode_steps)) as made:
         if not isinstance(made.unwrapped, HasDemonstrator):
             raise StudyError(f"{env} has no demonstrator to learn from.")
         driver = made.unwrapped.demonstrator(seed)
@@ -111,8 +105,6 @@ def record_demonstrations(
                 seen, rewards[step], terminated, truncated, _ = made.step(executed[step])
                 episodes[-1] += 1
                 over = terminated or truncated
-    finally:
-        made.close()
     return Demonstrations(np.stack(pictures), actions, executed, rewards, tuple(episodes))
 
 
@@ -287,12 +279,9 @@ def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
         policy: A clone of the env's demonstrator.
         env: The env.
     """
-    made = env.make()
-    try:
-        layout = getattr(made.unwrapped, "action_layout", None)
-    finally:
-        made.close()
-    if layout is None or layout.names == ("steering", "throttle"):
+    with closing(env.make()) as made:
+        _, layout = layouts_of(made)
+    if layout.names == ("steering", "throttle"):
         return policy
     card = msgspec.structs.replace(policy.card, action_layout=layout)
     return CameraPolicy(policy.network, card)

@@ -14,9 +14,9 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
-from shapechanger.transfer.learners import PolicyOrigin
+from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.algorithms import build_model
-from shapechanger.transfer.learners.cloning import DemonstrationFile, is_clone
+from shapechanger.transfer.learners.cloning import is_clone
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, Literal, Self, TypeVar
+from typing import Any, ClassVar, Final, Literal, Self, TypeVar
 
 import msgspec
 
@@ -39,6 +39,9 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     eval_every: int
     eval_episodes: int = 5
 
+    # Name of the setting that is the steps of each env between two updates.
+    _steps_per_update: ClassVar[str]
+
     def __post_init__(self) -> None:
         if min(self.n_envs, self.update_steps, self.eval_episodes) < 1:
             raise StudyError("A learner needs at least one env, one step and one episode.")
@@ -51,7 +54,7 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def update_steps(self) -> int:
         """Env steps between two updates; budgets are rounded up to a multiple of it."""
-        raise NotImplementedError
+        return self.n_envs * getattr(self, self._steps_per_update)
 
     @property
     def model_arguments(self) -> dict[str, Any]:
@@ -76,9 +79,10 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
         """Return settings with as many steps per update in a single env.
 
         Raises:
-            StudyError: If it is not known which setting that is.
+            StudyError: If that is not possible.
         """
-        raise NotImplementedError
+        changed: dict[str, Any] = {"n_envs": 1, self._steps_per_update: self.update_steps}
+        return msgspec.structs.replace(self, **changed)
 
     def for_budget(self, steps: int) -> Self:
         """Return the settings for a shorter budget: four evaluations, no source default."""
@@ -117,10 +121,7 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
     ent_coef: float = 0.0
     log_std_init: float = 0.0
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.n_steps
+    _steps_per_update = "n_steps"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
@@ -134,10 +135,6 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
             "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
         }
         return arguments
-
-    def for_one_env(self) -> PpoSettings:
-        """Return settings with as many steps per update in a single env."""
-        return msgspec.structs.replace(self, n_envs=1, n_steps=self.update_steps)
 
 
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
@@ -170,20 +167,13 @@ class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     tau: float = 0.005
     ent_coef: float | str = "auto"
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.train_freq
+    _steps_per_update = "train_freq"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
         policy = {"net_arch": list(self.net_arch), "optimizer_kwargs": {"foreach": True}}
         return {"policy_kwargs": policy, **self._own()}
-
-    def for_one_env(self) -> OffPolicySettings:
-        """Return settings with as many steps per update in a single env."""
-        return msgspec.structs.replace(self, n_envs=1, train_freq=self.update_steps)
 
 
 class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
@@ -204,18 +194,15 @@ class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
     eval_every: int = 10_000
     arguments: dict[str, Any] = {}
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.steps_per_update
+    _steps_per_update = "steps_per_update"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class or function besides policy, env and seed."""
         return self.arguments
 
-    def for_one_env(self) -> ImportedSettings:
-        """Refuse more than one env: which argument is the steps of an update is not known."""
+    def for_one_env(self) -> Self:
+        """Refuse more than one env: the argument that sets the steps of an update is not known."""
         if self.n_envs > 1:
             raise StudyError(
                 f"Only one instance of this env can exist: set n_envs=1, not {self.n_envs}."
@@ -339,8 +326,8 @@ _FINGER: Final = PpoSettings(
 # harder: both of two seeds reach 1,000, and one has dropped to 744 at the end.
 # `ppo-run` was tuned on the ant, seed 0: three seeds walk at 2.1, 2.0 and 1.5 m/s after 1,048,576
 # steps (the sources in benchmarks/results/atlas-ants-runs.json). `ppo-planar` has four times as
-# many updates and more noise at the start, which half cheetahs do not like. What each reaches
-# stands in `transfer/references`, and why it was chosen in docs/decisions.md.
+# many updates and more exploration noise at the start, with which half cheetahs end lower. The
+# results are in `transfer/references`, and the reasons in docs/decisions.md.
 LEARNERS: Final[dict[str, Settings]] = {
     "ppo-balance": PpoSettings(
         n_envs=16,
@@ -372,7 +359,7 @@ LEARNERS: Final[dict[str, Settings]] = {
         steps=1_048_576,
         eval_every=65_536,
     ),
-    # A stroke takes long: the learner looks farther ahead than for those that run.
+    # A swimming stroke takes longer than a stride, so the discount is closer to 1.
     "ppo-swim": PpoSettings(
         n_envs=16,
         n_steps=512,
@@ -386,7 +373,7 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_every=65_536,
     ),
     "ppo-finger": _FINGER,
-    # Ten minutes of a rig's motion; source steps in simulation are cheap.
+    # Ten minutes of motion of the rig; source steps are simulated, and so cheap.
     "ppo-rig": msgspec.structs.replace(
         _FINGER, steps=30_720, source_steps=307_200, eval_every=6144
     ),
@@ -438,7 +425,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "sac": (),
     "tqc": (),
 }
-"""The envs that the settings of each learner were tuned on; all others inherit them."""
+"""The envs that the settings of each learner were tuned on."""
 
 
 def tuning_text(learner: str, env: str) -> str:
@@ -449,7 +436,7 @@ def tuning_text(learner: str, env: str) -> str:
         env: Id of the env.
     """
     if not TUNED_ON.get(learner):
-        return "Nobody has stated what these settings were tuned on."
+        return "It is not stated what these settings were tuned on."
     name = env.rpartition("/")[2].removesuffix("-v1")
     tuned = " and ".join(TUNED_ON[learner])
     if name in TUNED_ON[learner]:
