@@ -16,7 +16,6 @@ import torch
 from numpy.typing import NDArray
 
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
-from shapechanger.transfer import suite
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
@@ -206,7 +205,7 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
 
     plan, runs = _plan(DRY, ICY), out / "Dry-to-Icy" / "runs"
     with monkeypatch.context() as patch:
-        patch.setattr(suite.shutil, "copytree", full)
+        patch.setattr(shutil, "copytree", full)
         with pytest.raises(OutputError, match="source-0: No space left"):
             _run(plan, out, executor=_Told(refuses=True))
     assert not (runs / "source-0").exists()
