@@ -35,7 +35,7 @@ from shapechanger.transfer.metrics import (
     total_reward_gain,
 )
 from shapechanger.transfer.plan import SOURCE, Run
-from shapechanger.transfer.runs import RunResult, learner_of, policy_path
+from shapechanger.transfer.runs import RunResult, learner_of
 from shapechanger.transfer.study import STUDY_FILE, Study
 
 RESULTS: Final = Path(__file__).parent / "results"
@@ -182,7 +182,7 @@ def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
     learner = learner_of(plan.learner, plan.settings)
     shares: list[NDArray[np.float64]] = []
     for index in range(plan.seeds):
-        act = learner.load(policy_path(folder, Run(SOURCE, index))).act
+        act = learner.load(Run(SOURCE, index).policy_file(folder)).act
         env: Any = plan.task.source.make()
         data, model = env.unwrapped.data, env.unwrapped.model
         limbs = [int(model.actuator(i).name.rpartition("_")[2]) - 1 for i in range(model.nu)]

@@ -24,7 +24,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import train, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
 
 SEEDS: Final = 5
@@ -79,7 +79,9 @@ def trained(name: str, seed: int) -> Path:
     assert isinstance(settings, PpoSettings)
     use_one_thread()
     curve: list[Evaluation] = []
-    policy = train(task.env, task.learner, settings, task.steps, seed, on_evaluation=curve.append)
+    policy = Sb3Learner(task.learner, settings).train(
+        task.env, task.steps, seed, on_evaluation=curve.append
+    )
     write_atomic(_curve(name, seed), msgspec.json.encode(curve))
     save_policy(policy, out)
     return out

@@ -32,7 +32,7 @@ from shapechanger.transfer.learners.evaluation import (
     zero_actions,
 )
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import train, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings, learner_settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
 from shapechanger.transfer.runs import RunResult
@@ -124,7 +124,9 @@ def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
     settings = learner_settings(learner)
     assert isinstance(settings, Sb3Settings)
     curve: list[Evaluation] = []
-    policy = train(env, learner, settings, TARGETS[name].steps, seed, on_evaluation=curve.append)
+    policy = Sb3Learner(learner, settings).train(
+        env, TARGETS[name].steps, seed, on_evaluation=curve.append
+    )
     save_policy(policy, place.with_suffix(".safetensors"))
     write_json(place, tuple(curve))
     return tuple(curve)

@@ -13,40 +13,40 @@ from shapechanger.transfer.executor import Job, Processes, ReportSteps
 
 
 def leave_a_mark(path: str, report: ReportSteps) -> None:
-    """Write the time at which the job ended."""
+    """Write the time to a file."""
     report(1)
     Path(path).write_text(str(time.monotonic_ns()))
 
 
 def refuse(report: ReportSteps) -> None:
-    """Fail as a user's mistake does."""
+    """Raise a ShapechangerError."""
     raise UnknownName("thing", "this", ["that"])
 
 
 def crash(report: ReportSteps) -> None:
-    """Fail as a bug does."""
+    """Raise an error that is not a ShapechangerError."""
     raise ZeroDivisionError("a bug")
 
 
 def vanish(report: ReportSteps) -> None:
-    """End without a word, as under the kernel's axe."""
+    """End by SIGKILL."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def wait_for_ever(pid_file: str, report: ReportSteps) -> None:
-    """Say who runs it, and go on until somebody ends it."""
+    """Write the process id to a file and wait."""
     Path(pid_file).write_text(str(os.getpid()))
     while True:
         signal.pause()
 
 
 def run_for_ever(pid_file: str) -> None:
-    """A parent whose only job never ends."""
+    """Run a job that never ends."""
     Processes(1).run([Job("endless", wait_for_ever, (pid_file,))], lambda *_: None)
 
 
 def end_when_there_is_one(mark: str, go: str, report: ReportSteps) -> None:
-    """Note each attempt, and end once a file is there."""
+    """Append a line for each attempt, and end once `go` exists."""
     with Path(mark).open("a") as log:
         log.write("attempt\n")
     never = threading.Event()

@@ -1,4 +1,4 @@
-"""A lane that is seen from above as a picture, and somebody who keeps to its middle."""
+"""A small camera env with a demonstrator: keep to the middle of a lane."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-        """Begin somewhere beside the middle."""
+        """Start at a random place beside the middle."""
         super().reset(seed=seed)
         self.course = int(self.np_random.integers(HELD_OUT)) + HELD_OUT * self.held_out
         self.place = float(self.np_random.uniform(-0.8, 0.8))
@@ -64,7 +64,7 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
-        """Move aside."""
+        """Move to the side."""
         wind = float(self.np_random.uniform(-0.05, 0.05))
         self.place += self.grip * float(action[0]) + wind
         terms = {
@@ -75,11 +75,11 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         return self._picture(), sum(terms.values()), over, False, terms
 
     def hold_out(self) -> None:
-        """Be judged elsewhere than one learned."""
+        """Draw courses from the held-out set."""
         self.held_out = True
 
     def demonstrator(self, seed: int) -> _Keeper:
-        """Who keeps to the middle."""
+        """Return a demonstrator that steers to the middle."""
         return _Keeper(self, seed)
 
     def _picture(self) -> NDArray[np.uint8]:
@@ -95,10 +95,10 @@ class _Keeper:
         self._rng = np.random.default_rng(seed)
 
     def begin(self) -> None:
-        """Nothing has to be known."""
+        """Nothing to do at the start of an episode."""
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Straight to the middle; every third time the hand trembles."""
+        """Steer straight to the middle, with a disturbance in three of ten steps."""
         meant = np.array([-self._lane.place, 0.5], np.float32)
         done = meant.copy()
         if self._rng.random() < 0.3:

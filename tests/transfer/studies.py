@@ -40,13 +40,13 @@ TINY_NORMALISED = PpoSettings(
 
 
 def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:
-    """A plan of a study that takes seconds."""
+    """Return the plan of a study that takes seconds."""
     task = arguments.pop("task", TransferTask(SMALL, BIG))
     return make_plan(task, "tiny", settings, **{"seeds": 2, **arguments})
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """The content of every file in a folder."""
+    """Return the content of every file in a folder."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))

@@ -1,4 +1,4 @@
-"""Cloning as a learner: what it refuses, and the clones of the package as sources."""
+"""The learner of clones: refused envs, and the shipped clones as sources."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import pytest
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners import PolicyOrigin
-from shapechanger.transfer.learners.camera import CameraLearner
-from shapechanger.transfer.learners.cloning import DemonstrationFile
+from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
+from shapechanger.transfer.learners.cloning import CloneLearner
 from shapechanger.transfer.learners.settings import CloningSettings, learner_settings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan
@@ -21,7 +20,7 @@ from tests.transfer.studies import BIG
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
-    """Before anything is learned, with the name of the env."""
+    """Envs without a camera or a demonstrator are refused when a study is planned."""
     task = TransferTask(*(LANE, BIG)[::order])
     with pytest.raises(
         StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and cloning"
@@ -30,9 +29,9 @@ def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
 
 
 def test_a_callback_is_refused(tmp_path: Path) -> None:
-    """Cloning does not learn with Stable-Baselines3."""
+    """Cloning takes no callback of Stable-Baselines3."""
     with pytest.raises(StudyError, match="cloning takes no callback of Stable-Baselines3"):
-        CameraLearner("cloning", TINY_CLONING).train(
+        CloneLearner("cloning", TINY_CLONING).train(
             LANE,
             30,
             0,
@@ -44,9 +43,9 @@ def test_a_callback_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("vehicle", CLONES)
 def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
-    """Their cards name the env and the ten minutes that they were cloned from."""
+    """Their cards name the env and the 12,000 demonstrated steps."""
     settings = learner_settings("cloning")
     assert isinstance(settings, CloningSettings)
     env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})
-    origin = CameraLearner("cloning", settings).origin(CLONES[vehicle])
+    origin = CloneLearner("cloning", settings).origin(CLONES[vehicle])
     assert origin == PolicyOrigin(env, 12_000)

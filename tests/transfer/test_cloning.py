@@ -1,4 +1,4 @@
-"""A study of clones: demonstrations that arms share, budgets, and runs that were cut off."""
+"""Studies of clones: shared demonstrations, budgets and resuming."""
 
 from __future__ import annotations
 
@@ -15,12 +15,10 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.reports.study import write_report
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners import cloning
+from shapechanger.transfer.learners import DemonstrationFile, cloning
 from shapechanger.transfer.learners.cloning import (
-    DemonstrationFile,
-    evaluate_clone,
+    CloneLearner,
     record_demonstrations,
-    train_clones,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings, learner_settings
@@ -30,11 +28,12 @@ from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG
 
 _FRAMING = TINY_CLONING.clone.framing
+_LEARNER = CloneLearner("cloning", TINY_CLONING)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Networks this small gain nothing from more."""
+    """Limit PyTorch to one thread."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
@@ -53,13 +52,13 @@ def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
-    """A study that was never interrupted, and its folder."""
+    """A study that was not interrupted, and its folder."""
     out = tmp_path_factory.mktemp("cloned") / "study"
     return run_study(_plan(), out, executor=Serial()), out
 
 
 def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
-    """The picture before the action, and not the mistake that was made."""
+    """Recorded actions are the intended ones for the picture before them."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)
@@ -73,7 +72,7 @@ def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
 
 
 def test_fewer_demonstrations_are_the_first_of_more() -> None:
-    """So that a budget is part of the next one."""
+    """A shorter recording is the start of a longer one."""
     more, fewer = (record_demonstrations(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
     first = more.first(30)
     np.testing.assert_array_equal(first.pictures, fewer.pictures)
@@ -84,7 +83,7 @@ def test_fewer_demonstrations_are_the_first_of_more() -> None:
 
 
 def test_an_env_without_a_demonstrator_is_refused() -> None:
-    """There is nobody to learn from, and the sentence says where."""
+    """The message names the env."""
     with pytest.raises(StudyError, match="BigInvertedPendulum-v1 has no demonstrator"):
         record_demonstrations(BIG, 10, 20, 3, _FRAMING)
 
@@ -93,9 +92,8 @@ def _cloned(
     folder: Path, steps: int = 120, *, only_last: bool = False, start: CameraPolicy | None = None
 ) -> tuple[CameraPolicy, list[Evaluation]]:
     found: list[Evaluation] = []
-    policy = train_clones(
+    policy = _LEARNER.train(
         LANE,
-        TINY_CLONING,
         steps,
         5,
         demonstrations=DemonstrationFile(folder / "shown.npz", 6),
@@ -107,16 +105,16 @@ def _cloned(
 
 
 def test_a_clone_is_judged_at_each_budget_and_gets_better(tmp_path: Path) -> None:
-    """The last one keeps to the middle, which the first, of nothing, does not."""
+    """There is an evaluation per budget, and the last is better than the first."""
     policy, found = _cloned(tmp_path)
     assert [one.steps for one in found] == [0, 30, 60, 120]
     assert found[-1].mean_return > found[0].mean_return + 2.0
     assert set(found[-1].terms) == {"reward_middle", "reward_speed"}
-    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+    assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
 
 
 def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
-    """Each budget begins anew, so that none depends on those before it."""
+    """The clone of a budget does not depend on earlier budgets."""
     _, found = _cloned(tmp_path, 60)
     _, last = _cloned(tmp_path, 60, only_last=True)
     assert [one.steps for one in last] == [0, 60]
@@ -124,15 +122,15 @@ def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
 
 
 def test_a_clone_goes_on_from_another(tmp_path: Path) -> None:
-    """Its first evaluation is that of the one it begins with, which stays as it is."""
+    """The first evaluation is that of the start, which is not changed."""
     policy, found = _cloned(tmp_path)
     _, tuned = _cloned(tmp_path, 30, start=policy)
     assert tuned[0].mean_return == found[-1].mean_return
-    assert evaluate_clone(LANE, policy, TINY_CLONING).mean_return == found[-1].mean_return
+    assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
 
 
 def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever comes later learns from the same ones; more are recorded where they are too few."""
+    """A file is reused, and recorded anew if it has too few steps."""
     _cloned(tmp_path, 30)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["shown.npz"]
     _, found = _cloned(tmp_path, 120)
@@ -144,7 +142,7 @@ def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_clones_are_judged_where_nobody_learned() -> None:
-    """On surroundings that are held out, for as many steps as the settings say."""
+    """Evaluations are on held-out courses, with the settings' number of steps."""
     envs = evaluation_envs(LANE, TINY_CLONING)
     try:
         assert len(envs) == 2
@@ -163,7 +161,7 @@ def test_clones_are_judged_where_nobody_learned() -> None:
 
 
 def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
-    """Every arm and seed, at every budget; zero-shot is where fine-tuning begins."""
+    """Every arm, seed and budget is evaluated; zero-shot is where fine-tuning starts."""
     study, out = finished
     for kind in ("scratch", "fine-tune"):
         for result in study.of(kind):
@@ -173,18 +171,18 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
     assert [e.steps for e in study.of("source")[0].curve] == [0, 60]
     assert set(study.summaries) == {"zero-shot", "fine-tune"}
     policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.safetensors")
-    again = evaluate_clone(SLIPPERY, policy, TINY_CLONING).mean_return
+    again = _LEARNER.evaluate(SLIPPERY, policy).mean_return
     assert again == study.of("scratch")[0].curve[-1].mean_return
 
 
 def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -> None:
-    """Of each seed there is one recording for the target and one for the source."""
+    """Each seed has one recording of the target and one of the source."""
     names = sorted(path.name for path in (finished[1] / "demonstrations").iterdir())
     assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
 
 
 def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """The plan decides every number, demonstrations and all."""
+    """Equal plans give equal numbers."""
     again = run_study(_plan(), tmp_path / "again", executor=Serial())
     assert _curves(again) == _curves(finished[0])
     assert again.summaries == finished[0].summaries
@@ -193,7 +191,7 @@ def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_
 def test_a_study_that_was_killed_ends_with_the_same_numbers(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """Whatever was left behind of a run, and of a recording."""
+    """Incomplete runs and recordings are repeated."""
     study, out = finished
     cut = tmp_path / "cut"
     shutil.copytree(out, cut)
@@ -210,7 +208,7 @@ def test_a_study_that_was_killed_ends_with_the_same_numbers(
 
 
 def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """A page with its learner and its curves, whatever the learner learns by."""
+    """The report has the learner and the curves."""
     path = tmp_path / "report.html"
     write_report(finished[0], path)
     page = path.read_text(encoding="utf-8")
@@ -220,7 +218,7 @@ def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path], tmp_path:
 
 
 def test_settings_that_contradict_themselves_are_refused() -> None:
-    """Budgets grow, and an evaluation has an episode."""
+    """Budgets must grow, and episodes have at least one step."""
     for budgets in ((), (0, 5), (5, 5), (10, 5)):
         with pytest.raises(StudyError, match="Budgets are numbers of steps that grow"):
             msgspec.structs.replace(TINY_CLONING, budgets=budgets)
@@ -230,7 +228,7 @@ def test_settings_that_contradict_themselves_are_refused() -> None:
 
 
 def test_a_budget_is_one_of_those_that_there_are() -> None:
-    """Rounded up, and to the largest one at most."""
+    """Steps are rounded up to a budget, or to the largest."""
     assert [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)] == [
         30,
         30,
@@ -243,7 +241,7 @@ def test_a_budget_is_one_of_those_that_there_are() -> None:
 
 
 def test_the_learner_is_there_by_its_name() -> None:
-    """Its settings survive the plan's JSON, and are told from those of PPO."""
+    """Its settings round trip through the JSON of a plan."""
     settings = learner_settings("cloning")
     assert isinstance(settings, CloningSettings)
     assert settings is LEARNERS["cloning"]

@@ -1,4 +1,4 @@
-"""What a policy is worth, on an env whose worth is known."""
+"""Evaluation of policies, in envs with known returns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.transfer.learners.evaluation import evaluate, random_actions
 
 
 class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
-    """An episode of as many steps as its seed says; each is worth its action plus one."""
+    """An episode of as many steps as its seed; each is worth its action plus one."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -25,7 +25,7 @@ class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """Begin to count."""
+        """Start the episode."""
         assert seed is not None
         self.left = seed
         return np.array([float(self.left)]), {}
@@ -51,7 +51,7 @@ def test_returns_lengths_and_terms_are_means_over_episodes() -> None:
 
 
 def test_each_env_gets_the_action_for_its_own_observation() -> None:
-    """When some episodes have ended, the others keep their own actions."""
+    """After some episodes have ended, the others still get their own actions."""
     seen: list[list[float]] = []
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
@@ -63,7 +63,7 @@ def test_each_env_gets_the_action_for_its_own_observation() -> None:
 
 
 def test_random_actions_come_from_the_seed() -> None:
-    """The same seed draws the same actions, another one others; all within the space."""
+    """Equal seeds draw equal actions, within the space."""
     observations = np.zeros((4, 1))
     first = random_actions(Countdown().action_space, 1)(observations)
     np.testing.assert_array_equal(first, random_actions(Countdown().action_space, 1)(observations))
@@ -73,7 +73,7 @@ def test_random_actions_come_from_the_seed() -> None:
 
 
 def test_one_env_plays_several_episodes() -> None:
-    """Of a robot there is but one: it plays one after another, each from a seed of its own."""
+    """A single env plays all episodes one after another, each with its own seed."""
     result = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 3, 7, episodes=3)
     many = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown() for _ in range(3)], 3, 7)
     assert result == many
@@ -81,7 +81,7 @@ def test_one_env_plays_several_episodes() -> None:
 
 
 class Succeeding(Countdown):
-    """An episode that says at each step whether it has succeeded, or nothing at all."""
+    """An env that reports a given success at each step, or none."""
 
     def __init__(self, said: list[bool]) -> None:
         self.said = said
@@ -95,7 +95,7 @@ class Succeeding(Countdown):
 
 
 def test_success_is_the_last_that_was_said() -> None:
-    """Of each episode; an env that says nothing has none."""
+    """The last value of each episode counts; None without any."""
     assert evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 1).success is None
     envs = [Succeeding(said) for said in ([False, True], [True, False], [True], [])]
     result = evaluate(lambda o: np.zeros((len(o), 1)), envs, 1)
@@ -103,7 +103,7 @@ def test_success_is_the_last_that_was_said() -> None:
 
 
 class Runner(Countdown):
-    """Runs at 2 m/s until it falls, and reports a term as one of NumPy's numbers."""
+    """An env at 2 m/s until it falls, with a reward term of a NumPy type."""
 
     measures = (FORWARD_SPEED,)
     spec = EnvSpec("Runner-v0", max_episode_steps=8)
@@ -118,7 +118,7 @@ class Runner(Countdown):
 
 
 def test_a_fallen_runner_stands_still_for_the_rest() -> None:
-    """Four of eight steps at 2 m/s are 1 m/s; terms of any numeric type are counted."""
+    """Four of eight steps at 2 m/s are 1 m/s; terms of any numeric type count."""
     result = evaluate(lambda o: np.zeros((len(o), 1)), [Runner()], 4)
     assert result.measures == {"forward speed": 1.0}
     assert result.terms == {"reward_ctrl": -2.0}
@@ -130,7 +130,7 @@ def test_a_fallen_runner_stands_still_for_the_rest() -> None:
 
 @pytest.mark.parametrize("name", ["Ant", "HalfCheetah", "Hopper", "InvertedPendulum", "Finger"])
 def test_reward_terms_of_an_evaluation_add_up_to_its_return(name: str) -> None:
-    """None is lost, whatever its type."""
+    """Every reward term is counted, whatever its type."""
     env = gym.make(f"shapechanger/{name}-v1")
     result = evaluate(random_actions(env.action_space, 0), [env], 0)
     assert sum(result.terms.values()) == pytest.approx(result.mean_return, rel=1e-5)

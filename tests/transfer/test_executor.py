@@ -1,4 +1,4 @@
-"""Jobs in processes: their order, their failures, their end."""
+"""Jobs in processes: order, failures and termination."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXECUTORS = [Serial(), Processes(2)]
 
 
 def await_(condition: object, timeout_s: float = 60.0) -> None:
-    """Wait until `condition()` holds, or fail."""
+    """Wait until `condition()` is true, or fail."""
     assert callable(condition)
     end = time.monotonic() + timeout_s
     never = threading.Event()
@@ -33,7 +33,7 @@ def await_(condition: object, timeout_s: float = 60.0) -> None:
 
 @pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
 def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> None:
-    """A job begins when all that it waits for have ended, in whatever order they are given."""
+    """A job starts after those that it depends on, whatever the order of the list."""
     names = ("last", "middle", "first")
     marks = {name: tmp_path / name for name in names}
     waits = {"last": ("middle",), "middle": ("first",), "first": ()}
@@ -49,31 +49,31 @@ def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
 def test_a_user_error_comes_back_as_it_was(executor: Executor) -> None:
-    """What a job raises is raised here, with its sentence."""
+    """A ShapechangerError of a job is raised in the parent."""
     with pytest.raises(UnknownName, match="No thing matches 'this'"):
         executor.run([Job("refuse", jobs.refuse, ())], lambda *_: None)
 
 
 def test_a_bug_comes_back_with_its_traceback() -> None:
-    """A job that crashes names itself and shows where."""
+    """Other errors become a StudyError with the job's name and traceback."""
     with pytest.raises(StudyError, match=r"(?s)crash failed.*ZeroDivisionError: a bug"):
         Processes(1).run([Job("crash", jobs.crash, ())], lambda *_: None)
 
 
 def test_a_process_that_is_killed_is_reported() -> None:
-    """A job whose process ends without a word is not waited for."""
+    """A worker that is killed raises a StudyError."""
     with pytest.raises(StudyError, match="vanish ended by itself with exit code -9"):
         Processes(1).run([Job("vanish", jobs.vanish, ())], lambda *_: None)
 
 
 def test_no_workers_are_refused() -> None:
-    """Nothing would ever run."""
+    """Zero workers are refused."""
     with pytest.raises(StudyError, match="at least one worker, got 0"):
         Processes(0)
 
 
 def test_processes_end_with_their_parent(tmp_path: Path) -> None:
-    """A parent that is killed outright leaves no process behind."""
+    """Workers end when their parent is killed."""
     pid_file = tmp_path / "pid"
     code = f"from tests.transfer import jobs; jobs.run_for_ever({str(pid_file)!r})"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -91,7 +91,7 @@ def test_processes_end_with_their_parent(tmp_path: Path) -> None:
 
 
 def _alive(pid: int) -> bool:
-    """Whether a process runs; one that has ended and that nobody has waited for does not."""
+    """Return whether a process runs; a zombie does not."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and errors that name the file."""
+"""Atomic writes, and errors that name the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.transfer.files import (
 
 
 def test_json_goes_round(tmp_path: Path) -> None:
-    """What is written reads back."""
+    """JSON round trips."""
     write_json(tmp_path / "a.json", {"x": [1, 2]})
     assert read_json(tmp_path / "a.json", dict[str, list[int]], "try") == {"x": [1, 2]}
 
@@ -25,7 +25,7 @@ def test_json_goes_round(tmp_path: Path) -> None:
 def test_a_file_appears_whole_or_keeps_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A write that fails half-way leaves the old file, and nothing beside it."""
+    """A write that fails keeps the old file, and leaves no other."""
     path = tmp_path / "a.json"
     write_atomic(path, b"old")
 
@@ -41,7 +41,7 @@ def test_a_file_appears_whole_or_keeps_what_was_there(
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[1]", b'{"x": "1"}', b"\xff"])
 def test_a_file_that_is_not_what_it_should_be_is_named(tmp_path: Path, content: bytes) -> None:
-    """The message says which file, and what to do."""
+    """The message has the file and the remedy."""
     path = tmp_path / "run.json"
     path.write_bytes(content)
     with pytest.raises(CorruptStudy, match=r"run\.json cannot be read .*: delete it\."):
@@ -49,7 +49,7 @@ def test_a_file_that_is_not_what_it_should_be_is_named(tmp_path: Path, content: 
 
 
 def test_lines_are_added_and_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
-    """One line for each value."""
+    """Each value is one line; a folder of that name is an error."""
     append_line(tmp_path / "curve", {"a": 1})
     append_line(tmp_path / "curve", {"a": 2})
     assert (tmp_path / "curve").read_text() == '{"a":1}\n{"a":2}\n'
@@ -58,7 +58,7 @@ def test_lines_are_added_and_a_folder_in_the_way_is_an_error(tmp_path: Path) -> 
 
 
 def test_folders_are_made_with_their_parents(tmp_path: Path) -> None:
-    """Making a folder twice is no error, and leaves nothing in it."""
+    """Folders may exist already, and stay empty."""
     make_folder(tmp_path / "a" / "b")
     make_folder(tmp_path / "a" / "b")
     assert not list((tmp_path / "a" / "b").iterdir())

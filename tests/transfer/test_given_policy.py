@@ -14,9 +14,10 @@ from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.cloning import DemonstrationFile, evaluate_clone, train_clones
+from shapechanger.transfer.learners import DemonstrationFile
+from shapechanger.transfer.learners.cloning import CloneLearner
 from shapechanger.transfer.learners.policy_file import save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
@@ -25,7 +26,7 @@ from tests.transfer.studies import SMALL, TINY, tiny_plan
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Networks this small gain nothing from more."""
+    """Limit PyTorch to one thread."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
@@ -34,11 +35,10 @@ def one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A clone of the driver on the dry lane, as `train` writes it."""
+    """A clone of the demonstrator on the dry lane."""
     folder = tmp_path_factory.mktemp("clone")
-    policy = train_clones(
+    policy = CloneLearner("cloning", QUICK_CLONING).train(
         DRY,
-        QUICK_CLONING,
         40,
         3,
         demonstrations=DemonstrationFile(folder / "shown.npz", 3),
@@ -52,15 +52,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A policy of a pendulum trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
-    policy = train(
-        SMALL,
-        "tiny",
-        TINY,
-        32,
-        3,
-        on_evaluation=lambda evaluation: None,
-        on_steps=lambda steps: None,
-    )
+    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 3, on_evaluation=lambda evaluation: None)
     save_policy(policy, path)
     return path
 
@@ -72,14 +64,15 @@ def _plan(source_policy: Path, **more: Any) -> Plan:
 
 
 def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> None:
-    """No source is trained, zero-shot is this clone, and every seed goes on from it."""
+    """No source is trained; zero-shot is the clone, and every seed starts from it."""
     plan = _plan(clone_file)
     assert plan.source_steps == 40
     study = run_study(plan, tmp_path / "study", source_policy=clone_file, executor=Serial())
     assert not study.of("source")
     assert study.source_return == ()
     (unchanged,) = study.of("zero-shot")
-    worth = evaluate_clone(ICY, CameraPolicy.load(clone_file), QUICK_CLONING).mean_return
+    learner = CloneLearner("cloning", QUICK_CLONING)
+    worth = learner.evaluate(ICY, learner.load(clone_file)).mean_return
     assert unchanged.curve[0].mean_return == worth
     for tuned in study.of("fine-tune"):
         assert tuned.curve[0].mean_return == worth
@@ -89,7 +82,7 @@ def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> 
 def test_a_study_goes_on_with_the_clone_it_was_planned_with(
     clone_file: Path, tmp_path: Path
 ) -> None:
-    """Another file is another study."""
+    """Another file than the planned one is refused."""
     other = tmp_path / "other.safetensors"
     CameraPolicy.load(clone_file).described(command="again").save(other)
     with pytest.raises(StudyError, match="not the one that this study was planned with"):
@@ -97,20 +90,20 @@ def test_a_study_goes_on_with_the_clone_it_was_planned_with(
 
 
 def test_a_clone_of_another_body_is_refused(clone_file: Path) -> None:
-    """The message says where it learned."""
+    """The message names the env that it was trained in."""
     with pytest.raises(SpaceMismatch, match=r"was trained in .*Dry-v1, and the source is .*Wet-v1"):
         _plan(clone_file, task=TransferTask(WET, ICY))
 
 
 def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Path) -> None:
-    """A vehicle with something wrong with its camera is another source."""
+    """Other arguments of the env are another source."""
     slippery = msgspec.structs.replace(DRY, kwargs={"grip": 0.1})
     with pytest.raises(SpaceMismatch, match=r"the source is .*Dry-v1 \(grip=0\.1\)"):
         _plan(clone_file, task=TransferTask(slippery, ICY))
 
 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
-    """One sentence says which learners take it."""
+    """The message names the learners that take it."""
     with pytest.raises(
         StudyError, match=r"dry\.safetensors is a clone, and tiny does not learn from pict"
     ):
@@ -118,7 +111,7 @@ def test_ppo_refuses_a_clone(clone_file: Path) -> None:
 
 
 def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
-    """And the other way round."""
+    """The message names the learner that trained it."""
     with pytest.raises(
         StudyError, match=r"pole\.safetensors was trained with tiny, and cloning starts"
     ):
@@ -126,7 +119,7 @@ def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
 
 
 def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
-    """Its demonstrations would be of another size; better said before the work."""
+    """Clones that take other pictures are refused."""
     framing = Framing(height=10, width=20, top=0.0)
     settings = msgspec.structs.replace(
         QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
@@ -137,7 +130,7 @@ def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
 
 @pytest.mark.parametrize("data", [{}, {"env": DRY.id, "arguments": {}}, {"env": 5}])
 def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
-    """Such as one that was made from recorded pictures alone."""
+    """Clones without an env and demonstrated steps on the card are refused."""
     path = tmp_path / "found.safetensors"
     CameraPolicy.fresh(QUICK_CLONING.clone, 0).described(**data).save(path)
     with pytest.raises(StudyError, match=r"card of .*found\.safetensors lacks the demonstrations"):
@@ -145,7 +138,7 @@ def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, A
 
 
 def test_what_is_no_policy_is_refused(clone_file: Path, tmp_path: Path) -> None:
-    """A file that is not there, that is something else, and half of one."""
+    """Missing, foreign, truncated and damaged files are refused."""
     with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.safetensors"):
         _plan(tmp_path / "none.safetensors")
     (tmp_path / "text.safetensors").write_text("not at all")

@@ -16,7 +16,7 @@ from stable_baselines3.sac.policies import MlpPolicy
 from shapechanger.errors import CorruptStudy, StudyError, UnknownName
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import Sb3Learner, train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import (
     ImportedSettings,
     OffPolicySettings,
@@ -41,7 +41,7 @@ SHORT: dict[str, Any] = {
 
 
 def narrow_sac(envs: VecEnv, seed: int, *, width: int = 8) -> BaseAlgorithm:
-    """A learner that is a function: SAC with one layer."""
+    """A learner as a function: SAC with one layer."""
     return SAC(
         MlpPolicy,
         envs,
@@ -54,22 +54,22 @@ def narrow_sac(envs: VecEnv, seed: int, *, width: int = 8) -> BaseAlgorithm:
 
 
 def not_a_model(envs: VecEnv, seed: int) -> object:
-    """A learner that builds something else."""
+    """A function that returns something else."""
     del envs, seed
     return "a policy"
 
 
 class Unstable(A2C):
-    """A learner whose weights are no numbers after its first update."""
+    """A learner whose weights are NaN after its first update."""
 
     def train(self) -> None:
-        """Spoil the weights."""
+        """Set the weights to NaN."""
         for weight in self.policy.parameters():
             weight.data.fill_(float("nan"))
 
 
 def settings_of(learner: str) -> Sb3Settings:
-    """Small settings of each kind of learner."""
+    """Return small settings of each kind of learner."""
     if learner in ("sac", "tqc"):
         _, settings = resolve_learner(learner, SHORT)
     else:
@@ -87,16 +87,18 @@ LEARNERS = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
 
 
 def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluation], Sb3Settings]:
-    """A policy that has learned for a second."""
+    """Return a policy trained for a second."""
     settings = settings_of(learner)
     curve: list[Evaluation] = []
-    policy = train(SMALL, learner, settings, 64, 0, on_evaluation=curve.append, **options)
+    policy = Sb3Learner(learner, settings).train(
+        SMALL, 64, 0, on_evaluation=curve.append, **options
+    )
     return policy, curve, settings
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_a_policy_goes_round(learner: str, tmp_path: Path) -> None:
-    """Any learner is evaluated at the same steps, and its policy reads back as it was."""
+    """Every learner is evaluated at the same steps, and its policy round trips."""
     policy, curve, settings = trained(learner)
     update = settings.update_steps
     assert [one.steps for one in curve] == [
@@ -113,7 +115,7 @@ def test_a_policy_goes_round(learner: str, tmp_path: Path) -> None:
 
 
 def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
-    """It could name any function of any package."""
+    """A file may not name a function to call."""
     policy, _, _ = trained(f"{HERE}:narrow_sac")
     path = tmp_path / "policy.safetensors"
     save_policy(policy, path)
@@ -123,18 +125,16 @@ def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("learner", LEARNERS[:3])
 def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
-    """Before its first update, also where a new policy would act at random."""
+    """Before its first update it acts as the source, instead of at random."""
     policy, curve, settings = trained(learner)
     plan = tiny_plan(settings)
     moved: list[Evaluation] = []
-    train(
+    Sb3Learner(learner, settings).train(
         BIG,
-        learner,
-        settings,
         64,
         1,
         on_evaluation=moved.append,
-        source=policy,
+        start=policy,
         body_map=plan.body_map,
     )
     zero_shot = Sb3Learner(learner, settings).evaluate(BIG, policy, plan.body_map)
@@ -143,13 +143,13 @@ def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
 
 
 def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
-    """With as many steps before the first update as there are, nothing changes."""
+    """Without updates the policy does not change."""
     policy, _, settings = trained("sac")
     assert isinstance(settings, OffPolicySettings)
     plan = tiny_plan(settings)
     late = msgspec.structs.replace(settings, learning_starts=64)
-    moved = train(
-        SMALL, "sac", late, 64, 1, on_evaluation=_ignore, source=policy, body_map=plan.body_map
+    moved = Sb3Learner("sac", late).train(
+        SMALL, 64, 1, on_evaluation=_ignore, start=policy, body_map=plan.body_map
     )
     observations = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_allclose(moved.act(observations), policy.act(observations), rtol=1e-5)
@@ -157,7 +157,7 @@ def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
 
 @pytest.mark.parametrize("learner", LEARNERS[:3])
 def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
-    """To 1e-5, as computed by onnxruntime."""
+    """ONNX Runtime computes the same actions to 1e-5."""
     policy, _, _ = trained(learner)
     export_onnx(policy, tmp_path / "policy.onnx")
     observations = np.random.default_rng(0).normal(size=(20, 4))
@@ -167,13 +167,13 @@ def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
 
 
 def test_a_study_of_sac_is_a_study_as_any(tmp_path: Path) -> None:
-    """Scratch, zero-shot and fine-tune."""
+    """A study of SAC with scratch, zero-shot and fine-tune."""
     study = run_study(tiny_plan(settings_of("sac"), steps=64, source_steps=32), tmp_path)
     assert len(study.of("fine-tune")) == 2
 
 
 def test_a_file_of_settings(tmp_path: Path) -> None:
-    """It starts from a preset or names an algorithm; `--set` wins over it."""
+    """A TOML file names a preset or an algorithm; `--set` takes precedence."""
     path = tmp_path / "mine.toml"
     path.write_text('preset = "sac"\nlearning_rate = 1e-4\ngamma = 0.9\n')
     name, settings = resolve_learner(str(path), {"gamma": 0.95})
@@ -198,7 +198,7 @@ def test_a_file_of_settings(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    """In one sentence."""
+    """The message names the file."""
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(StudyError, match=words):
@@ -206,26 +206,26 @@ def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, words: s
 
 
 def test_a_missing_file_of_settings_is_refused() -> None:
-    """With the names of those that exist."""
+    """The message lists the presets."""
     with pytest.raises(UnknownName, match="sac"):
         resolve_learner("none.toml", {})
 
 
 def test_a_function_that_builds_something_else_is_refused() -> None:
-    """With the type that it returned."""
+    """The message names the returned type."""
     with pytest.raises(StudyError, match="returned str"):
         trained(f"{HERE}:not_a_model")
 
 
 def test_arguments_that_a_class_refuses_are_one_sentence() -> None:
-    """Also those of a right name."""
+    """Errors of the class become a StudyError."""
     _, settings = resolve_learner("stable_baselines3:A2C", {"learning_rate": "fast"})
     assert isinstance(settings, ImportedSettings)
     with pytest.raises(StudyError, match="A2C refuses its arguments"):
-        train(SMALL, "mine", settings, 10_000, 0, on_evaluation=_ignore)
+        Sb3Learner("mine", settings).train(SMALL, 10_000, 0, on_evaluation=_ignore)
 
 
 def test_a_training_that_diverges_is_refused() -> None:
-    """Its weights are no numbers, and neither would its returns be."""
+    """Weights of NaN raise a StudyError."""
     with pytest.raises(StudyError, match="diverged after"):
         trained(f"{HERE}:Unstable")

@@ -1,4 +1,4 @@
-"""Policies as ONNX: the same actions without PyTorch, and names for every number."""
+"""Policies as ONNX: equal actions without PyTorch, and names in the metadata."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
 from shapechanger.transfer.plan import Run
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import TINY, TINY_NORMALISED, tiny_plan
 
@@ -25,17 +24,17 @@ from tests.transfer.studies import TINY, TINY_NORMALISED, tiny_plan
 def files(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Path]:
-    """A policy that was trained, and what it was exported to."""
+    """A trained policy and its ONNX file."""
     folder = tmp_path_factory.mktemp("onnx")
     plan = tiny_plan(request.param, arms=("scratch", "fine-tune"), steps=32, source_steps=32)
     run_study(plan, folder / "study", executor=Serial())
-    policy = policy_path(folder / "study", Run("fine-tune", 0))
+    policy = Run("fine-tune", 0).policy_file(folder / "study")
     export_onnx(load_policy(policy), folder / "policy.onnx")
     return policy, folder / "policy.onnx"
 
 
 def test_actions_are_those_of_pytorch(files: tuple[Path, Path]) -> None:
-    """To 1e-5, within the bounds, for observations near and far."""
+    """Actions agree to 1e-5 and are within the bounds."""
     policy, exported = load_policy(files[0]), OnnxPolicy(files[1])
     rng = np.random.default_rng(0)
     for scale in (0.01, 1.0, 100.0):
@@ -47,7 +46,7 @@ def test_actions_are_those_of_pytorch(files: tuple[Path, Path]) -> None:
 
 
 def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
-    """For whoever knows ONNX and nothing of us."""
+    """The metadata has the names of the features and the card."""
     model = onnx.load(str(files[1]))
     facts = {entry.key: entry.value for entry in model.metadata_props}
     card = load_policy(files[0]).card
@@ -58,7 +57,7 @@ def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
 
 
 def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
-    """As on a robot that has none."""
+    """OnnxPolicy works where torch cannot be imported."""
     code = (
         "import sys; sys.modules['torch'] = None; import numpy as np; from pathlib import Path; "
         "from shapechanger.transfer.onnx_policy import OnnxPolicy; "
@@ -71,7 +70,7 @@ def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
 
 
 def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
-    """With the shape that it takes."""
+    """The message states the shape."""
     with pytest.raises(StudyError, match=r"shape \(n, 4\), got \(1, 5\)"):
         OnnxPolicy(files[1]).act(np.zeros((1, 5)))
 
@@ -80,7 +79,7 @@ def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
 def test_what_is_no_policy_gets_one_sentence(
     files: tuple[Path, Path], tmp_path: Path, how: str
 ) -> None:
-    """Whatever the runtime makes of it."""
+    """Missing, truncated and foreign files are refused in one sentence."""
     path = tmp_path / "mine.onnx"
     content = files[1].read_bytes()
     if how == "cut":
@@ -97,7 +96,7 @@ def test_what_is_no_policy_gets_one_sentence(
 
 
 def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: Path) -> None:
-    """Layouts that do not fit the network would mislead everybody."""
+    """Layouts that do not fit the network are refused."""
     model = onnx.load(str(files[1]))
     for entry in model.metadata_props:
         if entry.key == "shapechanger":

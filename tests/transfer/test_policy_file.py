@@ -1,4 +1,4 @@
-"""Policies in files: what was saved acts as what was trained."""
+"""Policy files: round trips, and files that are refused."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ import pytest
 from safetensors import numpy as safetensors
 
 import shapechanger
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import CorruptStudy
-from shapechanger.transfer.learners.cloning import load_clone
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
 
 def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[Evaluation]]:
-    """A policy that has learned for a second."""
+    """Return a policy trained for a second, and its curve."""
     curve: list[Evaluation] = []
-    policy = train(SMALL, "tiny", settings, 64, seed, on_evaluation=curve.append)
+    policy = Sb3Learner("tiny", settings).train(SMALL, 64, seed, on_evaluation=curve.append)
     return policy, curve
 
 
 @pytest.mark.parametrize("settings", [TINY, TINY_NORMALISED], ids=["plain", "normalised"])
 def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
-    """Actions, statistics and card read back as they were."""
+    """Actions, statistics and card round trip."""
     policy, curve = trained(settings)
     save_policy(policy, tmp_path / "policy.safetensors")
     again = load_policy(tmp_path / "policy.safetensors")
@@ -47,7 +47,7 @@ def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
 
 
 def test_actions_are_those_of_the_model() -> None:
-    """The short way to PPO's mean actions gives `predict`'s, clipped like them."""
+    """PPO's mean actions equal those of `predict`."""
     policy, _ = trained(TINY)
     network: Any = policy.model.policy
     observations = np.random.default_rng(0).normal(size=(50, 4))
@@ -59,7 +59,7 @@ def test_actions_are_those_of_the_model() -> None:
 
 
 def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
-    """The statistics are part of the policy: numbers far away act otherwise."""
+    """The policy normalises observations itself."""
     policy, _ = trained(TINY_NORMALISED)
     assert policy.normalisation is not None
     near, far = policy.act(np.zeros((1, 4))), policy.act(np.full((1, 4), 0.05))
@@ -67,7 +67,7 @@ def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
 
 
 def test_the_seed_decides_the_training() -> None:
-    """The same seed gives the same weights, another seed others."""
+    """Equal seeds give equal weights."""
     observations = np.random.default_rng(0).normal(size=(5, 4))
     first, again, other = (trained(TINY, seed)[0].act(observations) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -76,7 +76,7 @@ def test_the_seed_decides_the_training() -> None:
 
 @pytest.mark.parametrize("kind", ["missing", "text", "zip"])
 def test_what_is_no_policy_is_refused(tmp_path: Path, kind: str) -> None:
-    """A missing file, a text, and a zip of something else."""
+    """A missing file, a text and a zip are refused."""
     path = tmp_path / "policy.safetensors"
     if kind == "text":
         path.write_text("not a policy")
@@ -92,7 +92,7 @@ SHIPPED = Path(shapechanger.__file__).parent / "envs"
 
 @pytest.mark.parametrize("path", POLICIES.values(), ids=POLICIES)
 def test_shipped_policies_load(path: Path) -> None:
-    """They act within the bounds of their actions."""
+    """Actions of the shipped policies are within the bounds."""
     policy = load_policy(path)
     seen = np.random.default_rng(0).normal(size=(3, policy.card.observation.size))
     assert np.abs(policy.act(seen)).max() <= 1.0
@@ -102,12 +102,12 @@ def test_shipped_policies_load(path: Path) -> None:
     "path", sorted(SHIPPED.glob("vehicle/clones/*.safetensors")), ids=lambda p: p.stem
 )
 def test_shipped_clones_load(path: Path) -> None:
-    """Their weights are read without unpickling."""
-    assert load_clone(path).card.framing.width > 0
+    """Shipped clones load without unpickling."""
+    assert CameraPolicy.load(path).card.framing.width > 0
 
 
 def test_loading_leaves_random_numbers_alone() -> None:
-    """A policy that is loaded in the middle of a training must not repeat its draws."""
+    """Loading keeps the states of all random generators."""
     random.seed(5)
     before = random.getstate()
     load_policy(POLICIES["reach"])
@@ -116,7 +116,7 @@ def test_loading_leaves_random_numbers_alone() -> None:
 
 @pytest.mark.parametrize("at", [3, 200, -1])
 def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
-    """In its length, its header or its numbers."""
+    """Changes of the length, the header or the numbers are refused."""
     content = bytearray(POLICIES["reach"].read_bytes())
     content[at] ^= 0x01
     (tmp_path / "bad.safetensors").write_bytes(content)
@@ -125,7 +125,7 @@ def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
 
 
 def test_half_a_file_is_refused(tmp_path: Path) -> None:
-    """A copy that was cut off."""
+    """A truncated file is refused."""
     content = POLICIES["reach"].read_bytes()
     for size in (0, 4, 500, len(content) - 1):
         (tmp_path / "half.safetensors").write_bytes(content[:size])
@@ -134,7 +134,7 @@ def test_half_a_file_is_refused(tmp_path: Path) -> None:
 
 
 def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:
-    """A policy of the finger with another card, and the hash of its numbers."""
+    """Write a policy of the finger with another card and the hash of its numbers."""
     content = POLICIES["reach"].read_bytes()
     length = int.from_bytes(content[:8], "little")
     metadata = json.loads(content[8 : 8 + length])["__metadata__"]
@@ -145,7 +145,7 @@ def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:
 
 
 def test_a_card_of_another_body_is_refused(tmp_path: Path) -> None:
-    """Its layouts must have the sizes of its spaces."""
+    """Layouts must have the sizes of the spaces."""
     card = load_policy(POLICIES["track"]).card
     path = _changed(tmp_path, {"observation": msgspec.to_builtins(card.observation)})
     with pytest.raises(CorruptStudy, match="its observation has 38 numbers, and its layout"):
@@ -153,7 +153,7 @@ def test_a_card_of_another_body_is_refused(tmp_path: Path) -> None:
 
 
 def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
-    """In one sentence."""
+    """Weights of other shapes are refused in one sentence."""
     settings = msgspec.structs.replace(load_policy(POLICIES["reach"]).card.settings, net_arch=(8,))
     path = _changed(tmp_path, {"settings": msgspec.to_builtins(settings)})
     with pytest.raises(CorruptStudy, match=r"other\.safetensors is not a policy") as refusal:
@@ -162,7 +162,7 @@ def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_pickle_is_refused(tmp_path: Path) -> None:
-    """Nothing of it is unpickled, whatever it is called."""
+    """Nothing is unpickled, whatever the file is called."""
     trace, bad = tmp_path / "trace", tmp_path / "bad.safetensors"
     bad.write_bytes(pickle.dumps(Malicious(trace)))
     with pytest.raises(CorruptStudy, match=r"bad\.safetensors is not a policy"):
@@ -171,7 +171,7 @@ def test_a_pickle_is_refused(tmp_path: Path) -> None:
 
 
 class Malicious:
-    """Leaves a file behind when it is unpickled."""
+    """An object that writes a file when it is unpickled."""
 
     def __init__(self, trace: Path) -> None:
         self._trace = trace

@@ -1,4 +1,4 @@
-"""A study on a Ray cluster: two nodes of this machine, of which one is killed."""
+"""A study on a Ray cluster of two nodes on this machine."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _UNTIL_DEAD = 6
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A head node without cores for jobs, so that all run on nodes that may be killed."""
+    """A head node without cores, so that all jobs run on nodes that can be killed."""
     from ray.cluster_utils import Cluster
 
     # Workers import the jobs of the tests.
@@ -58,7 +58,7 @@ def cluster() -> Iterator[Any]:
 
 
 def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -> None:
-    """Same seeds, same numbers; progress arrives."""
+    """Equal seeds give equal numbers, and progress arrives."""
     seen: set[str] = set()
 
     def on_progress(name: str, steps: int, ended: bool) -> None:
@@ -76,7 +76,7 @@ def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -
 
 
 def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path) -> None:
-    """Half-way through its first attempt."""
+    """A job whose node is killed is repeated on another."""
     doomed = cluster.add_node(num_cpus=1, object_store_memory=_MEMORY)
     marks = [tmp_path / f"job-{i}" for i in range(2)]
     killed, since = False, 0
@@ -106,7 +106,7 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
 
 
 def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_path: Path) -> None:
-    """A mistake at once; a worker that is lost three times at last; what needs them is named."""
+    """Failed jobs, lost jobs and those that need them are named."""
     mark = tmp_path / "mark"
     with pytest.raises(StudyError) as caught:
         RayCluster(cluster.address).run(
@@ -128,7 +128,7 @@ def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_pat
 
 @pytest.mark.parametrize("address", ["127.0.0.1:9", "nowhere", "ray://127.0.0.1:9"])
 def test_an_address_that_does_not_answer_is_one_sentence(address: str) -> None:
-    """Within ten seconds."""
+    """An address without an answer is refused within ten seconds."""
     began = time.monotonic()
     with pytest.raises(StudyError, match=r"does not answer|HOST:PORT"):
         RayCluster(address).run([], lambda *_: None)
@@ -136,7 +136,7 @@ def test_an_address_that_does_not_answer_is_one_sentence(address: str) -> None:
 
 
 def test_what_listens_but_is_no_ray_is_one_sentence() -> None:
-    """Something else may have the port."""
+    """Another program at the address is refused."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         began = time.monotonic()

@@ -1,4 +1,4 @@
-"""The references that ship: their policies do what their numbers say."""
+"""The shipped references and their policies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REFERENCES = load_references()
 
 
 def test_every_env_of_the_catalogue_has_one() -> None:
-    """With a policy, and no policy without a reference."""
+    """Every env has a reference with a policy, and every policy a reference."""
     assert set(REFERENCES) == set(CATALOGUE)
     assert {path for path in FOLDER.glob("*.safetensors")} == {
         reference_policy(env) for env in REFERENCES
@@ -30,7 +30,7 @@ def test_they_are_small() -> None:
 
 @pytest.mark.parametrize("env_id", REFERENCES)
 def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
-    """Its card names the training of the reference, and one episode is far above the floor."""
+    """The card is that of the reference, and one episode is far above the floor."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
@@ -50,7 +50,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
 
 
 def test_other_bodies_have_none() -> None:
-    """A reference belongs to one body."""
+    """Envs with arguments have no reference."""
     assert reference_of(EnvRef("shapechanger/Ant-v1")) is not None
     assert reference_of(EnvRef("shapechanger/Ant-v1", {"body": "BigAnt"})) is None
     assert reference_of(EnvRef("Ant-v5")) is None

@@ -1,4 +1,4 @@
-"""Settings of learners: changing some, and where they come from."""
+"""Settings of learners: changes, errors and presets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shapechanger.transfer.learners.settings import (
 
 
 def test_some_settings_change_and_others_stay() -> None:
-    """Values as TOML holds them: lists for tuples, whole numbers for floats."""
+    """Values are converted as from TOML: lists to tuples, integers to floats."""
     _, changed = resolve_learner("ppo-run", {"net_arch": [32], "learning_rate": 1})
     assert isinstance(changed, PpoSettings)
     assert (changed.net_arch, changed.learning_rate) == ((32,), 1.0)
@@ -39,13 +39,13 @@ def test_some_settings_change_and_others_stay() -> None:
 def test_wrong_settings_are_refused(
     changed: dict[str, Any], kind: type[Exception], words: str
 ) -> None:
-    """With the name of the setting."""
+    """The message names the setting."""
     with pytest.raises(kind, match=words):
         resolve_learner("ppo-run", changed)
 
 
 def test_every_learner_says_what_it_was_tuned_on() -> None:
-    """Envs that exist; an env that inherits settings is told."""
+    """The envs exist, and the text states whether an env is one of them."""
     assert set(TUNED_ON) == set(LEARNERS)
     for names in TUNED_ON.values():
         for name in names:
@@ -54,4 +54,4 @@ def test_every_learner_says_what_it_was_tuned_on() -> None:
         "The settings were tuned on Swimmer."
     )
     assert tuning_text("ppo-run", "shapechanger/Hopper-v1").endswith("not on Hopper.")
-    assert "Nobody has stated" in tuning_text("mine", "shapechanger/Ant-v1")
+    assert "It is not stated" in tuning_text("mine", "shapechanger/Ant-v1")

@@ -1,4 +1,4 @@
-"""An env of which there is but one, as of a robot."""
+"""Training in an env of which only one instance can exist."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Evaluation
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from tests.transfer.studies import TINY
 
 FINGER = EnvRef("shapechanger/Finger-v1")
@@ -19,7 +19,7 @@ _STEPS = 100  # Of an episode.
 
 
 def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Made once; each rollout begins an episode of its own, and the budget is what it was."""
+    """Training and evaluation share the env; each rollout starts an episode."""
     called: dict[int, list[int | str | None]] = {}
     reset, step = FingerReachEnv.reset, FingerReachEnv.step
 
@@ -37,7 +37,7 @@ def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(FingerReachEnv, "step", counted_step)
     monkeypatch.setattr(FingerReachEnv, "side_by_side", False, raising=False)
     curve: list[Evaluation] = []
-    policy = train(FINGER, "tiny", TINY, 96, 0, on_evaluation=curve.append)
+    policy = Sb3Learner("tiny", TINY).train(FINGER, 96, 0, on_evaluation=curve.append)
     assert [evaluation.steps for evaluation in curve] == [0, 32, 64, 96]
     assert policy.card.steps == 96
     (calls,) = called.values()

@@ -1,4 +1,4 @@
-"""Sources that are made more like the target."""
+"""Arms that train in an adapted source."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from shapechanger.reports.verdict import arm_rows, caveats
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
@@ -29,7 +28,7 @@ FOLLOWS = EnvRef("shapechanger/FingerTrack-v1")
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[Any]]:
-    """A tiny study of the gap, its folder, and the fingers that were identified."""
+    """A small study of the gap between fingers, its folder, and the identified fingers."""
     moved: list[Any] = []
 
     def identified(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
@@ -46,7 +45,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
 
 
 def test_every_arm_is_there_and_measured(study: tuple[Study, Path, list[Any]]) -> None:
-    """What was learned in a source made more like the target is judged on the target, unchanged."""
+    """Policies of adapted sources are evaluated on the target without training."""
     made, _, _ = study
     assert set(made.summaries) == {"zero-shot", "fine-tune", "randomised", "identified"}
     for kind in ("randomised", "identified"):
@@ -55,7 +54,7 @@ def test_every_arm_is_there_and_measured(study: tuple[Study, Path, list[Any]]) -
 
 
 def test_each_seed_meets_another_individual(study: tuple[Study, Path, list[Any]]) -> None:
-    """Of the fingers of a gap; so intervals are over fingers, too."""
+    """Each seed has another finger as its target."""
     made, _, moved = study
     assert made.plan.individual == "finger_seed"
     fingers = [made.plan.target_of(Run("zero-shot", i)).kwargs["finger_seed"] for i in range(2)]
@@ -69,7 +68,7 @@ def test_each_seed_meets_another_individual(study: tuple[Study, Path, list[Any]]
 
 
 def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> None:
-    """With the policies that were learned in them."""
+    """The adapted envs are in the folders of the runs, with their policies."""
     made, out, _ = study
     sources = {
         kind: json.loads((Run(kind, 0).folder(out) / "source.json").read_text())
@@ -77,12 +76,12 @@ def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> N
     }
     assert sources["randomised"] == {"id": FINGER.id, "kwargs": {"gap": "wide"}}
     assert sources["identified"]["kwargs"]["parameters"]["tendon_friction"] == 0.25
-    assert all(policy_path(out, Run(kind, 1)).exists() for kind in sources)
+    assert all(Run(kind, 1).policy_file(out).exists() for kind in sources)
     assert made.plan.task.source == FINGER
 
 
 def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
-    """Where an env says what it is: for each arm, and of the source policy in the source."""
+    """Every arm reports success, and so does the source policy in the source."""
     made, _, _ = study
     said = {row.kind: row.success for row in arm_rows(made)}
     assert set(said) == {"source", "random", "zero-action", *_EVERY}
@@ -94,7 +93,7 @@ def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
 def test_a_study_that_cannot_go_on_begins_no_run_twice(
     study: tuple[Study, Path, list[Any]],
 ) -> None:
-    """What has ended is kept: the same study again moves no finger."""
+    """Finished runs are kept when a later one fails."""
     made, out, moved = study
     before = len(moved)
     again = run_study(made.plan, out, executor=Serial())
@@ -103,26 +102,26 @@ def test_a_study_that_cannot_go_on_begins_no_run_twice(
 
 
 def test_default_arms() -> None:
-    """The same task in another finger gets all arms, any other pair the three of always."""
+    """A target that adapts the source gets all arms, other pairs the three basic ones."""
     assert default_arms(inspect_task(TransferTask(FINGER, REAL_LIKE))) == _EVERY
     assert default_arms(inspect_task(TransferTask(FINGER, FOLLOWS))) == ARMS
     assert default_arms(inspect_task(TransferTask(SMALL, BIG))) == ARMS
 
 
 def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
-    """Before anything is trained."""
+    """It is refused when the study is planned."""
     with pytest.raises(StudyError, match=r"identified needs a target that can adapt"):
         tiny_plan(arms=("scratch", "identified"))
 
 
 def test_only_what_is_needed_is_trained() -> None:
-    """Without an arm that moves a source policy there is none."""
+    """Without an arm that uses a source policy none is trained."""
     plan = tiny_plan(task=TransferTask(FINGER, REAL_LIKE), arms=("scratch", "randomised"))
     assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", "randomised"}
 
 
 def test_a_robot_is_had_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The plan says so, and whoever runs it takes one worker."""
+    """The plan of an exclusive env says so."""
     task = TransferTask(FINGER, REAL_LIKE)
     assert not tiny_plan(task=task).exclusive
     monkeypatch.setattr(FingerReachEnv, "exclusive", True, raising=False)

@@ -1,4 +1,4 @@
-"""Camera students of teachers that see distances."""
+"""Camera policies that learn from a teacher with distances."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, save_policy
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.learners.student import STUDENT_CLONING, train_student
 
@@ -33,7 +33,7 @@ _TINY = PpoSettings(
 
 def _teacher(vehicle: str = "Car") -> TrainedPolicy:
     env = EnvRef(f"shapechanger/{vehicle}Ranges-v1", {"courses": [0, 1]})
-    return train(env, "tiny", _TINY, 8, 0, on_evaluation=lambda _: None)
+    return Sb3Learner("tiny", _TINY).train(env, 8, 0, on_evaluation=lambda _: None)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def teacher() -> TrainedPolicy:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -> None:
-    """It says which teacher it had, and acts like it: this one hardly moves, so it just rolls."""
+    """Its card names the teacher, and it acts like it."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
@@ -61,7 +61,7 @@ def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -
 
 
 def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
-    """Another vehicle's policy, another env, or no time for lessons."""
+    """Policies of other envs, envs without teachers and too few steps are refused."""
     with pytest.raises(StudyError, match=r"A teacher for shapechanger/Car-v1 is a policy of"):
         train_student(_CAR, _teacher("Tank"), 10, 0)
     with pytest.raises(StudyError, match=r"CarRanges-v1 has no teachers"):
@@ -73,7 +73,7 @@ def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
 def test_the_command_line_refuses_in_sentences(
     teacher: TrainedPolicy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before anything is trained."""
+    """Wrong arguments are refused before the training."""
     path = tmp_path / "teacher.safetensors"
     save_policy(teacher, path)
     for arguments, sentence in (

@@ -1,4 +1,4 @@
-"""A study from beginning to end, cut off, resumed, refused."""
+"""A study from planning to its result, interrupted, resumed and refused."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import (
     STUDY_FILE,
     Study,
@@ -42,7 +41,7 @@ from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
 
 
 def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
-    """Every number that a study must give again."""
+    """Return every number that must be reproduced."""
     return {
         result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
     }
@@ -50,7 +49,7 @@ def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
-    """A study that was never interrupted, and its folder."""
+    """A study that was not interrupted, and its folder."""
     out = tmp_path_factory.mktemp("finished") / "study"
     return run_study(tiny_plan(), out, executor=Serial(), command="test"), out
 
@@ -69,7 +68,7 @@ def test_every_arm_and_seed_is_there(finished: tuple[Study, Path]) -> None:
 
 
 def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> None:
-    """The source policy through the map, and the transplanted one, do the same in the target."""
+    """The mapped and the transplanted source policy have equal returns."""
     study, _ = finished
     for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
         assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
@@ -77,14 +76,14 @@ def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> 
 
 
 def test_the_study_file_reads_back(finished: tuple[Study, Path]) -> None:
-    """study.json holds all that the study holds."""
+    """study.json round trips."""
     study, out = finished
     assert read_json(out / STUDY_FILE, Study, "") == study
     assert json.loads((out / STUDY_FILE).read_text())["command"] == "test"
 
 
 def test_curves_are_written_as_they_grow(finished: tuple[Study, Path]) -> None:
-    """Each evaluation is a line of the run's own file."""
+    """Each evaluation is a line of the run's curve file."""
     study, out = finished
     lines = (out / "runs" / "scratch-0" / "curve.jsonl").read_text().splitlines()
     assert [json.loads(line)["steps"] for line in lines] == [0, 32, 64, 96]
@@ -94,21 +93,21 @@ def test_curves_are_written_as_they_grow(finished: tuple[Study, Path]) -> None:
 
 
 def test_seeds_make_different_runs(finished: tuple[Study, Path]) -> None:
-    """No two runs of an arm share a seed, nor do two arms."""
+    """No two runs share a seed."""
     study, _ = finished
     seeds = [result.seed for result in study.runs]
     assert len(set(seeds)) == len(seeds)
 
 
 def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """The plan decides every number."""
+    """Equal plans give equal numbers."""
     again = run_study(tiny_plan(), tmp_path / "again", executor=Serial())
     assert curves(again) == curves(finished[0])
     assert again.summaries == finished[0].summaries
 
 
 def test_runs_that_were_cut_off_start_again(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """What a kill leaves behind of a run does not count; the numbers are the same."""
+    """Incomplete runs are repeated, with the same numbers."""
     study, out = finished
     cut = tmp_path / "cut"
     shutil.copytree(out, cut)
@@ -124,7 +123,7 @@ def test_runs_that_were_cut_off_start_again(finished: tuple[Study, Path], tmp_pa
 
 
 def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """A study that is complete is only summed up again."""
+    """A complete study is only summarised again."""
     study, out = finished[0], tmp_path / "study"
     shutil.copytree(finished[1], out)
     before = (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
@@ -138,14 +137,14 @@ def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: P
 
 
 def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
-    """With VecNormalize too the transplanted policy starts as the source policy ends."""
+    """With VecNormalize too, fine-tuning starts where the source policy ends."""
     study = run_study(tiny_plan(TINY_NORMALISED), tmp_path / "study", executor=Serial())
     for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
         assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
 
 
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
-    """Ant to ExtendedAnt: more senses, more motors, one command."""
+    """Ant to ExtendedAnt, whose spaces differ."""
     task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     plan = tiny_plan(
         TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, steps=32
@@ -159,8 +158,8 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
 
 
 def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """With a source policy no source is trained, and every seed starts from that policy."""
-    policy = policy_path(finished[1], Run("source", 0))
+    """With a given policy no source is trained, and every seed starts from it."""
+    policy = Run("source", 0).policy_file(finished[1])
     plan = tiny_plan(source_policy=policy)
     study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
     assert not study.of("source")
@@ -172,34 +171,34 @@ def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: P
         run_study(
             plan,
             tmp_path / "study",
-            source_policy=policy_path(finished[1], Run("source", 1)),
+            source_policy=Run("source", 1).policy_file(finished[1]),
         )
 
 
 def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
-    """A pendulum's policy is no source for an ant."""
+    """A policy of another env is refused as the source policy."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
-    policy = policy_path(finished[1], Run("source", 0))
+    policy = Run("source", 0).policy_file(finished[1])
     with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
         tiny_plan(task=ants, source_policy=policy)
 
 
 def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
-    """A pendulum is not moved to itself, and nothing is trained for it."""
+    """Equal source and target are refused before any training."""
     with pytest.raises(EmptyShift, match="nothing to transfer across"):
         run_study(tiny_plan(task=TransferTask(BIG, BIG)), tmp_path / "s", executor=Serial())
     assert not (tmp_path / "s").exists()
 
 
 def test_spaces_that_cannot_be_mapped_are_refused() -> None:
-    """A pendulum and an ant have no number in common."""
+    """Bodies without a common name are refused."""
     with pytest.raises(MapError, match="cannot be mapped"):
         tiny_plan(task=TransferTask(SMALL, EnvRef("shapechanger/Ant-v1")))
 
 
 @pytest.mark.parametrize("steps", [1, 31])
 def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
-    """The message says how much is needed."""
+    """The message states the smallest budget."""
     with pytest.raises(
         StudyError, match=f"{steps} target steps is smaller than one evaluation.*32"
     ):
@@ -209,13 +208,13 @@ def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
 
 
 def test_one_seed_is_refused() -> None:
-    """One run says nothing about how sure it is."""
+    """A study needs two seeds."""
     with pytest.raises(StudyError, match="at least 2 seeds"):
         tiny_plan(seeds=1)
 
 
 def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
-    """Everything is measured against scratch."""
+    """Unknown arms, and studies without scratch, are refused."""
     with pytest.raises(UnknownName, match="'fine-tune'"):
         tiny_plan(arms=("scratch", "fine-tun"))
     with pytest.raises(StudyError, match="named once"):
@@ -225,7 +224,7 @@ def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
 
 
 def test_unknown_envs_are_refused() -> None:
-    """The message lists what there is."""
+    """The message lists the known envs."""
     with pytest.raises(UnknownName, match="shapechanger/BigAnt-v1"):
         tiny_plan(task=TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG))
 
@@ -233,7 +232,7 @@ def test_unknown_envs_are_refused() -> None:
 def test_a_folder_of_another_study_is_left_alone(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """The message says in what the two differ; nothing is overwritten."""
+    """The message names the differences; nothing is overwritten."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
@@ -242,7 +241,7 @@ def test_a_folder_of_another_study_is_left_alone(
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
-    """A folder with other files is nobody's study."""
+    """A folder with other files is refused."""
     (tmp_path / "thesis.tex").write_text("precious")
     with pytest.raises(ForeignStudy, match="holds other files"):
         run_study(tiny_plan(), tmp_path, executor=Serial())
@@ -252,7 +251,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 def test_a_policy_that_was_deleted_is_made_again(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """A source run without its policy is no finished run."""
+    """A run whose policy is missing is repeated."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     (out / "runs" / "source-1" / "policy.safetensors").unlink()
@@ -265,7 +264,7 @@ def test_a_policy_that_was_deleted_is_made_again(
 def test_a_result_that_is_not_the_runs_own_is_refused(
     finished: tuple[Study, Path], tmp_path: Path, how: str
 ) -> None:
-    """A run.json that was copied or cut counts for nothing, and the message says what to do."""
+    """The result of another run, or a truncated one, is refused with the remedy."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     path = out / "runs" / "scratch-0" / "run.json"
@@ -280,7 +279,7 @@ def test_a_result_that_is_not_the_runs_own_is_refused(
 
 
 def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """A study that was begun with another MuJoCo is not gone on with."""
+    """A study cannot be resumed with other versions of packages."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     plan = tiny_plan()
@@ -293,7 +292,7 @@ def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path
 def test_a_corrupt_file_is_named_and_nothing_is_lost(
     finished: tuple[Study, Path], tmp_path: Path, name: str
 ) -> None:
-    """A file that cannot be read stops the study before anything is written."""
+    """A corrupt file is refused before anything is written."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     (out / name).write_text('{"not": "it"')
@@ -304,7 +303,7 @@ def test_a_corrupt_file_is_named_and_nothing_is_lost(
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    """A file where a folder should be: one sentence, and the file stays."""
+    """A file in place of the folder is refused and kept."""
     (tmp_path / "file").write_text("here")
     with pytest.raises(OutputError, match="Cannot write to"):
         run_study(tiny_plan(), tmp_path / "file" / "study", executor=Serial())
@@ -314,7 +313,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 def test_a_disk_that_runs_full_loses_nothing(
     finished: tuple[Study, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Runs that had ended are kept, and the study goes on when there is room again."""
+    """Finished runs are kept, and the study can be resumed."""
     out = tmp_path / "study"
     replace = Path.replace
 
@@ -333,14 +332,14 @@ def test_a_disk_that_runs_full_loses_nothing(
 
 
 def test_a_study_of_an_env_without_layouts_is_refused() -> None:
-    """An env that publishes no layout cannot be mapped."""
+    """Envs without layouts are refused."""
     bare = EnvRef("CartPole-v1")
     with pytest.raises(Exception, match="publishes no observation_layout"):
         tiny_plan(task=TransferTask(bare, BIG))
 
 
 def test_settings_refuse_what_cannot_be(finished: tuple[Study, Path]) -> None:
-    """Evaluations cannot come more often than updates."""
+    """Evaluations cannot be more frequent than updates."""
     with pytest.raises(StudyError, match="more often than an update"):
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):
@@ -348,7 +347,7 @@ def test_settings_refuse_what_cannot_be(finished: tuple[Study, Path]) -> None:
 
 
 class Misnamed(gym.Env[Any, Any]):
-    """An env whose layout does not name the numbers of its space."""
+    """An env whose layout does not fit its space."""
 
     def __init__(self, as_dict: bool = False) -> None:
         box = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
@@ -363,7 +362,7 @@ class Misnamed(gym.Env[Any, Any]):
 def test_a_layout_that_does_not_fit_its_space_is_refused(
     order: int, kwargs: dict[str, Any]
 ) -> None:
-    """When the study is planned, and not after the source was trained."""
+    """It is refused when the study is planned."""
     gym.register("tests/Misnamed-v0", Misnamed)
     try:
         task = TransferTask(*(SMALL, EnvRef("tests/Misnamed-v0", kwargs))[::order])
@@ -374,7 +373,7 @@ def test_a_layout_that_does_not_fit_its_space_is_refused(
 
 
 def test_an_argument_that_an_env_of_others_refuses_is_named() -> None:
-    """Gymnasium raises a TypeError where a constructor refuses an argument."""
+    """A TypeError of a constructor becomes a StudyError."""
     with pytest.raises(StudyError, match=r"CartPole-v1 cannot be made with these opt.*'colour'"):
         EnvRef("CartPole-v1", {"colour": "red"}).make()
 
@@ -383,12 +382,12 @@ class Failing(Misnamed):
     """An env whose certificate fails in a rollout."""
 
     def certify_shift(self, source: Any, target: Any) -> str:
-        """Fail as an env does with an argument of another type."""
+        """Raise the TypeError of a wrong argument."""
         raise TypeError("can't multiply sequence by non-int")
 
 
 def test_an_env_that_fails_in_the_rollout_is_refused_in_a_sentence() -> None:
-    """Both envs are named, because either can fail."""
+    """The message names both envs, because either can fail."""
     with pytest.raises(
         StudyError, match=r"Failing.* or .*Misnamed.* fails in a short rollout \(can"
     ):
@@ -396,14 +395,14 @@ def test_an_env_that_fails_in_the_rollout_is_refused_in_a_sentence() -> None:
 
 
 def test_an_argument_that_does_not_exist_is_refused() -> None:
-    """By our envs themselves."""
+    """The envs of the package refuse unknown arguments."""
     task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
     with pytest.raises(UnknownName, match="No argument of InvertedPendulum matches 'colour'"):
         tiny_plan(task=task)
 
 
 def test_each_env_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planning and certifying read both envs together."""
+    """Planning and certifying share one instance of each env."""
     made: list[str] = []
     make = EnvRef.make
 

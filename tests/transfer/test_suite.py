@@ -1,4 +1,4 @@
-"""Studies beside one another: what they share, what they do not, and what they say together."""
+"""Studies of a suite: which runs they share, merging, and outcomes."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ import torch
 from numpy.typing import NDArray
 
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
-from shapechanger.transfer import suite
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.executor import Job, OnProgress, Serial
+from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
-from shapechanger.transfer.suite import StudyOutcome, run_in_suite, study_outcomes
+from shapechanger.transfer.suite import StudyOutcome, open_study_folder, study_outcome
 from tests.reports.studies import make_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import files_of
@@ -30,7 +29,7 @@ _KINDS = ("source", "random", "zero-action", "scratch", "zero-shot", "fine-tune"
 
 
 class _Stopped(Exception):
-    """Somebody has looked at the jobs, and none was done."""
+    """Raised by an executor that only records its jobs."""
 
 
 class _Told(Serial):
@@ -45,7 +44,7 @@ class _Told(Serial):
         self._refuses = refuses
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Do the jobs."""
+        """Record the jobs, and perform them unless `refuses`."""
         self.names += [job.name for job in jobs]
         if self._refuses:
             raise _Stopped
@@ -54,7 +53,7 @@ class _Told(Serial):
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Networks this small gain nothing from more."""
+    """Limit PyTorch to one thread."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
@@ -67,13 +66,18 @@ def _plan(source: EnvRef, target: EnvRef, **more: Any) -> Plan:
 
 
 def _study(plan: Plan) -> str:
-    """Name of a study of two lanes, such as Dry-to-Wet."""
+    """Return the name of a study of two lanes, such as Dry-to-Wet."""
     ends = (plan.task.source, plan.task.target)
     return "-to-".join(env.id.rpartition("/")[2].removesuffix("-v1") for env in ends)
 
 
+def _run(plan: Plan, out: Path, executor: Executor) -> Study:
+    """Run a study in the suite's folder."""
+    return run_study(plan, open_study_folder(plan, out, _study(plan)), executor=executor)
+
+
 def _names(*kinds: str) -> set[str]:
-    """Names of the runs of two seeds; the action zero needs one run."""
+    """Return the names of the runs of two seeds; zero-action has one run."""
     return {
         f"{kind}-{index}" for kind in kinds for index in range(1 if kind == "zero-action" else 2)
     }
@@ -87,10 +91,10 @@ def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a suite in which Dry-to-Wet is done; tests work on copies."""
+    """The folder of a suite with a finished Dry-to-Wet; tests use copies."""
     out = tmp_path_factory.mktemp("suite") / "suite"
     told = _Told()
-    run_in_suite(_plan(DRY, WET), out, _study(_plan(DRY, WET)), executor=told)
+    _run(_plan(DRY, WET), out, executor=told)
     assert set(told.names) == _names(*_KINDS)
     return out
 
@@ -102,15 +106,15 @@ def out(first: Path, tmp_path: Path) -> Path:
 
 
 def _asked_for(plan: Plan, out: Path) -> set[str]:
-    """The runs that a study beside the others would do; it does none."""
+    """Return the runs that a study would perform, without performing them."""
     told = _Told(refuses=True)
     with pytest.raises(_Stopped):
-        run_in_suite(plan, out, _study(plan), executor=told)
+        _run(plan, out, executor=told)
     return set(told.names)
 
 
 def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
-    """Another target, the same source: its policies and demonstrations are taken over."""
+    """Studies of one source share its policies and demonstrations."""
     plan = _plan(DRY, ICY)
     assert _asked_for(plan, out) == _names(
         "random", "zero-action", "scratch", "zero-shot", "fine-tune"
@@ -128,9 +132,9 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
 
 
 def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
-    """Another source, the same target; and the study says what it says when it is alone."""
+    """Studies of one target share its runs, with the numbers of a study alone."""
     plan, told = _plan(ICY, WET), _Told()
-    beside = run_in_suite(plan, out, _study(plan), executor=told)
+    beside = _run(plan, out, executor=told)
     assert set(told.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "zero-action", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
@@ -141,18 +145,18 @@ def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
 
 
 def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
-    """Neither the source nor the target is the same."""
+    """Studies with another source and target share nothing."""
     assert _asked_for(_plan(WET, DRY), out) == _names(*_KINDS)
 
 
 @pytest.mark.parametrize("differs", [{"seed": 1}, {"steps": 20}, {"source_steps": 40}])
 def test_a_study_with_another_plan_lends_nothing(out: Path, differs: dict[str, int]) -> None:
-    """Other seeds or budgets are other trainings."""
+    """Studies with other seeds or budgets share nothing."""
     assert _asked_for(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
 
 
 def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
-    """In its own folder and beside it; what was done with fewer seeds is done."""
+    """With more seeds, finished runs are reused."""
     assert _asked_for(_plan(DRY, WET, seeds=3), out) == {
         f"{kind}-2" for kind in _KINDS if kind != "zero-action"
     }
@@ -163,20 +167,20 @@ def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
 
 
 def test_other_versions_lend_nothing(out: Path) -> None:
-    """What another release has trained is not mixed in."""
+    """Studies of other versions share nothing."""
     plan = _plan(DRY, ICY)
     other = msgspec.structs.replace(plan, versions={**plan.versions, "torch": "0.1"})
     assert _asked_for(other, out) == _names(*_KINDS)
 
 
 def test_a_run_that_was_cut_off_is_not_lent(out: Path) -> None:
-    """Of two seeds one has ended; the other is done anew."""
+    """Incomplete runs are not shared."""
     (out / "Dry-to-Wet" / "runs" / "source-1" / "run.json").unlink()
     assert _asked_for(_plan(DRY, ICY), out) & _names("source") == {"source-1"}
 
 
 def test_what_is_there_already_stays(out: Path) -> None:
-    """A second look takes nothing over again, and a finished suite does nothing."""
+    """Runs are not copied twice, and a finished suite does nothing."""
     plan = _plan(DRY, ICY)
     _asked_for(plan, out)
     taken_over = out / "Dry-to-Icy" / "runs" / "source-0" / "run.json"
@@ -184,14 +188,14 @@ def test_what_is_there_already_stays(out: Path) -> None:
     _asked_for(plan, out)
     assert taken_over.stat().st_ino == before
     told = _Told()
-    run_in_suite(_plan(DRY, WET), out, _study(_plan(DRY, WET)), executor=told)
+    _run(_plan(DRY, WET), out, executor=told)
     assert told.names == []
 
 
 def test_a_copy_that_was_cut_off_counts_for_nothing(
     out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run appears whole: what is left of a copy is no run, and is cleared away."""
+    """Runs are copied atomically; parts of a copy are removed."""
 
     def full(theirs: Path, mine: Path) -> None:
         mine.mkdir(parents=True)
@@ -201,9 +205,9 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
 
     plan, runs = _plan(DRY, ICY), out / "Dry-to-Icy" / "runs"
     with monkeypatch.context() as patch:
-        patch.setattr(suite.shutil, "copytree", full)
+        patch.setattr(shutil, "copytree", full)
         with pytest.raises(OutputError, match="source-0: No space left"):
-            run_in_suite(plan, out, _study(plan), executor=_Told(refuses=True))
+            _run(plan, out, executor=_Told(refuses=True))
     assert not (runs / "source-0").exists()
     _asked_for(plan, out)
     assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
@@ -211,19 +215,17 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
 
 
 def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
-    """It may hold what is wanted here, so somebody should look at it."""
+    """A corrupt study of the suite is named with the remedy."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
     with pytest.raises(CorruptStudy, match=r"to-Wet/plan\.json .*delete .*to-Wet to repeat"):
-        run_in_suite(_plan(DRY, ICY), out, _study(_plan(DRY, ICY)), executor=_Told(refuses=True))
+        _run(_plan(DRY, ICY), out, executor=_Told(refuses=True))
 
 
 def test_a_folder_of_another_study_is_left_alone(out: Path) -> None:
-    """The same pair with another seed is another study."""
+    """A folder of a study with another seed is refused."""
     before = files_of(out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
-        run_in_suite(
-            _plan(DRY, WET, seed=1), out, _study(_plan(DRY, WET, seed=1)), executor=Serial()
-        )
+        _run(_plan(DRY, WET, seed=1), out, executor=Serial())
     assert files_of(out) == before
 
 
@@ -231,21 +233,19 @@ _STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluatio
 
 
 def _twice(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Curves of two seeds around these means, shape (2, 11)."""
+    """Return curves of two seeds around these means, shape (2, 11)."""
     return means + np.array([[-30.0], [30.0]])
 
 
 def _crossing(
     fine_tune: NDArray[np.float64], scratch: NDArray[np.float64] = _STEADY, **more: Any
 ) -> StudyOutcome:
-    (found,) = study_outcomes(
-        {"Ant-to-BigAnt": make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)}
-    )
-    return found
+    study = make_study(scratch=_twice(scratch), fine_tune=_twice(fine_tune), **more)
+    return study_outcome("Ant-to-BigAnt", study)
 
 
 def test_a_crossing_is_found_along_a_line() -> None:
-    """Half-way between two evaluations, of the mean over seeds."""
+    """Crossings are interpolated between evaluations of the mean."""
     found = _crossing(np.array([0.0, 500.0, 1500.0, *[900.0] * 8]))
     assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]
     assert found.gains["jumpstart"].value is not None
@@ -261,7 +261,7 @@ def test_a_crossing_is_found_along_a_line() -> None:
 
 
 def test_scratch_may_come_to_its_end_before_it() -> None:
-    """What counts is when it is first as good, for both arms alike."""
+    """The first crossing counts, for both arms."""
     early = np.array([0.0, 2000.0, *[1000.0] * 9])
     found = _crossing(_STEADY, early)
     assert found.scratch_steps == pytest.approx(512.0)
@@ -270,31 +270,28 @@ def test_scratch_may_come_to_its_end_before_it() -> None:
 
 
 def test_a_policy_that_is_as_good_at_once_needs_no_step() -> None:
-    """Nothing has to be shown to it."""
+    """A policy that starts above the level needs 0 steps."""
     found = _crossing(np.full(11, 1200.0))
     assert found.fine_tune_steps == 0.0
     assert found.halves
 
 
 def test_never_is_not_half() -> None:
-    """Fine-tuning that ends below scratch has no steps to compare."""
+    """Fine-tuning that never reaches the level has no steps."""
     found = _crossing(np.full(11, 400.0))
     assert found.fine_tune_steps is None
     assert not found.halves
 
 
 def test_half_is_less_than_half() -> None:
-    """Exactly half of scratch's steps are not less."""
+    """Exactly half of scratch's steps do not count as half."""
     at_half = np.array([*[0.0] * 5, *[1000.0] * 6])
     assert _crossing(at_half).fine_tune_steps == pytest.approx(5120.0)
     assert not StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2560.0).halves
     assert StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2559.9).halves
 
 
-def test_zero_shot_may_be_left_out_and_order_is_kept() -> None:
-    """One line for each study, in their order."""
-    without = make_study(arms=("scratch", "fine-tune"))
-    found = study_outcomes({"first": without, "second": make_study()})
-    assert [crossing.name for crossing in found] == ["first", "second"]
-    assert found[0].zero_shot is None
-    assert found[1].zero_shot is not None
+def test_zero_shot_may_be_left_out() -> None:
+    """Without that arm its value is None."""
+    assert study_outcome("first", make_study(arms=("scratch", "fine-tune"))).zero_shot is None
+    assert study_outcome("second", make_study()).zero_shot is not None

@@ -1,4 +1,4 @@
-"""Policies in the shapes of another body: what they compute there is what they computed before."""
+"""Transplanted policies compute what the source policy computes through the map."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Numbers = dict[str, NDArray[np.float64]]
 
 
 class Box(gym.Env[np.ndarray, np.ndarray]):
-    """An env of these layouts, in which nothing happens that anybody would understand."""
+    """An env with given layouts and random observations."""
 
     def __init__(self, observation: Layout, action: Layout) -> None:
         n = observation.size
@@ -49,25 +49,25 @@ class Box(gym.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start somewhere."""
+        """Start an episode."""
         super().reset(seed=seed)
         return self.np_random.normal(size=self.observation_space.shape), {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Go anywhere; now and then an episode ends."""
+        """Return a random observation; some steps end the episode."""
         end = bool(self.np_random.uniform() < 0.1)
         observation = self.np_random.normal(size=self.observation_space.shape)
         return observation, float(action.sum()), end, False, {}
 
 
 def envs(observation: Layout, action: Layout, *, normalised: bool = False) -> Any:
-    """One env, with fresh statistics if normalised."""
+    """Return a vectorised env, with new statistics if normalised."""
     one = DummyVecEnv([lambda: Box(observation, action)])
     return VecNormalize(one) if normalised else one
 
 
 def ant_map(source_feet: bool, target_feet: bool, **options: Any) -> BodyMap:
-    """The map between two ants."""
+    """Return the map between two ants."""
     return BodyMap.between(
         ant_observation(feet=source_feet),
         ant_observation(feet=target_feet),
@@ -78,7 +78,7 @@ def ant_map(source_feet: bool, target_feet: bool, **options: Any) -> BodyMap:
 
 
 def mirrored() -> BodyMap:
-    """The ant whose left is right."""
+    """Return the map from an ant to its mirror image."""
     symmetry = mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
     return BodyMap.identity(ant_observation(), ant_action()).with_symmetry(symmetry)
 
@@ -117,7 +117,7 @@ def trained(
     policy: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Model:
-    """A model of the source with weights and statistics that no untrained model has."""
+    """Return a model of the source with random weights and statistics."""
     env = env or envs(body_map.source_observation, body_map.source_action, normalised=normalised)
     kwargs = {"net_arch": net_arch[kind is SAC], **(policy or {})}
     quick = {"n_steps": 32, "batch_size": 16} if kind is PPO else {"buffer_size": 64}
@@ -136,7 +136,7 @@ def trained(
 
 
 def sensed(model: Model, observation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the network sees of an observation, in double precision."""
+    """Return the network's inputs for an observation, in double precision."""
     normalize = model.get_vec_normalize_env()
     if normalize is None or not normalize.norm_obs:
         return observation
@@ -147,7 +147,7 @@ def sensed(model: Model, observation: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def computed(model: Model, z: NDArray[np.float64], u: NDArray[np.float64] | None = None) -> Numbers:
-    """All that the networks give, in the precision of their weights."""
+    """Return all outputs of the networks, in the precision of their weights."""
     dtype = next(model.policy.parameters()).dtype
     inputs = torch.as_tensor(z, dtype=dtype)
     with torch.no_grad():
@@ -169,7 +169,7 @@ def computed(model: Model, z: NDArray[np.float64], u: NDArray[np.float64] | None
 def expected(
     source: Model, body_map: BodyMap, observation: NDArray[np.float64], u: NDArray[np.float64]
 ) -> tuple[Numbers, NDArray[np.float64]]:
-    """What the source gives through the map, and which actions take something.
+    """Return the source's outputs through the map, and which actions copy something.
 
     Args:
         source: The trained model.
@@ -190,7 +190,7 @@ def expected(
 
 
 def back_to_source(body_map: BodyMap, u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Source actions from target actions: by namesakes, and by others where there are none."""
+    """Return source actions for target actions, by copies of the same name if any."""
     column = {name: place.start for name, place in body_map.target_action.slices.items()}
     signed: dict[str, NDArray[np.float64]] = {}
     for entry in body_map.action:
@@ -203,7 +203,7 @@ def back_to_source(body_map: BodyMap, u: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def check_same_function(source: Model, target: Model, body_map: BodyMap, atol: float) -> None:
-    """Compare what both models compute, wherever an action takes something."""
+    """Check that both models compute the same, for all actions that are copied."""
     rng = np.random.default_rng(5)
     normalize = target.get_vec_normalize_env()
     observation = rng.normal(size=(32, body_map.target_observation.size))
@@ -227,7 +227,7 @@ def check_same_function(source: Model, target: Model, body_map: BodyMap, atol: f
 def test_the_transplanted_networks_compute_the_same(
     kind: type[Model], body_map: BodyMap, net_arch: Any, normalised: bool
 ) -> None:
-    """Actor, value and critics agree with the source's, in double precision to rounding."""
+    """Actor, value and critics agree in double precision, up to rounding."""
     source = trained(kind, body_map, net_arch, normalised=normalised)
     source.policy.double()
     env = envs(body_map.target_observation, body_map.target_action, normalised=normalised)
@@ -242,7 +242,7 @@ def test_the_transplanted_networks_compute_the_same(
 def test_the_transplanted_policy_does_the_same(
     kind: type[Model], body_map: BodyMap, normalised: bool
 ) -> None:
-    """The deterministic action, through everything that Stable-Baselines3 does, is the source's."""
+    """`predict` returns the source's deterministic action."""
     source = trained(kind, body_map, normalised=normalised)
     env = envs(body_map.target_observation, body_map.target_action, normalised=normalised)
     target = transplant(source, body_map, env, seed=1)
@@ -258,7 +258,7 @@ def test_the_transplanted_policy_does_the_same(
 
 @each_class
 def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
-    """A policy that stays in its body keeps its parameters, optimisers apart."""
+    """The identity map keeps all parameters bitwise."""
     source = trained(kind, MAPS["identity"], normalised=True)
     env = envs(ant_observation(), ant_action(), normalised=True)
     target = transplant(source, MAPS["identity"], env)
@@ -270,7 +270,7 @@ def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
 
 @each_class
 def test_there_and_back_changes_no_bit(kind: type[Model]) -> None:
-    """The ant visits the ant with feet and comes home as it went."""
+    """To an ant with feet and back keeps all parameters bitwise."""
     there = MAPS["growth"]
     source = trained(kind, there, normalised=True)
     away = transplant(
@@ -282,7 +282,7 @@ def test_there_and_back_changes_no_bit(kind: type[Model]) -> None:
 
 
 def test_each_weight_goes_to_its_name() -> None:
-    """A linear policy, worked out by hand: a column in the wrong place shows."""
+    """A linear policy, by hand: each column moves to the feature of its name."""
     observation = Layout(tuple(Feature(name, "1") for name in ("a", "b", "c")))
     seen = Layout(tuple(Feature(name, "1") for name in ("c", "new", "a", "b")))
     body_map = BodyMap.between(
@@ -306,7 +306,7 @@ def test_each_weight_goes_to_its_name() -> None:
 
 @each_class
 def test_new_inputs_are_open_to_training(kind: type[Model]) -> None:
-    """Their weights begin at 0, and their gradients do not."""
+    """New inputs have weights of 0 and non-zero gradients."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map)
     target = transplant(source, body_map, envs(body_map.target_observation, body_map.target_action))
@@ -328,7 +328,7 @@ def test_new_inputs_are_open_to_training(kind: type[Model]) -> None:
 @pytest.mark.parametrize("net_arch", [([16], [16]), ([], [])], ids=["[16]", "[]"])
 @each_class
 def test_what_is_to_be_learned_is_fresh(kind: type[Model], net_arch: Any) -> None:
-    """It has the weights of an untrained policy of that seed, and another seed has others."""
+    """Learned actions have the weights of an untrained policy of the seed."""
     body_map = ant_map(False, True, rules={"foot_*": "learn"})
     source = trained(kind, body_map, net_arch, policy={"log_std_init": -1.5})
 
@@ -349,7 +349,7 @@ def test_what_is_to_be_learned_is_fresh(kind: type[Model], net_arch: Any) -> Non
 
 
 def test_constant_actions_are_explored() -> None:
-    """A motor that is held has a mean of that value and the mean spread of the others."""
+    """A held action has its constant as mean and the mean spread of the others."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     places = body_map.target_action.slices
@@ -372,7 +372,7 @@ def test_constant_actions_are_explored() -> None:
 
 
 def test_a_constant_at_the_bound_is_finite() -> None:
-    """No number has the hyperbolic tangent 1."""
+    """A constant at the bound of SAC gives finite weights."""
     body_map = ant_map(False, True, rules={"foot_*": Hold(1.0)})
     env = envs(body_map.target_observation, body_map.target_action)
     target = transplant(trained(SAC, body_map), body_map, env)
@@ -381,7 +381,7 @@ def test_a_constant_at_the_bound_is_finite() -> None:
 
 
 def test_ppo_scales_its_actions_and_their_spread() -> None:
-    """A motor twice as strong is driven half as hard, and explored half as widely."""
+    """A scale of PPO's action scales mean and standard deviation."""
     body_map = BodyMap.between(
         pendulum_observation(),
         pendulum_observation(),
@@ -399,7 +399,7 @@ def test_ppo_scales_its_actions_and_their_spread() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(-0.5, 0.5), (-1.0, 3.0)])
 def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
-    """The hyperbolic tangent stands between the weights and the motor."""
+    """Scales and shifts are refused for SAC, because of tanh."""
     wide = Layout((Feature("slide/motor", "1", low, high, gain=100.0, gain_unit="N"),))
     sensing = pendulum_observation(), pendulum_observation()
     body_map = BodyMap.between(*sensing, pendulum_action(), wide)
@@ -408,7 +408,7 @@ def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
 
 
 def test_sac_follows_the_range() -> None:
-    """A motor of half the range that is driven half as hard is the same number to the network."""
+    """A scale equal to that of the ranges keeps SAC's weights."""
     narrow = Layout((Feature("slide/motor", "1", -0.5, 0.5, gain=200.0, gain_unit="N"),))
     sensing = pendulum_observation(), pendulum_observation()
     body_map = BodyMap.between(*sensing, pendulum_action(), narrow, units="torque")
@@ -420,7 +420,7 @@ def test_sac_follows_the_range() -> None:
 
 
 def test_critics_judge_copies_by_the_namesake_or_the_mean() -> None:
-    """On what the policy does, both are exact; a new motor and a lost one count for nothing."""
+    """Critics are exact for the policy's actions; new and lost motors have no weight."""
     sensing = pendulum_observation(), pendulum_observation()
     cart = Layout((motor("a"), motor("b"), motor("lost")))
     copies = Layout((motor("c"), motor("d"), motor("e"), motor("b"), motor("new")))
@@ -445,7 +445,7 @@ def test_critics_judge_copies_by_the_namesake_or_the_mean() -> None:
 
 
 def test_a_lost_motor_is_judged_as_standing_still() -> None:
-    """Where 0 is not the middle of the range, the critic must be told so."""
+    """Critics see a lost motor at the action 0, also off the middle of the range."""
     sensing = pendulum_observation(), pendulum_observation()
     pump = Layout((motor("a"), Feature("pump/motor", "1", 0.0, 1.0)))
     body_map = BodyMap.between(*sensing, pump, Layout((motor("a"),)))
@@ -459,7 +459,7 @@ def test_a_lost_motor_is_judged_as_standing_still() -> None:
 
 
 def test_statistics_go_with_their_names() -> None:
-    """Matched numbers keep mean and variance, through the scale; new ones get a guess."""
+    """Copied numbers keep mean and variance, scaled; new ones get a guess."""
     body_map = BodyMap.between(
         Layout((Feature("copy", "m"), Feature("z", "m"), Feature("angle", "rad"))),
         Layout(
@@ -486,7 +486,7 @@ def test_statistics_go_with_their_names() -> None:
 
 
 def test_a_constant_is_clipped_like_any_number() -> None:
-    """A foot that the target lacks, always at 0, may be far from where it was in training."""
+    """A constant number is clipped after its normalisation."""
     body_map = MAPS["shrink"]
     source = trained(PPO, body_map, normalised=True)
     normalize = source.get_vec_normalize_env()
@@ -499,7 +499,7 @@ def test_a_constant_is_clipped_like_any_number() -> None:
 
 @each_class
 def test_statistics_of_the_target_env_are_replaced(kind: type[Model]) -> None:
-    """Also how it clips, and what returns were divided by; the source's stay its own."""
+    """Clipping and return statistics move too; the source's are not changed."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map, normalised=True)
     theirs = source.get_vec_normalize_env()
@@ -515,7 +515,7 @@ def test_statistics_of_the_target_env_are_replaced(kind: type[Model]) -> None:
 
 @each_class
 def test_statistics_can_be_folded_into_the_weights(kind: type[Model]) -> None:
-    """A target that is not normalised, such as a robot, gets the same policy all the same."""
+    """Without normalisation of the target, the statistics go into the first layer."""
     body_map = MAPS["mirror"]
     source = trained(kind, body_map, normalised=True)
     theirs = source.get_vec_normalize_env()
@@ -527,7 +527,7 @@ def test_statistics_can_be_folded_into_the_weights(kind: type[Model]) -> None:
 
 
 def test_statistics_can_be_named_for_a_model_without_an_env(tmp_path: Any) -> None:
-    """A model that was loaded from a file does not know how its observations were normalised."""
+    """The normalisation can be given for a model without its env."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map, normalised=True)
     source.save(tmp_path / "model")
@@ -548,7 +548,7 @@ def test_statistics_can_be_named_for_a_model_without_an_env(tmp_path: Any) -> No
 
 
 def test_only_the_target_normalises() -> None:
-    """Statistics that go on changing would undo the policy; frozen ones are taken into account."""
+    """Changing statistics of the target alone are refused; frozen ones are used."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map)
     env = envs(body_map.target_observation, body_map.target_action, normalised=True)
@@ -563,7 +563,7 @@ def test_only_the_target_normalises() -> None:
 
 
 def test_rewards_alone_may_be_normalised() -> None:
-    """Then observations are left alone on both sides, and return statistics are moved."""
+    """Return statistics move also where observations are not normalised."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map, normalised=True)
     theirs = source.get_vec_normalize_env()
@@ -577,7 +577,7 @@ def test_rewards_alone_may_be_normalised() -> None:
 
 
 def test_settings_are_kept_or_changed() -> None:
-    """The new model learns as the old one did, unless it is told otherwise."""
+    """The new model has the source's settings except those given."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     ppo = trained(PPO, body_map, gamma=0.9, clip_range=0.3, target_kl=0.5, learning_rate=1e-4)
@@ -600,7 +600,7 @@ def test_settings_are_kept_or_changed() -> None:
 
 
 def test_the_entropy_coefficient_is_moved() -> None:
-    """Whether it was learned or set."""
+    """The coefficient moves whether it is learned or constant."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     source = trained(SAC, body_map, ent_coef="auto_0.1")
@@ -616,7 +616,7 @@ def test_the_entropy_coefficient_is_moved() -> None:
 
 
 def test_action_noise_is_not_guessed() -> None:
-    """It is made for the number of motors."""
+    """A source with action noise needs an explicit noise."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     noise = NormalActionNoise(np.zeros(8), np.ones(8))
@@ -628,7 +628,7 @@ def test_action_noise_is_not_guessed() -> None:
 
 @each_class
 def test_a_transplanted_model_goes_on_learning(kind: type[Model]) -> None:
-    """In its new env, from its first step, and the source model is left as it was."""
+    """It trains from step 0, and the source model is unchanged."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map, normalised=True)
     before = {name: values.clone() for name, values in source.policy.state_dict().items()}
@@ -645,14 +645,14 @@ def test_a_transplanted_model_goes_on_learning(kind: type[Model]) -> None:
 
 
 def test_a_plain_env_will_do() -> None:
-    """Stable-Baselines3 wraps it by itself."""
+    """An env that is not vectorised is accepted."""
     body_map = MAPS["growth"]
     env = Box(body_map.target_observation, body_map.target_action)
     assert transplant(trained(PPO, body_map), body_map, env, device="cpu").n_envs == 1
 
 
 def test_activations_with_parameters_are_copied() -> None:
-    """Everything between the edges belongs to the skill and not to the body."""
+    """Parameters between first and last layer are copied."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map, policy={"activation_fn": nn.PReLU})
     source.policy.double()
@@ -661,7 +661,7 @@ def test_activations_with_parameters_are_copied() -> None:
 
 
 def test_feature_extractors_need_not_be_shared() -> None:
-    """Flattening has no weights, shared or not."""
+    """Separate flattening extractors are accepted."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     for kind, share in ((PPO, False), (SAC, True)):
@@ -670,7 +670,7 @@ def test_feature_extractors_need_not_be_shared() -> None:
 
 
 class Extra(nn.Module):
-    """A layer that depends on the body where none should."""
+    """A policy with another layer that depends on the body."""
 
     def __init__(self, n: int) -> None:
         super().__init__()
@@ -715,7 +715,7 @@ def _discrete(body_map: BodyMap) -> Any:
     ],
 )
 def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str) -> None:
-    """The message says what there is and what would do."""
+    """The message names the policy and what is supported."""
     body_map = MAPS["identity"]
     with pytest.raises(TransplantError, match=message) as caught:
         transplant(make(body_map), body_map, envs(ant_observation(), ant_action()))
@@ -723,7 +723,7 @@ def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str
 
 
 def test_unknown_parameters_are_refused() -> None:
-    """A policy with a part of its own is not moved half."""
+    """Other parameters that depend on the body are refused."""
     body_map = MAPS["identity"]
     source = trained(PPO, body_map)
     source.policy.extra = Extra(3)
@@ -733,7 +733,7 @@ def test_unknown_parameters_are_refused() -> None:
 
 @pytest.mark.parametrize("wrong", ["source", "target"])
 def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
-    """A map for other bodies is found before anything is built."""
+    """A map for other bodies is refused."""
     there, stay = MAPS["growth"], MAPS["identity"]
     source = trained(PPO, stay)
     with pytest.raises(SpaceMismatch, match=f"layout of the {wrong} observation has 59"):
@@ -745,7 +745,7 @@ def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
 
 
 def test_without_torch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The message holds the command that installs it."""
+    """The message has the command that installs the extra."""
     spec = importlib.util.find_spec("shapechanger.transfer.transplant")
     assert spec is not None
     assert spec.loader is not None

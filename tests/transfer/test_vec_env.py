@@ -1,4 +1,4 @@
-"""The envs of a learner: Stable-Baselines3's `DummyVecEnv` to the last bit, and faster."""
+"""`ThreadVecEnv` against Stable-Baselines3's `DummyVecEnv`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.sb3 import ThreadVecEnv, training_vec_env
+from shapechanger.transfer.learners.vec_env import ThreadVecEnv, training_vec_env
 from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 
@@ -26,7 +26,7 @@ def _pair(env_id: str, threads: int, **more: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("env_id", [_PENDULUM, "shapechanger/Ant-v1", "shapechanger/Hopper-v1"])
 def test_the_numbers_are_those_of_sb3(env_id: str, threads: int) -> None:
-    """Observations, rewards, ends and infos, with ends of both kinds, under the monitor too."""
+    """Observations, rewards, ends and infos are equal, also in VecMonitor."""
     ours, theirs = (VecMonitor(one) for one in _pair(env_id, threads, max_episode_steps=60))
     for one in (ours, theirs):
         one.seed(5)
@@ -50,7 +50,7 @@ def test_the_numbers_are_those_of_sb3(env_id: str, threads: int) -> None:
 
 
 def test_options_are_each_envs_own() -> None:
-    """And are used once."""
+    """Options are per env and used once."""
     ours, theirs = _pair("shapechanger/Ant-v1", 2)
     for one in (ours, theirs):
         one.seed(1)
@@ -63,7 +63,7 @@ def test_options_are_each_envs_own() -> None:
 
 
 def test_envs_are_reached_one_by_one() -> None:
-    """As through SB3's."""
+    """Attributes and methods of single envs can be reached."""
     ours, theirs = _pair(_PENDULUM, 1)
     for one in (ours, theirs):
         one.set_attr("mood", "good", indices=[0, 2])
@@ -78,7 +78,7 @@ def test_envs_are_reached_one_by_one() -> None:
 
 @pytest.mark.gl
 def test_pictures_are_tiled() -> None:
-    """As SB3 shows them."""
+    """`render` tiles the pictures of all envs."""
     if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
         missing("Neither EGL nor OSMesa nor a display works here")
     envs = ThreadVecEnv(_PENDULUM, 4, render_mode="rgb_array", width=32, height=32)
@@ -90,10 +90,10 @@ def test_pictures_are_tiled() -> None:
 
 
 def test_envs_of_strangers_are_stepped_by_sb3() -> None:
-    """They may share what they change."""
+    """Envs of other packages are stepped by DummyVecEnv."""
     for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
         envs = training_vec_env(EnvRef(env_id), 2, 1)
-        assert isinstance(envs, kind)
+        assert type(envs) is kind
         envs.close()
     envs = training_vec_env(EnvRef(f"shapechanger:{_PENDULUM}", {"max_episode_steps": 3}), 2, None)
     assert isinstance(envs, ThreadVecEnv)

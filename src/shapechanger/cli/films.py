@@ -17,7 +17,7 @@ from shapechanger.transfer.env_ref import EnvRef, measures_of
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.plan import SOURCE, Run
-from shapechanger.transfer.runs import learner_of, policy_path
+from shapechanger.transfer.runs import learner_of
 
 if TYPE_CHECKING:
     from shapechanger.transfer.study import Study
@@ -85,7 +85,7 @@ def _scenes(study: Study, folder: Path) -> list[_Scene]:
     scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
-        return learner.load(policy_path(folder, run)).act
+        return learner.load(run.policy_file(folder)).act
 
     has_source = bool(study.of(SOURCE))
     if has_source:

@@ -90,11 +90,12 @@ class Play:
 
             policy = OnnxPolicy(file)
         else:
-            from shapechanger.transfer.learners.cloning import is_clone, load_clone
+            from shapechanger.demos.cloning.policy import CameraPolicy
+            from shapechanger.transfer.learners.cloning import is_clone
             from shapechanger.transfer.learners.policy_file import load_policy
 
             if is_clone(file):
-                clone = load_clone(file)
+                clone = CameraPolicy.load(file)
                 if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
                     clone.card.require_layouts(layout, clone.card.state_layout)
                 return env, clone.predict_many

@@ -32,11 +32,12 @@ class Show:
 
     def run(self) -> None:
         """Print the card."""
-        from shapechanger.transfer.learners.cloning import is_clone, load_clone
+        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
         if is_clone(self.file):
-            self._print(*_clone_lines(load_clone(self.file).card))
+            self._print(*_clone_lines(CameraPolicy.load(self.file).card))
             return
         policy = load_policy(self.file)
         card = policy.card
@@ -90,7 +91,8 @@ class ListPolicies:
 
     def run(self) -> None:
         """Print a line for each policy; a file that is none gets its reason."""
-        from shapechanger.transfer.learners.cloning import is_clone, load_clone
+        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
         if self.references:
@@ -102,7 +104,7 @@ class ListPolicies:
             name = str(path.relative_to(self.folder))
             try:
                 if is_clone(path):
-                    lines, _ = _clone_lines(load_clone(path).card)
+                    lines, _ = _clone_lines(CameraPolicy.load(path).card)
                     table.add_row(
                         name, *(lines[each] for each in ("env", "learner", "steps", "seed"))
                     )

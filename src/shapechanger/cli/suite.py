@@ -226,8 +226,8 @@ class RunSuite:
 
     def run(self) -> None:
         """Run the studies, write their reports, and print the joint table."""
-        from shapechanger.transfer.study import inspect_task, unfinished_runs
-        from shapechanger.transfer.suite import open_study_folder, run_in_suite
+        from shapechanger.transfer.study import inspect_task, run_study, unfinished_runs
+        from shapechanger.transfer.suite import open_study_folder
 
         suite = load_suite(self.name)
         require_seed(suite.seed if self.seed is None else self.seed)
@@ -248,10 +248,9 @@ class RunSuite:
             try:
                 folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
-                    study = run_in_suite(
+                    study = run_study(
                         plan,
-                        out,
-                        name,
+                        folder,
                         executor=executor,
                         on_progress=progress,
                         command=command,
@@ -494,11 +493,10 @@ class _Page:
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
-        from shapechanger.transfer.suite import study_outcomes
+        from shapechanger.transfer.suite import study_outcome
 
-        return study_outcomes(
-            {one: self._studies[one] for one in self._tasks if one in self._studies}
-        )
+        studies = self._studies
+        return [study_outcome(one, studies[one]) for one in self._tasks if one in studies]
 
 
 def _table(found: list[StudyOutcome]) -> Table:

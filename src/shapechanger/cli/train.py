@@ -59,9 +59,10 @@ class Train:
         from shapechanger.transfer.env_ref import env_traits
         from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.policy_file import save_policy
-        from shapechanger.transfer.learners.sb3 import require_budget, train, use_one_thread
+        from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
         from shapechanger.transfer.learners.settings import (
             Sb3Settings,
+            require_budget,
             resolve_learner,
             tuning_text,
         )
@@ -101,19 +102,17 @@ class Train:
         try:
             with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
                 if not isinstance(settings, Sb3Settings):
-                    _learn_to_drive(env, settings, steps, self.seed, out, show, progress)
+                    _learn_to_drive(env, learner, settings, steps, self.seed, out, show, progress)
                     console.print(f"wrote {out}")
                     return
-                policy = train(
+                policy = Sb3Learner(
+                    learner, settings, tensorboard=self.tensorboard, threads=None
+                ).train(
                     env,
-                    learner,
-                    settings,
                     steps,
                     self.seed,
                     on_evaluation=show,
                     on_steps=lambda done: progress(env.id, done, False),
-                    tensorboard=self.tensorboard,
-                    threads=None,
                 )
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
@@ -151,6 +150,7 @@ class Train:
 
 def _learn_to_drive(
     env: EnvRef,
+    learner: str,
     settings: CloningSettings,
     steps: int,
     seed: int,
@@ -159,11 +159,11 @@ def _learn_to_drive(
     progress: StudyProgress,
 ) -> None:
     """Clone the demonstrator of an env, and write the policy and its demonstrations."""
-    from shapechanger.transfer.learners.cloning import DemonstrationFile, train_clones
+    from shapechanger.transfer.learners import DemonstrationFile
+    from shapechanger.transfer.learners.cloning import CloneLearner
 
-    policy = train_clones(
+    policy = CloneLearner(learner, settings).train(
         env,
-        settings,
         settings.whole_updates(steps),
         seed,
         demonstrations=DemonstrationFile(

@@ -82,7 +82,7 @@ class HasDemonstrator(Protocol):
 
 @runtime_checkable
 class CanBeTaught(Protocol):
-    """An env whose task a policy of another env can demonstrate, which sees more than pictures.
+    """An env whose demonstrations can come from a policy of another env with richer observations.
 
     Attributes:
         teacher_env: Id of that env.
@@ -91,7 +91,7 @@ class CanBeTaught(Protocol):
     teacher_env: str
 
     def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> TaskDemonstrator:
-        """Return a teacher as a demonstrator of this env.
+        """Return a demonstrator of this env that acts as a teacher does.
 
         Args:
             act: The teacher: maps observations of the teacher's env, (n, k), to actions, (n, m).
@@ -186,6 +186,13 @@ class EnvTraits:
     family: str
     measures: tuple[Measure, ...]
 
+    def same_layouts(self, other: EnvTraits) -> bool:
+        """Return whether observations and actions mean the same in another env."""
+        return (self.observation_layout, self.action_layout) == (
+            other.observation_layout,
+            other.action_layout,
+        )
+
 
 def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
     """Read the traits of an env.
@@ -221,12 +228,15 @@ def measures_of(env: gym.Env[Any, Any]) -> tuple[Measure, ...]:
 
 
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """Return the observation and the action layout of an env.
+    """Return the observation and the action layout of an env, or of its outermost wrapper with one.
 
     Raises:
         LayoutError: If it publishes none.
     """
-    found = [getattr(env.unwrapped, f"{side}_layout", None) for side in ("observation", "action")]
+    found = [
+        env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
+        for name in ("observation_layout", "action_layout")
+    ]
     if not all(isinstance(layout, Layout) for layout in found):
         name = env.spec.id if env.spec else type(env.unwrapped).__name__
         raise LayoutError(

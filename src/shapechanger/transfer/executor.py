@@ -55,24 +55,47 @@ class Executor(Protocol):
         ...
 
 
+def done_before(jobs: Sequence[Job]) -> set[str]:
+    """Return the names that jobs wait for but that are not among them: those have ended."""
+    return {name for job in jobs for name in job.after} - {job.name for job in jobs}
+
+
+def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
+    """Return a callback that forwards only some of the numbers: a run makes thousands.
+
+    Args:
+        report: Called with the numbers that are forwarded.
+        every_s: Least time between two of them, s.
+    """
+    last = 0.0
+
+    def forward(steps: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= every_s:
+            last = now
+            report(steps)
+
+    return forward
+
+
 class Serial:
     """Runs jobs one after another in this process, for debugging."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Run all jobs; see `Executor.run`."""
-        ended: set[str] = {name for job in jobs for name in job.after} - {job.name for job in jobs}
+        ended = done_before(jobs)
         waiting = list(jobs)
         while waiting:
             job = next(job for job in waiting if ended.issuperset(job.after))
             waiting.remove(job)
-            job.function(*job.arguments, _reporting(job.name, on_progress))
+
+            def report(steps: int, name: str = job.name) -> None:
+                on_progress(name, steps, False)
+
+            job.function(*job.arguments, report)
             ended.add(job.name)
             on_progress(job.name, 0, True)
-
-
-def _reporting(name: str, on_progress: OnProgress) -> ReportSteps:
-    """Return a callback that reports steps under the job's name."""
-    return lambda steps: on_progress(name, steps, False)
 
 
 class Processes:
@@ -97,7 +120,7 @@ class Processes:
             ShapechangerError: What a job raised, or a `StudyError` with its traceback.
         """
         waiting = list(jobs)
-        ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
+        ended = done_before(jobs)
         idle = [_Worker() for _ in range(min(self._workers, len(jobs)))]
         busy: dict[Connection, _Worker] = {}
         try:
@@ -165,33 +188,20 @@ def _serve(connection: Connection) -> None:
     # Ctrl-C reaches every process of the terminal; the parent handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    report = throttled(lambda steps: connection.send(("steps", steps)), _REPORT_EVERY_S)
     while True:
         try:
             function, arguments = connection.recv()
         except EOFError:
             return
         try:
-            function(*arguments, _throttled(connection))
+            function(*arguments, report)
         except ShapechangerError as error:
             connection.send(("failed", error))
         except Exception:  # It crosses to the parent, which raises it.
             connection.send(("crashed", traceback.format_exc()))
         else:
             connection.send(("ended", None))
-
-
-def _throttled(connection: Connection) -> ReportSteps:
-    """Return a callback that forwards a few numbers a second: a run makes thousands."""
-    last = 0.0
-
-    def report(steps: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _REPORT_EVERY_S:
-            last = now
-            connection.send(("steps", steps))
-
-    return report
 
 
 def _end_with_parent() -> None:

@@ -27,9 +27,6 @@ _CARD: Final = "shapechanger"
 _OPSET: Final = 17
 # The intermediate representation of ONNX 1.12, which every runtime since 2022 reads.
 _IR_VERSION: Final = 8
-# Defaults of Stable-Baselines3's `VecNormalize`.
-_EPSILON: Final = 1e-8
-_CLIP: Final = 10.0
 
 
 class OnnxCard(msgspec.Struct, frozen=True):
@@ -74,6 +71,9 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         from onnx import helper, numpy_helper
     except ImportError as error:
         raise MissingExtra("onnx", "onnx") from error
+
+    from shapechanger.transfer.transplant.layers import CLIP, EPSILON
+
     make: Any = helper
     numbers: Any = numpy_helper
     nodes: list[Any] = []
@@ -87,8 +87,8 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
     if policy.normalisation is not None:
         statistics = policy.normalisation.observation
         constants["mean"] = np.asarray(statistics.mean, np.float64)
-        constants["deviation"] = np.sqrt(np.asarray(statistics.var, np.float64) + _EPSILON)
-        constants["least"], constants["most"] = np.float64(-_CLIP), np.float64(_CLIP)  # pyright: ignore[reportArgumentType]
+        constants["deviation"] = np.sqrt(np.asarray(statistics.var, np.float64) + EPSILON)
+        constants["least"], constants["most"] = np.float64(-CLIP), np.float64(CLIP)  # pyright: ignore[reportArgumentType]
         last = apply("Sub", [last, "mean"], "centred")
         last = apply("Div", [last, "deviation"], "scaled")
         last = apply("Clip", [last, "least", "most"], "normalised")
@@ -128,7 +128,7 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         producer_version=policy.card.version,
     )
     facts = {f"{name}_names": json.dumps(layout.names) for name, _, layout in sides}
-    card = OnnxCard(*(getattr(policy.card, name) for name in OnnxCard.__struct_fields__))
+    card = msgspec.convert(policy.card, OnnxCard, from_attributes=True)
     make.set_model_props(model, {**facts, _CARD: msgspec.json.encode(card).decode()})
     cast("Any", onnx).checker.check_model(model)
     write_atomic(path, model.SerializeToString())

@@ -22,7 +22,8 @@ SOURCE: Final = "source"
 """Kind of the runs that train a source policy."""
 NO_SKILL: Final = ("random", "zero-action")
 """Kinds of the runs without a policy, which give the zero of scores."""
-# Seeds follow from the place in this list, and those of other methods from their names.
+# The index in this tuple determines the seeds of a kind; seeds of other methods follow from their
+# names.
 _KINDS: Final = (SOURCE, "random", *ARMS, "randomised", "identified", "zero-action")
 # Welch's interval needs two of each.
 _MIN_SEEDS: Final = 2
@@ -106,7 +107,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         wanted = [*NO_SKILL, *self.arms]
         if not given and any(load_method(arm).uses_source_policy for arm in self.arms):
             wanted.insert(0, SOURCE)
-        # One given policy does the same in every run, and so does an action.
+        # A given policy has the same result in every run, and so has the zero action.
         once = set[str]() if self.individual else {"zero-action"}
         if given and not self.individual:
             once.add("zero-shot")
@@ -176,3 +177,7 @@ class Run(msgspec.Struct, frozen=True):
     def folder(self, study: Path) -> Path:
         """Its folder in the folder of a study."""
         return study / "runs" / self.name
+
+    def policy_file(self, study: Path) -> Path:
+        """The file of its policy in the folder of a study."""
+        return self.folder(study) / "policy.safetensors"

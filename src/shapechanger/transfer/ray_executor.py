@@ -10,15 +10,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 import traceback
 from collections.abc import Sequence
 from typing import Any, Final
 
 from shapechanger.errors import FailedRuns, MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Job, OnProgress, ReportSteps
+from shapechanger.transfer.executor import Job, OnProgress, done_before, throttled
 
-# Before Ray is imported, which reads it: otherwise it reports its use to its makers.
+# Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 
 try:
@@ -103,10 +102,9 @@ class _Schedule:
     def __init__(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         self._on_progress = on_progress
         self._waiting = list(jobs)
-        names = {job.name for job in jobs}
-        self._ended = {name for job in jobs for name in job.after} - names
+        self._ended = done_before(jobs)
         self._failed: dict[str, str] = {}
-        self._attempts = dict.fromkeys(names, 0)
+        self._attempts = {job.name: 0 for job in jobs}
         self._running: dict[Any, Job] = {}
         self._steps: dict[str, int] = {}
         self._board: Any = _new_board()
@@ -161,7 +159,7 @@ class _Schedule:
     def _report(self) -> None:
         try:
             found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
-        except RayError:  # It is being restarted; progress is not worth a study.
+        except RayError:  # The board is being restarted; a study goes on without progress.
             return
         running = {job.name for job in self._running.values()}
         for name, steps in found.items():
@@ -171,7 +169,7 @@ class _Schedule:
 
 
 def _new_board() -> Any:
-    """Start the board on the node of this program: others may be lost, and progress with them."""
+    """Start the board on the node of this program, because other nodes may be lost."""
     here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=False)
     return _ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)(_Board).remote()
 
@@ -195,23 +193,11 @@ class _Board:
 def _perform(function: Any, arguments: tuple[Any, ...], name: str, board: Any) -> str:
     """Perform a job on a node; return why it failed, or nothing."""
     try:
-        function(*arguments, _throttled(name, board))
+        function(
+            *arguments, throttled(lambda steps: board.put.remote(name, steps), _REPORT_EVERY_S)
+        )
     except ShapechangerError as error:
         return str(error).rstrip(".")
     except Exception:  # It crosses to the program that started the study.
         return traceback.format_exc()
     return ""
-
-
-def _throttled(name: str, board: Any) -> ReportSteps:
-    """Return a callback that forwards two numbers a second."""
-    last = 0.0
-
-    def report(steps: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _REPORT_EVERY_S:
-            last = now
-            board.put.remote(name, steps)
-
-    return report

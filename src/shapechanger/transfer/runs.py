@@ -9,18 +9,15 @@ import math
 import shutil
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
 from shapechanger.errors import CorruptStudy, StudyError
-from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import ReportSteps
 from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.learners import Learner
-from shapechanger.transfer.learners.camera import CameraLearner
-from shapechanger.transfer.learners.cloning import DemonstrationFile
+from shapechanger.transfer.learners.cloning import CloneLearner
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
@@ -28,7 +25,7 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.sb3 import OnEvaluation, Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
@@ -62,7 +59,7 @@ def learner_of(name: str, settings: Settings) -> Learner:
     """
     if isinstance(settings, Sb3Settings):
         return Sb3Learner(name, settings)
-    return CameraLearner(name, settings)
+    return CloneLearner(name, settings)
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
@@ -77,7 +74,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
         CorruptStudy: If its file cannot be read or belongs to another run.
     """
     path = run.folder(study) / _RESULT
-    if not path.exists() or (plan.trains(run.kind) and not policy_path(study, run).exists()):
+    if not path.exists() or (plan.trains(run.kind) and not run.policy_file(study).exists()):
         return None
     remedy = f"delete {path.parent} to repeat that run"
     result = read_json(path, RunResult, remedy)
@@ -138,11 +135,14 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         curve.append(evaluation)
         append_line(folder / _CURVE, evaluation)
 
+    policy = None
     if run.kind in NO_SKILL:
         on_evaluation(_evaluate_unskilled(plan, run))
-        policy = None
     else:
-        context = _method_run(plan, run, Path(study), given, on_evaluation, report)
+        learner = learner_of(plan.learner, plan.settings)
+        context = MethodRun(
+            plan, run, Path(study), learner, given=given, report=on_evaluation, on_steps=report
+        )
         if run.kind == SOURCE:
             policy = context.train(
                 context.source, context.source_steps, on_evaluation=context.report
@@ -150,71 +150,9 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         else:
             policy = load_method(run.kind).learn(context)
         if policy is not None:
-            context.learner.save(policy, policy_path(Path(study), run))
+            learner.save(policy, run.policy_file(Path(study)))
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
     write_json(folder / _RESULT, result)
-
-
-def _method_run(
-    plan: Plan,
-    run: Run,
-    study: Path,
-    given: Path | None,
-    on_evaluation: OnEvaluation,
-    on_steps: ReportSteps,
-) -> MethodRun:
-    """Return the arguments of a method for one of its runs."""
-    learner = learner_of(plan.learner, plan.settings)
-    target = plan.target_of(run)
-    done = 0
-
-    def source_policy() -> object:
-        return learner.load(given or policy_path(study, Run(SOURCE, run.index)))
-
-    def train(
-        env: EnvRef,
-        steps: int,
-        *,
-        start: Any = None,
-        body_map: BodyMap | None = None,
-        callback: Any = None,
-        on_evaluation: OnEvaluation | None = None,
-    ) -> Any:
-        nonlocal done
-        before = done
-        # All arms share the demonstrations of a target: they differ only in where they start.
-        shown = Run("scratch", run.index) if env == target else run
-        trained = learner.train(
-            env,
-            steps,
-            plan.seed_of(run),
-            demonstrations=DemonstrationFile(
-                study / "demonstrations" / f"{shown.name}.npz", plan.seed_of(shown)
-            ),
-            start=start,
-            body_map=body_map,
-            only_last=env != target,
-            callback=callback,
-            on_evaluation=on_evaluation or _ignore,
-            on_steps=lambda now: on_steps(before + now),
-        )
-        done += steps
-        return trained
-
-    return MethodRun(
-        source=plan.task.source,
-        target=target,
-        body_map=plan.body_map,
-        learner=learner,
-        settings=plan.settings,
-        steps=plan.steps,
-        source_steps=plan.source_steps,
-        seed=plan.seed_of(run),
-        folder=run.folder(study),
-        source_policy=source_policy,
-        report=on_evaluation,
-        train=train,
-    )
 
 
 def _evaluate_unskilled(plan: Plan, run: Run) -> Evaluation:
@@ -230,17 +168,3 @@ def _evaluate_unskilled(plan: Plan, run: Run) -> Evaluation:
     finally:
         for env in envs:
             env.close()
-
-
-def _ignore(evaluation: Evaluation) -> None:
-    pass
-
-
-def policy_path(study: Path, run: Run) -> Path:
-    """Return the policy file of a run.
-
-    Args:
-        study: Folder of the study.
-        run: The run.
-    """
-    return run.folder(study) / "policy.safetensors"

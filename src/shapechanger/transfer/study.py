@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
@@ -25,11 +26,10 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
-from shapechanger.transfer.learners.sb3 import require_budget
-from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.learners.settings import Settings, require_budget
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
-from shapechanger.transfer.plan import ARMS, SOURCE, Plan, Run, TransferTask
+from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 
@@ -73,7 +73,10 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     def curves(self, kind: str) -> LearningCurves:
         """Return the learning curves of one kind of run, in units of the measure."""
-        return _curves(self.plan, self.of(kind))
+        results = self.of(kind)
+        steps = [float(evaluation.steps) for evaluation in results[0].curve]
+        values = [[e.value(self.plan.measure) for e in result.curve] for result in results]
+        return LearningCurves(np.array(steps), np.array(values))
 
 
 class TaskTraits(NamedTuple):
@@ -112,19 +115,12 @@ def inspect_task(task: TransferTask) -> TaskTraits:
         LayoutError: If an env publishes no layouts.
         StudyError: If an env does not take its arguments.
     """
-    source = task.source.make()
-    try:
-        target = task.target.make()
+    with closing(task.source.make()) as source, closing(task.target.make()) as target:
+        traits = env_traits(source), env_traits(target)
         try:
-            traits = env_traits(source), env_traits(target)
-            try:
-                return TaskTraits(*traits, certify_shift(source, target))
-            except ShapechangerError as error:
-                return TaskTraits(*traits, error)
-        finally:
-            target.close()
-    finally:
-        source.close()
+            return TaskTraits(*traits, certify_shift(source, target))
+        except ShapechangerError as error:
+            return TaskTraits(*traits, error)
 
 
 def default_arms(traits: TaskTraits) -> tuple[str, ...]:
@@ -133,12 +129,8 @@ def default_arms(traits: TaskTraits) -> tuple[str, ...]:
     Source adaptation helps where source and target are the same task, that is, where their layouts
     are equal.
     """
-    source, target = traits.source, traits.target
-    same = (source.observation_layout, source.action_layout) == (
-        target.observation_layout,
-        target.action_layout,
-    )
-    return (*ARMS, *_ADAPTED) if same and target.adapts_source else ARMS
+    adapts = traits.target.adapts_source and traits.source.same_layouts(traits.target)
+    return (*ARMS, *_ADAPTED) if adapts else ARMS
 
 
 def make_plan(
@@ -301,14 +293,24 @@ def run_study(
     ]
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
-        if missing := unfinished_runs(plan, out):
-            raise StudyError(
-                f"The results of {', '.join(run.name for run in missing)} are not in {out}: all "
-                "nodes of a cluster must share this folder."
-            )
-    results = [load_result(plan, out, run) for run in plan.runs()]
-    study = _study(plan, [result for result in results if result is not None], command, shift)
-    study = msgspec.structs.replace(study, looks=_looks(plan, out / STUDY_FILE))
+    found = {run: load_result(plan, out, run) for run in plan.runs()}
+    if missing := [run.name for run, result in found.items() if result is None]:
+        raise StudyError(
+            f"The results of {', '.join(missing)} are not in {out}: all nodes of a cluster must "
+            "share this folder."
+        )
+    results = tuple(result for result in found.values() if result is not None)
+    study = Study(
+        plan=plan,
+        command=command,
+        machine=f"{platform.system()} {platform.machine()}",
+        shift=shift,
+        runs=results,
+        source_return=tuple(r.curve[-1].mean_return for r in results if r.run.kind == SOURCE),
+        summaries={},
+        looks=_looks(plan, out / STUDY_FILE),
+    )
+    study = msgspec.structs.replace(study, summaries=_summaries(study))
     write_json(out / STUDY_FILE, study)
     return study
 
@@ -396,12 +398,10 @@ def _after(plan: Plan, run: Run) -> tuple[str, ...]:
     return (Run(SOURCE, run.index).name,) if load_method(run.kind).uses_source_policy else ()
 
 
-def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> Study:
-    """Summarise the results of all runs."""
-    by_kind: dict[str, list[RunResult]] = {}
-    for result in results:
-        by_kind.setdefault(result.run.kind, []).append(result)
-    curves = {kind: _curves(plan, by_kind[kind]) for kind in by_kind if kind != "source"}
+def _summaries(study: Study) -> dict[str, Summary]:
+    """Compare each arm of a study with scratch."""
+    plan = study.plan
+    curves = {kind: study.curves(kind) for kind in (*NO_SKILL, *plan.arms)}
     scratch = curves["scratch"]
     last_k = min(plan.last_k, scratch.n_evals)
     reference = Reference.of(
@@ -413,7 +413,7 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
         {arm: float(curves[arm].returns[:, -last_k:].mean()) for arm in plan.arms},
         _shipped_reference(plan),
     )
-    summaries: dict[str, Summary] = {
+    return {
         arm: summarise(
             scratch,
             curves[arm],
@@ -425,15 +425,6 @@ def _study(plan: Plan, results: list[RunResult], command: str, shift: str) -> St
         for arm in plan.arms
         if arm != "scratch"
     }
-    return Study(
-        plan=plan,
-        command=command,
-        machine=f"{platform.system()} {platform.machine()}",
-        shift=shift,
-        runs=tuple(results),
-        source_return=tuple(r.curve[-1].mean_return for r in by_kind.get("source", [])),
-        summaries=summaries,
-    )
 
 
 def _shipped_reference(plan: Plan) -> tuple[str, float] | None:
@@ -441,10 +432,3 @@ def _shipped_reference(plan: Plan) -> tuple[str, float] | None:
     reference = reference_of(plan.task.target)
     value = None if reference is None else reference.end(plan.measure)
     return None if reference is None or value is None else (reference.text, value)
-
-
-def _curves(plan: Plan, results: list[RunResult]) -> LearningCurves:
-    """Learning curves of several runs, in units of the plan's measure."""
-    steps = [float(evaluation.steps) for evaluation in results[0].curve]
-    values = [[e.value(plan.measure) for e in result.curve] for result in results]
-    return LearningCurves(np.array(steps), np.array(values))

@@ -7,8 +7,9 @@ runs from the finished studies of its suite.
 
 from __future__ import annotations
 
+import math
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -16,12 +17,11 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.tasks.measure import RETURN
-from shapechanger.transfer.executor import Executor, OnProgress
 from shapechanger.transfer.files import make_folder, read_json
-from shapechanger.transfer.metrics import Estimate, LearningCurves
+from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_reach
 from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result
-from shapechanger.transfer.study import PLAN_FILE, Study, TaskTraits, claim_folder, run_study
+from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
@@ -58,38 +58,6 @@ class StudyOutcome(msgspec.Struct, frozen=True):
     def halves(self) -> bool:
         """Return whether fine-tuning needs less than half as many steps as scratch."""
         return self.fine_tune_steps is not None and self.fine_tune_steps < self.scratch_steps / 2
-
-
-def run_in_suite(
-    plan: Plan,
-    out: Path,
-    name: str,
-    *,
-    executor: Executor | None = None,
-    on_progress: OnProgress = lambda name, steps, ended: None,
-    command: str = "",
-    traits: TaskTraits | None = None,
-) -> Study:
-    """Run a study in its folder below `out`, reusing runs of the other studies there.
-
-    Args:
-        plan: The plan of the study.
-        out: Folder of the suite.
-        name: Name of the study, which is that of its folder.
-        executor: As in `run_study`.
-        on_progress: As in `run_study`.
-        command: As in `run_study`.
-        traits: As in `run_study`.
-
-    Raises:
-        ForeignStudy: If its folder holds another study.
-        CorruptStudy: If a file in one cannot be read.
-        OutputError: If `out` cannot be written.
-    """
-    folder = open_study_folder(plan, out, name)
-    return run_study(
-        plan, folder, executor=executor, on_progress=on_progress, command=command, traits=traits
-    )
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
@@ -160,11 +128,6 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     return whole
 
 
-def study_outcomes(studies: Mapping[str, Study]) -> list[StudyOutcome]:
-    """Return the outcome of each study, by name."""
-    return [_outcome(name, study) for name, study in studies.items()]
-
-
 def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
@@ -205,34 +168,32 @@ def _copy_atomic(theirs: Path, mine: Path) -> None:
         raise OutputError(f"Cannot write {mine}: {error.strerror or error}.") from error
 
 
-def _outcome(name: str, study: Study) -> StudyOutcome:
+def study_outcome(name: str, study: Study) -> StudyOutcome:
+    """Return the outcome of a study.
+
+    Args:
+        name: Its name.
+        study: The study, with the arms scratch and fine-tune.
+    """
     scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
     final = float(scratch.returns[:, -1].mean())
-    zero_shot = study.of("zero-shot")
     summary = study.summaries["fine-tune"]
-    measures = summary.in_target_steps
     first = _first_at(scratch, final)
     return StudyOutcome(
         name,
         final,
-        float(study.curves("zero-shot").returns.mean()) if zero_shot else None,
+        float(study.curves("zero-shot").returns.mean()) if study.of("zero-shot") else None,
         float(tuned.returns[:, -1].mean()),
         study.plan.steps if first is None else first,
         _first_at(tuned, final),
         summary.unit,
-        {gain: getattr(measures, gain) for gain in _GAINS},
+        {gain: getattr(summary.in_target_steps, gain) for gain in _GAINS},
         study.plan.measure,
     )
 
 
 def _first_at(curves: LearningCurves, level: float) -> float | None:
-    """Steps at which the mean over seeds first reaches a level, linearly interpolated."""
-    means = curves.returns.mean(axis=0)
-    before_steps, before = 0.0, float("-inf")
-    for steps, mean in zip(curves.steps.tolist(), means.tolist(), strict=True):
-        if mean >= level:
-            if before == float("-inf"):
-                return steps
-            return before_steps + (steps - before_steps) * (level - before) / (mean - before)
-        before_steps, before = steps, mean
-    return None
+    """Steps at which the mean over seeds first reaches a level; None if it never does."""
+    mean = LearningCurves(curves.steps, curves.returns.mean(axis=0, keepdims=True))
+    steps = float(steps_to_reach(mean, level)[0])
+    return steps if math.isfinite(steps) else None

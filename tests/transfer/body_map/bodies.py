@@ -1,4 +1,4 @@
-"""Small bodies for the tests of body maps, named as the ants are."""
+"""Small layouts for the tests of body maps, with the names of the ants."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ ANT_FLIP = ["hip_*"]
 
 
 def motor(name: str, gain: float = 150.0, unit: str = "N·m") -> Feature:
-    """An action feature that reaches from -1 to 1."""
+    """Return an action feature with the range -1 to 1."""
     return Feature(f"{name}/motor", "1", -1.0, 1.0, gain=gain, gain_unit=unit)
 
 
 def ant_observation(*, feet: bool = False) -> Layout:
-    """What an ant senses: torso, joints, velocities and the forces on its shanks."""
+    """Return an ant's observation: torso, joints, velocities and forces on the shanks."""
     ankle = {1: (30, 100), 2: (-100, -30), 3: (-100, -30), 4: (30, 100)}
     torso = [Feature("torso/z", "m")]
     torso += [Feature(f"torso/{axis}", "1") for axis in ("qw", "qx", "qy", "qz")]
@@ -45,7 +45,7 @@ def ant_observation(*, feet: bool = False) -> Layout:
 
 
 def ant_action(*, feet: bool = False) -> Layout:
-    """What an ant moves, in MuJoCo's order of the motors."""
+    """Return an ant's action, in MuJoCo's order of the motors."""
     motors = [motor(f"{joint}_{leg}") for leg in (4, 1, 2, 3) for joint in ("hip", "ankle")]
     if feet:
         motors += [motor(f"foot_{leg}") for leg in (4, 1, 2, 3)]
@@ -53,7 +53,7 @@ def ant_action(*, feet: bool = False) -> Layout:
 
 
 def pendulum_observation(hinge: str = "hinge", unit: str = "rad") -> Layout:
-    """What a cart with a pole senses."""
+    """Return the observation of a cart with a pole."""
     return Layout(
         (
             Feature("slider/position", "m", -1.0, 1.0),
@@ -65,5 +65,5 @@ def pendulum_observation(hinge: str = "hinge", unit: str = "rad") -> Layout:
 
 
 def pendulum_action(gain: float = 100.0, unit: str = "N", name: str = "slide") -> Layout:
-    """The one motor of a cart."""
+    """Return the action of a cart with a pole."""
     return Layout((motor(name, gain, unit),))

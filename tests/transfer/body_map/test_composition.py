@@ -1,4 +1,4 @@
-"""Maps in a row and backwards."""
+"""Composition and inversion of body maps."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def copied() -> BodyMap:
 
 
 def test_there_and_back_is_nothing() -> None:
-    """An ant whose policy visits an ant with feet comes home unchanged."""
+    """Mapping an ant to an ant with feet and back is the identity."""
     there = grown(rules={"foot_*": "learn"})
     assert there.then(there.inverse()) == BodyMap.identity(ant_observation(), ant_action())
 
 
 def test_back_and_there_keeps_what_was_shared() -> None:
-    """What the ant lacks is lost on the way, and the rules say how."""
+    """Features that the middle body lacks are zero in the composition."""
     there = grown(rules={"foot_*": "learn"})
     round_trip = there.inverse("hold").then(there)
     observation = {entry.feature: entry for entry in round_trip.observation}
@@ -61,7 +61,7 @@ def test_back_and_there_keeps_what_was_shared() -> None:
 
 
 def test_rules_multiply_and_reasons_add_up() -> None:
-    """The map of a chain says where each of its steps came from."""
+    """Scales multiply, and `why` names the rule of each map."""
     motors = pendulum_action()
     first = BodyMap.between(
         pendulum_observation("pole"),
@@ -89,7 +89,7 @@ def test_rules_multiply_and_reasons_add_up() -> None:
 
 
 def test_actions_run_through_both_maps() -> None:
-    """The chain does to an action what its links do, one after the other."""
+    """The composition adapts actions as the two maps in a row."""
     first, second = grown(rules={"foot_*/motor": "copy ankle_*/motor"}), grown().inverse()
     second = second.then(grown(rules={"foot_*/motor": "copy hip_*/motor"}))
     action = np.random.default_rng(0).uniform(-1.0, 1.0, size=8)
@@ -107,7 +107,7 @@ def test_actions_run_through_both_maps() -> None:
     ],
 )
 def test_maps_that_do_not_meet_are_refused(middle: Layout, message: str) -> None:
-    """The message says where the bodies in the middle part."""
+    """Maps with different bodies in the middle are refused, with the first difference."""
     here = Layout((Feature("z", "m"), Feature("y", "m")))
     first = BodyMap.identity(here, pendulum_action())
     second = BodyMap.identity(middle, pendulum_action())
@@ -117,7 +117,7 @@ def test_maps_that_do_not_meet_are_refused(middle: Layout, message: str) -> None
 
 
 def test_motors_of_another_strength_do_not_meet() -> None:
-    """A scale made for one gain is wrong for another."""
+    """Maps whose gains differ in the middle body are refused."""
     first = BodyMap.identity(pendulum_observation(), pendulum_action(100.0))
     second = BodyMap.identity(pendulum_observation(), pendulum_action(200.0))
     with pytest.raises(MapError, match=r"action of the first .* gain is 100\.0 and 200\.0"):
@@ -125,21 +125,21 @@ def test_motors_of_another_strength_do_not_meet() -> None:
 
 
 def test_a_scale_is_undone() -> None:
-    """The way back divides."""
+    """The inverse divides by the scale."""
     motors = pendulum_action(100.0), pendulum_action(400.0)
     there = BodyMap.between(pendulum_observation(), pendulum_observation(), *motors, units="torque")
     assert there.inverse().action[0].rule == Copy("slide/motor", 4.0)
 
 
 def test_the_namesake_gives_a_copied_feature_back() -> None:
-    """Of several copies the one of the same name is the original."""
+    """The inverse of several copies reads the copy of the same name."""
     back = copied().inverse()
     assert [entry.rule for entry in back.action] == [Copy("ankle/motor")]
     assert [entry.rule for entry in back.observation] == [Copy("z")]
 
 
 def test_copies_without_a_namesake_have_no_way_back() -> None:
-    """Which of two motors was meant, nobody can know."""
+    """Several copies without one of the same name have no unique inverse."""
     there = BodyMap.between(
         pendulum_observation(),
         pendulum_observation(),
@@ -152,7 +152,7 @@ def test_copies_without_a_namesake_have_no_way_back() -> None:
 
 
 def test_what_was_not_taken_gets_the_rule_for_the_rest() -> None:
-    """The way back has gaps of its own."""
+    """The inverse fills features that were not copied by `otherwise`."""
     for otherwise, rule in (("learn", Learn()), ("zero", Zero())):
         rules = {e.feature: e.rule for e in grown().inverse(otherwise).observation}
         assert rules["foot_1/velocity"] == rule

@@ -1,4 +1,4 @@
-"""Maps between envs, and the target env as a source policy sees it."""
+"""Body maps between envs, and `MappedEnv`."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from shapechanger.errors import MapError, SpaceMismatch
+from shapechanger.errors import LayoutError, SpaceMismatch
 from shapechanger.layout import Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv, body_map, wrap
+from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv, body_map
 from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 
 class Recorder(gym.Env[np.ndarray, np.ndarray]):
-    """An env of some layout that senses what it is told to and remembers what it was made to do."""
+    """An env with given layouts that returns given observations and records its actions."""
 
     def __init__(self, *, feet: bool = False) -> None:
         self.observation_layout = ant_observation(feet=feet)
@@ -27,26 +27,26 @@ class Recorder(gym.Env[np.ndarray, np.ndarray]):
         self.moved: list[np.ndarray] = []
 
     def sensed(self) -> np.ndarray:
-        """A different number in each place and at each time."""
+        """Return a different number for each entry and step."""
         n = self.observation_layout.size
         return np.linspace(-0.3, 0.3, n) + len(self.moved)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Forget everything."""
+        """Reset the counter."""
         super().reset(seed=seed)
         self.moved = []
         return self.sensed(), {"options": options}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Remember the action."""
+        """Record the action."""
         self.moved.append(action)
         return self.sensed(), 2.5, True, False, {"moved": action}
 
 
 class Silent(Recorder):
-    """An env that publishes nothing."""
+    """An env without layouts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -54,23 +54,23 @@ class Silent(Recorder):
 
 
 def test_envs_are_mapped_by_their_layouts() -> None:
-    """A map needs nothing but two envs."""
+    """`body_map` reads the layouts of both envs."""
     built = body_map(Recorder(), gym.wrappers.TimeLimit(Recorder(feet=True), 5), otherwise="learn")
     assert built.source_action == ant_action()
     assert built.target_action == ant_action(feet=True)
 
 
 def test_an_env_without_layouts_is_refused() -> None:
-    """The message says what to add."""
-    with pytest.raises(MapError, match="publishes no action_layout: add a property"):
+    """The message names the properties to add."""
+    with pytest.raises(LayoutError, match="publishes no observation_layout and action_layout"):
         body_map(Recorder(), Silent())
 
 
 def test_a_source_policy_acts_in_the_target() -> None:
-    """It senses the source's numbers and moves the target's motors."""
+    """Observations are those of the source, and actions move the target's motors."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target, rules={"foot_*/motor": "copy ankle_*/motor"})
-    env = wrap(target, built)
+    env = MappedEnv(target, built)
     observation, info = env.reset(seed=3, options={"a": 1})
     assert info == {"options": {"a": 1}}
     np.testing.assert_array_equal(observation, built.adapt_observation(target.sensed()))
@@ -84,14 +84,14 @@ def test_a_source_policy_acts_in_the_target() -> None:
 
 
 def test_the_spaces_are_those_of_the_source() -> None:
-    """They follow from the layouts, or are the source's own."""
+    """Spaces are derived from the layouts unless given."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target)
-    env = wrap(target, built)
+    env = MappedEnv(target, built)
     assert isinstance(env.observation_space, gym.spaces.Box)
     np.testing.assert_array_equal(env.observation_space.high, source.observation_layout.high)
     assert env.action_space == source.action_space
-    env = wrap(
+    env = MappedEnv(
         target,
         built,
         observation_space=source.observation_space,
@@ -102,29 +102,29 @@ def test_the_spaces_are_those_of_the_source() -> None:
 
 
 def test_a_mapped_env_publishes_the_source_layouts() -> None:
-    """So it can be mapped again: what it shows is what counts, and not what it wraps."""
+    """A mapped env can be mapped again, from the layouts of the wrapper."""
     source, target = Recorder(), Recorder(feet=True)
-    env = wrap(target, body_map(source, target))
+    env = MappedEnv(target, body_map(source, target))
     assert (env.observation_layout, env.action_layout) == (ant_observation(), ant_action())
     assert body_map(source, env) == BodyMap.identity(ant_observation(), ant_action())
 
 
 def test_a_space_of_the_wrong_size_is_refused() -> None:
-    """A map for other bodies is found when the env is built."""
+    """A map for other bodies is refused when the env is built."""
     built = body_map(Recorder(), Recorder(feet=True))
     with pytest.raises(SpaceMismatch, match=r"target observation has 59 numbers"):
-        wrap(Recorder(), built)
+        MappedEnv(Recorder(), built)
     with pytest.raises(SpaceMismatch, match="source action has 8"):
-        wrap(Recorder(feet=True), built, action_space=gym.spaces.Box(-1.0, 1.0, (7,)))
+        MappedEnv(Recorder(feet=True), built, action_space=gym.spaces.Box(-1.0, 1.0, (7,)))
 
 
 def test_a_mapped_env_is_rebuilt_from_its_spec() -> None:
-    """The spec holds the map, also as JSON, so that a study can be repeated."""
+    """The spec holds the map as JSON, so an env can be made from it."""
     gym.register("body_map_test/Recorder-v0", f"{__name__}:Recorder", kwargs={"feet": True})
     try:
         target = gym.make("body_map_test/Recorder-v0", disable_env_checker=True)
         built = body_map(Recorder(), target, action_rules={"foot_1/motor": Copy("hip_1/motor")})
-        spec = wrap(target, built).spec
+        spec = MappedEnv(target, built).spec
         assert spec is not None
         again = gym.make(EnvSpec.from_json(spec.to_json()), disable_env_checker=True)
     finally:

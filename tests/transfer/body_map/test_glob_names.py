@@ -1,4 +1,4 @@
-"""Names that contain the characters of a glob are names first."""
+"""Feature names with the characters of globs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOTOR = _layout("motor")
 
 
 def test_a_rule_under_the_exact_name_of_a_feature_is_no_glob() -> None:
-    """`leg[12]` names one feature, so `leg1` and `leg2` keep the default."""
+    """`leg[12]` names one feature; `leg1` and `leg2` get the default rule."""
     source = _layout("leg[12]", "leg1", "leg2", "tail*", "tail_2", "same")
     built = BodyMap.between(
         source,
@@ -34,7 +34,7 @@ def test_a_rule_under_the_exact_name_of_a_feature_is_no_glob() -> None:
 
 
 def test_a_copied_name_with_a_star_is_no_template() -> None:
-    """The target has a feature `eye*`, which is copied literally."""
+    """A target feature named `eye*` is copied literally."""
     built = BodyMap.between(
         _layout("left/eye", "same"),
         _layout("eye*", "same"),
@@ -46,7 +46,7 @@ def test_a_copied_name_with_a_star_is_no_template() -> None:
 
 
 def test_a_mirror_prefers_exact_names_to_globs() -> None:
-    """`leg?` and `arm*` are elements; `legs` and `arms` must stay in place."""
+    """`leg?` and `arm*` are elements; `legs` and `arms` stay in place."""
     layout = _layout("leg?/angle", "legs/angle", "arm*/angle", "arms/angle")
     found = mirror(layout, MOTOR, swap={"leg?": "arm*"}, flip=["leg?", "arm*"])
     assert found.observation == (

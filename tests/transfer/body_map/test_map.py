@@ -1,4 +1,4 @@
-"""What a body map computes, shows and refuses."""
+"""What a body map computes, prints and refuses."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def small() -> BodyMap:
 
 
 def test_numbers_arrive_where_their_names_are() -> None:
-    """Observations in the order of the source, actions in that of the target."""
+    """Observations are in the order of the source, actions in that of the target."""
     np.testing.assert_array_equal(small().adapt_observation([7.0, 3.0]), [3.0, 0.0, 0.25])
     np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
 
 
 def test_actions_end_at_the_bounds_of_the_target() -> None:
-    """A scaled action shall not ask for more than the motor has."""
+    """Scaled actions are clipped to the target's bounds."""
     np.testing.assert_array_equal(small().adapt_action([3.0, -0.7]), [-0.7, 1.0, 0.0, 1.0])
 
 
 def test_batches_of_any_shape_pass() -> None:
-    """Leading axes are left alone."""
+    """Leading axes are kept."""
     values = np.random.default_rng(0).normal(size=(4, 5, 2))
     adapted = small().adapt_observation(values)
     assert adapted.shape == (4, 5, 3)
@@ -62,14 +62,14 @@ def test_batches_of_any_shape_pass() -> None:
     [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
 )
 def test_the_number_type_is_kept(given: type, result: type) -> None:
-    """A policy in single precision gets single precision."""
+    """float32 in gives float32 out."""
     assert small().adapt_observation(np.ones(2, given)).dtype == result
     assert small().adapt_action(np.ones(2, given)).dtype == result
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_matched_numbers_are_copied_to_the_last_bit(dtype: type) -> None:
-    """A map of namesakes is a permutation and not arithmetic."""
+    """A map of equal names is a bitwise permutation."""
     built = BodyMap.between(
         ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
     )
@@ -82,19 +82,19 @@ def test_matched_numbers_are_copied_to_the_last_bit(dtype: type) -> None:
 
 
 def test_a_gap_is_filled_even_from_nonsense() -> None:
-    """0 times NaN is NaN, so what is not taken must not be touched."""
+    """Numbers that are not copied do not matter, even if they are NaN."""
     np.testing.assert_array_equal(small().adapt_observation([np.nan, 3.0]), [3.0, 0.0, 0.25])
 
 
 def test_the_result_is_a_new_array() -> None:
-    """A learner may keep an observation."""
+    """The result does not share memory with the input."""
     built = BodyMap.identity(pendulum_observation(), pendulum_action())
     values = np.zeros(4)
     assert not np.may_share_memory(values, built.adapt_observation(values))
 
 
 def test_blocks_move_as_a_whole() -> None:
-    """A picture keeps its order, wherever it lies in the vector."""
+    """A block keeps its order."""
     eye = Feature("eye", "1", 0.0, 1.0, shape=(2, 2))
     ear = Feature("ear", "1", 0.0, 1.0, shape=(2,))
     built = BodyMap.between(
@@ -109,7 +109,7 @@ def test_blocks_move_as_a_whole() -> None:
 
 
 def test_the_affine_form_is_the_map() -> None:
-    """Transplanting weights uses the matrices, so they must say what the map does."""
+    """Matrix and offset compute the same as the map."""
     rng = np.random.default_rng(2)
     built = small()
     sensed, moved = rng.normal(size=2), rng.uniform(-0.3, 0.3, size=2)
@@ -126,7 +126,7 @@ def test_the_affine_form_is_the_map() -> None:
 
 
 def test_a_vector_of_another_body_is_refused() -> None:
-    """The message counts the numbers."""
+    """The message names the expected and the given size."""
     with pytest.raises(SpaceMismatch, match=r"target observation features has 2 numbers.*\(3,\)"):
         small().adapt_observation(np.zeros(3))
     with pytest.raises(SpaceMismatch, match=r"source action feature.* shape is \(\)"):
@@ -134,7 +134,7 @@ def test_a_vector_of_another_body_is_refused() -> None:
 
 
 def test_the_table_states_each_rule() -> None:
-    """Every entry of the map says what it does and why."""
+    """The table has the rule and the reason of each entry."""
     assert small().table() == (
         MapRow("observation", "z", "z", "same name"),
         MapRow("observation", "lost", "zero", "default"),
@@ -151,14 +151,14 @@ def test_the_table_states_each_rule() -> None:
 
 
 def test_the_short_form_counts_the_rules() -> None:
-    """A map of an ant has a hundred lines, which nobody wants in a traceback."""
+    """`repr` counts rules instead of listing them."""
     assert repr(small()) == (
         "BodyMap(observation: 1 Copy, 1 Zero, 1 Hold; action: 3 Copy, 1 Learn)"
     )
 
 
 def test_each_feature_needs_its_rule_in_order() -> None:
-    """A map built by hand is checked as well."""
+    """Entries given to the constructor are checked."""
     good = small()
     with pytest.raises(MapError, match=r"in the order of the layout: z, lost, rest; .* lost, z"):
         msgspec.structs.replace(
@@ -171,7 +171,7 @@ def test_each_feature_needs_its_rule_in_order() -> None:
 
 
 def test_entries_are_equal_if_they_do_the_same() -> None:
-    """Where a rule came from is a remark."""
+    """Equality of entries ignores `why`."""
     assert MapEntry("a", Zero(), "default") == MapEntry("a", Zero(), "rule 'a'")
     assert hash(MapEntry("a", Zero(), "default")) == hash(MapEntry("a", Zero(), "rule 'a'"))
     assert MapEntry("a", Zero()) != MapEntry("a", Learn())
@@ -179,7 +179,7 @@ def test_entries_are_equal_if_they_do_the_same() -> None:
 
 
 def test_a_map_crosses_to_another_process() -> None:
-    """Workers get maps by pickle; what was computed once is computed again there."""
+    """Pickling keeps the map, without its cached arrays."""
     built = small()
     assert built.action_matrix.shape == (4, 2)
     for twin in (pickle.loads(pickle.dumps(built)), copy.deepcopy(built)):
@@ -188,7 +188,7 @@ def test_a_map_crosses_to_another_process() -> None:
 
 
 def test_json_round_trip_keeps_the_layouts() -> None:
-    """A study writes its map down and reads it again."""
+    """JSON round trips with all layouts."""
     again = BodyMap.from_json(small().to_json())
     assert again == small()
     assert again.table() == small().table()
@@ -196,6 +196,6 @@ def test_json_round_trip_keeps_the_layouts() -> None:
 
 @pytest.mark.parametrize("text", ["{", "{}", small().to_json().replace("0.25", "null")])
 def test_json_that_is_no_map_is_refused(text: str) -> None:
-    """The message comes from here and not from the parser."""
+    """Invalid JSON raises a MapError."""
     with pytest.raises(MapError, match="This is not a body map"):
         BodyMap.from_json(text)

@@ -42,12 +42,12 @@ def shrunk(**options: object) -> BodyMap:
 
 
 def rules_of(built: BodyMap) -> dict[str, object]:
-    """The rule of each filled feature."""
+    """Return the rule of each feature that is filled."""
     return {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
 
 
 def test_features_of_one_name_are_partners() -> None:
-    """An ant with feet has everything that an ant has."""
+    """An ant with feet has every feature of an ant."""
     built = grown()
     assert all(entry.rule == Copy(entry.feature) for entry in built.observation)
     assert {entry.why for entry in built.observation} == {"same name"}
@@ -67,33 +67,33 @@ def test_features_of_one_name_are_partners() -> None:
     ],
 )
 def test_a_rule_can_be_said_in_words(like: RuleLike, rule: object) -> None:
-    """Words and values mean the same."""
+    """The short form of a rule equals its object."""
     built = grown(rules={"foot_2/motor": like})
     assert rules_of(built)["foot_2/motor"] == rule
     assert {e.feature: e.why for e in built.action}["foot_2/motor"] == "rule 'foot_2/motor'"
 
 
 def test_holding_keeps_to_the_middle_of_the_range() -> None:
-    """A joint that the target lacks rests half way between its stops."""
+    """The rule "hold" is the middle of the range."""
     held = rules_of(shrunk(rules={"foot_*/angle": "hold"}))["foot_1/angle"]
     assert isinstance(held, Hold)
     assert held.value == pytest.approx(65 * DEGREE)
 
 
 def test_the_first_glob_that_fits_counts() -> None:
-    """Rules are read from the top."""
+    """Globs are tried in order."""
     rules = rules_of(grown(rules={"foot_[12]/*": "learn", "foot_*": "hold"}))
     assert [rules[f"foot_{leg}/motor"] for leg in (1, 2, 3)] == [Learn(), Learn(), Hold(0.0)]
 
 
 def test_an_exact_name_comes_before_a_glob() -> None:
-    """The exception need not be written above the rule."""
+    """An exact name takes precedence wherever it is written."""
     rules = rules_of(grown(rules={"foot_*": "learn", "foot_3/motor": "zero"}))
     assert rules["foot_3/motor"] == Zero()
 
 
 def test_only_an_exact_name_overrules_a_namesake() -> None:
-    """A glob fills gaps; to cut a joint off it has to be named."""
+    """A glob does not override a partner of the same name."""
     rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
     assert rules["hip_1/motor"] == Zero()
     assert rules["hip_2/motor"] == Copy("hip_2/motor")
@@ -107,7 +107,7 @@ def test_stars_carry_over() -> None:
 
 
 def test_rules_can_be_for_one_side_only() -> None:
-    """A sensor and a motor of one name may need different rules; the narrower one comes first."""
+    """Rules of one side take precedence over shared ones."""
     layout = Layout((Feature("a", "1"), Feature("b", "1")))
     built = BodyMap.between(
         layout,
@@ -126,7 +126,7 @@ def test_rules_can_be_for_one_side_only() -> None:
 
 
 def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
-    """Silence about a feature is answered by `otherwise`."""
+    """Features without a partner or rule get `otherwise`."""
     assert rules_of(grown(otherwise="learn"))["foot_2/motor"] == Learn()
     assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
     with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', not 'copy hip_1/motor'"):
@@ -134,7 +134,7 @@ def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
 
 
 def test_what_a_feature_cannot_be_is_not_held() -> None:
-    """A motor that ends at 1 is not held at 3."""
+    """A constant outside the range is refused."""
     with pytest.raises(MapError, match=r"'foot_4/motor' cannot hold 3: it reaches from -1 to 1"):
         grown(rules={"foot_*": Hold(3.0)})
     with pytest.raises(MapError, match="cannot hold 3"):
@@ -142,31 +142,31 @@ def test_what_a_feature_cannot_be_is_not_held() -> None:
 
 
 def test_a_pattern_that_fits_nothing_is_unknown() -> None:
-    """A slip in a name is found before anything is trained."""
+    """A pattern that matches no feature is refused."""
     with pytest.raises(UnknownName, match=r"matches 'fot_1/motor'\. Did you mean 'foot_1/motor'"):
         grown(rules={"fot_1/motor": "learn"})
 
 
 def test_a_pattern_that_changes_nothing_is_refused() -> None:
-    """Who writes that the hips are to be learned shall not find them copied."""
+    """A pattern whose features all have other rules is refused."""
     with pytest.raises(MapError, match=r"The rule 'hip_\*' changes nothing"):
         grown(rules={"hip_*": "learn"})
 
 
 def test_a_word_that_is_no_rule_is_refused() -> None:
-    """The message knows the nearest word."""
+    """The message suggests the nearest word."""
     with pytest.raises(MapError, match=r"No rule matches 'lern'. Did you mean 'learn'"):
         grown(rules={"foot_*": "lern"})
 
 
 def test_a_partner_that_is_not_there_is_unknown() -> None:
-    """The message knows the nearest name."""
+    """The message suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"No source action feature .* Did you mean 'ankle_1/mot"):
         grown(rules={"foot_1/motor": "copy ankle_1/moter"})
 
 
 def test_units_are_not_mixed() -> None:
-    """0.1 rad is not 0.1 m, whatever the name; a scale says that somebody thought of it."""
+    """Features with different units need a scale."""
     sides = pendulum_observation(), pendulum_observation(unit="deg")
     motors = pendulum_action(), pendulum_action()
     with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot copy .* hinge/angle \[deg\]"):
@@ -184,7 +184,7 @@ def test_units_are_not_mixed() -> None:
 
 
 def test_blocks_of_different_shapes_are_no_partners() -> None:
-    """A picture is not cut to size in passing."""
+    """Blocks of different shapes are refused."""
     small = Layout((Feature("eye", "1", 0.0, 1.0, shape=(2, 3)),))
     large = Layout((Feature("eye", "1", 0.0, 1.0, shape=(4, 3)),))
     with pytest.raises(MapError, match=r"'eye' has the shape \(2, 3\) and cannot copy"):
@@ -192,7 +192,7 @@ def test_blocks_of_different_shapes_are_no_partners() -> None:
 
 
 def test_bodies_with_nothing_in_common_are_refused() -> None:
-    """The message says what each has and what to write."""
+    """The message lists the features of both bodies and an example of a rule."""
     with pytest.raises(MapError, match="These observation spaces cannot be mapped") as caught:
         BodyMap.between(pendulum_observation(), ant_observation(), pendulum_action(), ant_action())
     message = str(caught.value)
@@ -203,7 +203,7 @@ def test_bodies_with_nothing_in_common_are_refused() -> None:
 
 
 def test_a_body_without_motors_is_refused_too() -> None:
-    """There is nothing to copy, so the example holds."""
+    """Without features to copy, the example is "hold"."""
     with pytest.raises(MapError, match=r"source action features are none.*: 'hold'"):
         BodyMap.between(
             pendulum_observation(), pendulum_observation(), Layout(()), pendulum_action()
@@ -211,7 +211,7 @@ def test_a_body_without_motors_is_refused_too() -> None:
 
 
 def test_strangers_may_be_mapped_by_hand() -> None:
-    """A stated rule for each feature is a map, even if all of it is to be learned."""
+    """Bodies without a common name can be mapped by explicit rules."""
     built = BodyMap.between(
         pendulum_observation(),
         pendulum_observation(),
@@ -223,7 +223,7 @@ def test_strangers_may_be_mapped_by_hand() -> None:
 
 
 def test_equal_torque_is_a_scale() -> None:
-    """A motor twice as strong is driven half as hard."""
+    """A motor of twice the gain gets half the action."""
     weak, strong = pendulum_action(100.0), pendulum_action(200.0)
     sides = pendulum_observation(), pendulum_observation()
     assert BodyMap.between(*sides, weak, strong).action[0].rule == Copy("slide/motor")
@@ -236,14 +236,14 @@ def test_equal_torque_is_a_scale() -> None:
 
 
 def test_a_force_is_no_torque() -> None:
-    """Only gains of one unit can be made equal."""
+    """Only gains of one unit can be converted."""
     sides = pendulum_observation(), pendulum_observation()
     with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
         BodyMap.between(*sides, pendulum_action(), pendulum_action(unit="N·m"), units="torque")
 
 
 def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
-    """Where both are silent about what they do, the numbers are all there is."""
+    """Where both gains are unknown, the scale is 1."""
     silent = Layout((motor("slide", 1.0, ""),))
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
@@ -252,7 +252,7 @@ def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
 
 @pytest.mark.parametrize("rule", [{"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None])
 def test_a_rule_of_another_type_is_refused_in_a_sentence(rule: Any) -> None:
-    """A table of TOML is no rule in Python."""
+    """A dictionary is not a rule."""
     with pytest.raises(MapError, match=r"The rule 'foot_1/motor' is .*: give 'zero', 'hold'"):
         BodyMap.between(
             ant_observation(),

@@ -1,4 +1,4 @@
-"""The four rules, their words and their arithmetic."""
+"""The four rules, their text and their arithmetic."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from shapechanger.transfer.body_map.rules import (
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
 def test_a_scale_that_cannot_be_undone_is_refused(scale: float) -> None:
-    """A map is inverted by dividing by its scales."""
+    """Scales of zero, infinity and NaN are refused."""
     with pytest.raises(MapError, match="'hip/angle' must be finite and not zero"):
         Copy("hip/angle", scale)
 
 
 def test_a_value_that_is_no_number_is_refused() -> None:
-    """A body that senses NaN acts on nothing."""
+    """Constants must be finite."""
     with pytest.raises(MapError, match="must be finite, got nan"):
         Hold(math.nan)
 
@@ -43,7 +43,7 @@ def test_a_value_that_is_no_number_is_refused() -> None:
     ],
 )
 def test_each_rule_has_words(rule: Rule, words: str) -> None:
-    """A table of rules is read by people."""
+    """`describe_rule` returns a text for each rule."""
     assert describe_rule(rule) == words
 
 
@@ -57,7 +57,7 @@ def test_each_rule_has_words(rule: Rule, words: str) -> None:
     ],
 )
 def test_two_rules_in_a_row_are_one(inner: Rule, result: Rule) -> None:
-    """Scales multiply, and what is constant stays constant."""
+    """Scales multiply, and constants are scaled."""
     assert compose_rules(Copy("shin", -2.0), inner) == result
 
 
@@ -75,12 +75,12 @@ def test_two_rules_in_a_row_are_one(inner: Rule, result: Rule) -> None:
 def test_stars_stand_for_what_the_wildcards_fitted(
     template: str, pattern: str, name: str, result: str
 ) -> None:
-    """One line of a map serves four legs."""
+    """Stars of a template are replaced in order."""
     assert expand_template(template, pattern, name) == result
 
 
 @pytest.mark.parametrize("pattern", ["foot_2/motor", "*_*/motor"])
 def test_as_many_stars_as_wildcards(pattern: str) -> None:
-    """A star with nothing to stand for is a slip of the pen."""
+    """A template with more or fewer stars than wildcards is refused."""
     with pytest.raises(MapError, match="must have a star for each wildcard"):
         expand_template("ankle_*/motor", pattern, "foot_2/motor")

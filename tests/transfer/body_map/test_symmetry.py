@@ -1,4 +1,4 @@
-"""Symmetries of a body, and the mirror in particular."""
+"""Symmetries of a body, and its mirror image."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from tests.transfer.body_map.bodies import (
 
 
 def ant_mirror() -> Symmetry:
-    """The ant's left and right exchanged."""
+    """The left-right mirror of the ant."""
     return mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
 
 
 def legs(*names: str, low: float = -1.0, high: float = 1.0) -> Layout:
-    """A layout of like features."""
+    """Return a layout of features with equal ranges."""
     return Layout(tuple(Feature(name, "1", low, high) for name in names))
 
 
 def test_the_mirror_of_an_ant() -> None:
-    """Worked out by hand: y turns, axial x and z turn, hips turn, ankles do not."""
+    """Worked out by hand: y and axial x and z are negated, hips too, ankles not."""
     taken = dict(zip(ant_observation().names, ant_mirror().observation, strict=True))
     assert taken["torso/z"] == Copy("torso/z")
     assert [taken[f"torso/{q}"].scale for q in ("qw", "qx", "qy", "qz")] == [1, -1, 1, -1]
@@ -71,14 +71,14 @@ def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
 
 
 def test_two_mirrors_are_none() -> None:
-    """Left becomes right becomes left."""
+    """The mirror of the mirror is the identity."""
     once = BodyMap.identity(ant_observation(), ant_action()).with_symmetry(ant_mirror())
     assert once.then(once) == BodyMap.identity(ant_observation(), ant_action())
     assert ant_mirror().inverse() == ant_mirror()
 
 
 def test_a_turned_policy_is_equivariant() -> None:
-    """With g the turn of a four-legged body, the map makes of p the policy g⁻¹ p(g o)."""
+    """With g a quarter turn, the map makes of a policy p the policy g⁻¹ p(g o)."""
     names = ("a", "b", "c", "d")
     turn = {name: Copy(names[(i + 1) % 4], -1.0 if i == 0 else 1.0) for i, name in enumerate(names)}
     symmetry = Symmetry.of(legs(*names), legs(*names), observation=turn, action=turn)
@@ -91,7 +91,7 @@ def test_a_turned_policy_is_equivariant() -> None:
 
 
 def test_the_symmetry_of_either_body_will_do() -> None:
-    """Mirrored before or after the body changes, the map is the same."""
+    """The symmetry of the source and that of the target give the same map."""
     there = BodyMap.between(
         ant_observation(),
         ant_observation(feet=True),
@@ -126,13 +126,13 @@ def test_the_symmetry_of_a_third_body_is_refused() -> None:
 def test_what_is_no_signed_permutation_is_refused(
     changes: Mapping[str, Copy], message: str
 ) -> None:
-    """A symmetry loses nothing and stretches nothing."""
+    """Scales other than 1 and -1, and two copies of one feature, are refused."""
     with pytest.raises(MapError, match=message):
         Symmetry.of(legs("a", "b"), legs("a"), observation=changes)
 
 
 def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
-    """A slip in a name is found, and so is a rule too few."""
+    """Unknown names and missing rules are refused."""
     with pytest.raises(UnknownName, match="No feature matches 'hip'"):
         Symmetry.of(legs("hop"), legs("a"), observation={"hip": Copy("hop")})
     with pytest.raises(UnknownName, match="No action feature matches 'b'"):
@@ -142,7 +142,7 @@ def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
 
 
 def test_only_like_features_change_places() -> None:
-    """An angle does not stand for a length, nor a strong motor for a weak one."""
+    """Features that differ in unit, shape or gain cannot swap."""
     mixed = Layout((Feature("a", "m"), Feature("b", "rad")))
     swap = {"a": Copy("b"), "b": Copy("a")}
     with pytest.raises(MapError, match="their unit is 'm' and 'rad'"):
@@ -150,7 +150,7 @@ def test_only_like_features_change_places() -> None:
 
 
 def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
-    """A wrong sign shows where the stops of a joint are not symmetric."""
+    """Features whose ranges are not mirror images cannot swap."""
     with pytest.raises(MapError, match=r"'ankle_1/angle' reaches from 0.52.* no such symmetry"):
         mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=["hip_*", "ankle_*"])
 
@@ -166,7 +166,7 @@ def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
 def test_an_element_that_is_not_there_is_unknown(
     swap: dict[str, str], flip: list[str], message: str
 ) -> None:
-    """A mirror is described by names, and a slip is found."""
+    """Unknown elements are refused."""
     with pytest.raises(UnknownName, match=message):
         mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
 
@@ -185,13 +185,13 @@ def test_an_element_that_is_not_there_is_unknown(
 def test_a_mirror_that_is_none_is_refused(
     swap: dict[str, str], flip: list[str], message: str
 ) -> None:
-    """Each element has one partner, and what flips on one side flips on the other."""
+    """Contradicting pairs, and pairs of which one element flips, are refused."""
     with pytest.raises(MapError, match=message):
         mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
 
 
 def test_a_picture_has_no_mirror_by_name() -> None:
-    """Turning a picture is more than a sign."""
+    """Blocks cannot be mirrored."""
     seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
     with pytest.raises(MapError, match="'eye' is a block of numbers"):
         mirror(seeing, pendulum_action())

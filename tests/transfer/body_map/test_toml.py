@@ -1,4 +1,4 @@
-"""Body maps as text."""
+"""Body maps as TOML."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ otherwise = { hold = 0.1 }
 
 
 def test_a_person_can_write_a_map() -> None:
-    """The example of the documentation does what it says."""
+    """The example of the documentation has the documented rules."""
     built = BodyMap.from_toml(EXAMPLE, *GROWN)
     rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
     assert rules["torso/vx"] == Copy("torso/vx", 0.5)
@@ -45,12 +45,12 @@ def test_a_person_can_write_a_map() -> None:
 
 
 def test_an_empty_text_is_a_map_by_name() -> None:
-    """What is not said has a default."""
+    """All keys have defaults."""
     assert BodyMap.from_toml("", *GROWN) == BodyMap.between(*GROWN)
 
 
 def test_units_come_from_the_text() -> None:
-    """A stronger motor is driven less hard."""
+    """`units = "torque"` scales actions by the gains."""
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.from_toml(
         'units = "torque"', *sides, pendulum_action(100.0), pendulum_action(200.0)
@@ -68,7 +68,7 @@ def test_units_come_from_the_text() -> None:
     ],
 )
 def test_what_is_written_is_read_again(built: BodyMap) -> None:
-    """The text holds the rules to the last bit."""
+    """TOML round trips bitwise."""
     layouts = (
         built.source_observation,
         built.target_observation,
@@ -79,7 +79,7 @@ def test_what_is_written_is_read_again(built: BodyMap) -> None:
 
 
 def test_the_text_is_short() -> None:
-    """A partner of the same name needs no line."""
+    """Partners of the same name have no line."""
     text = BodyMap.between(*GROWN, rules={"foot_1/motor": "learn"}).to_toml()
     assert text.splitlines() == [
         'units = "same"',
@@ -94,7 +94,7 @@ def test_the_text_is_short() -> None:
 
 
 def test_odd_names_survive() -> None:
-    """Quotes, backslashes, umlauts and control characters are written as TOML wants them."""
+    """Quotes, backslashes, umlauts and control characters are escaped."""
     names = ('a"b', "a\\b", "Größe µ", "tab\t", "del\x7f", "x[0]")
     layout = Layout(tuple(Feature(name, "1") for name in (*names, "z")))
     less = Layout((Feature("z", "1"),))
@@ -104,7 +104,7 @@ def test_odd_names_survive() -> None:
 
 @pytest.mark.parametrize(("of", "feet"), [("", (False, True)), ('of = "target"', (True, False))])
 def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -> None:
-    """The symmetry is that of the source, or of the target if the text says so."""
+    """`[symmetry]` mirrors the source or the target."""
     layouts = (
         *(ant_observation(feet=f) for f in feet),
         *(ant_action(feet=f) for f in feet),
@@ -138,14 +138,14 @@ def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -
     ],
 )
 def test_wrong_text_is_explained(text: str, message: str) -> None:
-    """One sentence with what exists and the nearest spelling."""
+    """Errors name the key, and suggest the nearest spelling."""
     with pytest.raises(MapError) as caught:
         BodyMap.from_toml(text, *GROWN)
     assert message in str(caught.value)
 
 
 def test_a_name_that_is_not_there_is_unknown() -> None:
-    """Names in a text are checked as those in a program."""
+    """Unknown feature names are refused."""
     with pytest.raises(UnknownName, match="Did you mean 'foot_1/motor'"):
         BodyMap.from_toml('[action]\n"fot_1/motor" = "zero"', *GROWN)
     with pytest.raises(UnknownName, match="No target action feature"):

@@ -22,7 +22,6 @@ from shapechanger.transfer.methods.evolution import bodies_between
 from shapechanger.transfer.methods.kickstart import MappedTeacher
 from shapechanger.transfer.methods.shuffled_map import shuffle
 from shapechanger.transfer.plan import Run, TransferTask
-from shapechanger.transfer.runs import policy_path
 from shapechanger.transfer.study import Study, run_study
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
 
@@ -33,7 +32,7 @@ _LEARNING = ("fine-tune", "frozen-trunk", "kickstart", "evolution")
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
-    """A tiny study of the methods that learn on the target, and its folder."""
+    """A small study of the methods that learn on the target, and its folder."""
     out = tmp_path_factory.mktemp("methods") / "study"
     plan = tiny_plan(_DEEP, arms=("scratch", *_LEARNING), steps=128, source_steps=32)
     return run_study(plan, out, executor=Serial()), out
@@ -41,11 +40,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
     _, out = study
-    return dict(load_policy(policy_path(out, Run(kind, 0))).model.policy.state_dict())
+    return dict(load_policy(Run(kind, 0).policy_file(out)).model.policy.state_dict())
 
 
 def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
-    """So that they can be compared; every arm has a summary."""
+    """Every arm is evaluated at the steps of scratch and has a summary."""
     made, _ = study
     for kind in ("scratch", *_LEARNING):
         assert [e.steps for e in made.of(kind)[0].curve] == [0, 32, 64, 96, 128], kind
@@ -53,14 +52,14 @@ def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
 
 
 def test_they_start_where_the_source_policy_does(study: tuple[Study, Path]) -> None:
-    """All but kickstart, which starts with a new policy."""
+    """All methods but kickstart start with the source policy."""
     made, _ = study
     starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
     assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]
 
 
 def test_a_frozen_trunk_stays(study: tuple[Study, Path]) -> None:
-    """The second layer is the source's, and all others have learned."""
+    """The second layer equals the source's, and all others have changed."""
     source, frozen = _weights(study, "source"), _weights(study, "frozen-trunk")
     tuned = _weights(study, "fine-tune")
     trunk = "mlp_extractor.policy_net.2.weight"
@@ -74,7 +73,7 @@ def test_a_frozen_trunk_stays(study: tuple[Study, Path]) -> None:
 
 
 def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It comes nearer to the source policy's actions than the same training without that weight."""
+    """Distillation brings the policy closer to the source policy's actions."""
     settings = msgspec.structs.replace(
         TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
     )
@@ -88,7 +87,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         run_study(plan, out, executor=Serial())
 
         def acts(kind: str, out: Path = out) -> Any:
-            return load_policy(policy_path(out, Run(kind, 0))).act
+            return load_policy(Run(kind, 0).policy_file(out)).act
 
         shown = MappedTeacher(acts("source"), plan.body_map)(observations)
         away.append(float(np.abs(acts("kickstart")(observations) - shown).mean()))
@@ -96,7 +95,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_actions_to_be_learned_are_not_taught() -> None:
-    """A motor that the source lacks has no teacher, unless a rule gives it one."""
+    """Actions with the rule Learn are not distilled."""
     source, target = ANT.make(), EXTENDED.make()
     layouts = [
         getattr(env.unwrapped, f"{side}_layout")
@@ -112,7 +111,7 @@ def test_actions_to_be_learned_are_not_taught() -> None:
 
 
 def test_bodies_between_grow() -> None:
-    """From a small pole to a big one in equal steps; the two ends are left out."""
+    """Bodies between two pendulums grow in equal steps, without the two ends."""
     lengths = []
     for ref in bodies_between(SMALL, BIG, 2):
         made = ref.make()
@@ -123,7 +122,7 @@ def test_bodies_between_grow() -> None:
 
 
 def test_bodies_between_may_have_other_spaces() -> None:
-    """An ant with weak feet lies between an ant without and one with."""
+    """Bodies between an ant and an ant with feet have feet."""
     (between,) = bodies_between(ANT, EXTENDED, 1)
     made = between.make()
     assert made.action_space.shape == (12,)
@@ -135,7 +134,7 @@ def test_bodies_between_may_have_other_spaces() -> None:
 
 
 def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
-    """Ant to ExtendedAnt by evolution, with a rule of the study for the new motors."""
+    """Evolution from Ant to ExtendedAnt, with a rule for the new motors."""
     plan = tiny_plan(
         TINY_NORMALISED,
         task=TransferTask(ANT, EXTENDED),
@@ -149,7 +148,7 @@ def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
 
 
 def test_bodies_of_two_families_have_no_path() -> None:
-    """Nor has an env without a family."""
+    """Envs of two families, or of none, are refused."""
     with pytest.raises(StudyError, match="not of one family"):
         bodies_between(ANT, BIG, 1)
     finger = EnvRef("shapechanger/Finger-v1")
@@ -167,20 +166,20 @@ def test_bodies_of_two_families_have_no_path() -> None:
     ],
 )
 def test_clones_are_refused(arm: str, needs: str) -> None:
-    """Before anything is recorded: these methods are not for cloning."""
+    """Methods for Stable-Baselines3 refuse cloning when the study is planned."""
     cars = TransferTask(EnvRef("shapechanger/Car-v1"), EnvRef("shapechanger/Tank-v1"))
     with pytest.raises(StudyError, match=f"{arm} needs {needs}"):
         tiny_plan(learner_settings("cloning"), task=cars, arms=("scratch", arm))  # type: ignore[arg-type]
 
 
 def test_a_network_without_a_trunk_is_refused() -> None:
-    """One hidden layer is both the first and the last."""
+    """frozen-trunk needs two hidden layers."""
     with pytest.raises(StudyError, match="at least 2 hidden layers"):
         tiny_plan(TINY, arms=("scratch", "frozen-trunk"))
 
 
 def test_a_shuffled_map_has_the_same_rules() -> None:
-    """Each at another entry, of the same shape; those that copy nothing stay."""
+    """Rules are exchanged between entries of one shape; constants stay."""
     source, target = ANT.make(), EXTENDED.make()
     layouts = [
         getattr(env.unwrapped, f"{side}_layout")
@@ -199,7 +198,7 @@ def test_a_shuffled_map_has_the_same_rules() -> None:
 
 
 def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) -> None:
-    """It is an arm as any other, and does not start where fine-tuning does."""
+    """shuffled-map does not start where fine-tuning does."""
     made, _ = study
     plan = tiny_plan(_DEEP, arms=("scratch", "shuffled-map"), steps=32, source_steps=32)
     shuffled = run_study(plan, tmp_path / "study", executor=Serial())
@@ -208,7 +207,7 @@ def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) 
 
 
 def test_a_randomised_source_is_one_of_bodies_between(tmp_path: Path) -> None:
-    """Its env is noted; bodies of other spaces are refused."""
+    """The env is written to the run's folder; bodies of other spaces are refused."""
     plan = tiny_plan(TINY, steps=64, source_steps=64, arms=("scratch", "randomised"))
     study = run_study(plan, tmp_path, executor=Serial())
     assert study.curves("randomised").n_evals == 1

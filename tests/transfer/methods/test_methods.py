@@ -1,4 +1,4 @@
-"""Methods by name: shipped ones, those of plug-ins, and what is refused."""
+"""Loading methods by name: shipped, installed and registered ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Patient(Method):
 
 @pytest.fixture
 def no_other(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[Method]]:
-    """An empty registry, as at the start of a program."""
+    """An empty registry."""
     found: dict[str, type[Method]] = {}
     monkeypatch.setattr(methods, "_registered", found)
     return found
@@ -45,7 +45,7 @@ def no_other(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[Method]]:
 def plugin(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_other: dict[str, type[Method]]
 ) -> str:
-    """Name of a method in a module that nobody has imported."""
+    """Name of a method in a module that is not imported yet."""
     (tmp_path / "my_methods.py").write_text(_PLUGIN)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -55,7 +55,7 @@ def plugin(
 
 @pytest.mark.parametrize("name", method_names())
 def test_shipped_methods_have_their_names(name: str) -> None:
-    """Each is found, says its name and what it does; all but the simplest name a paper."""
+    """Each shipped method loads under its name and has a docstring."""
     method = load_method(name)
     assert method.name == name
     assert type(method).__doc__
@@ -63,7 +63,7 @@ def test_shipped_methods_have_their_names(name: str) -> None:
 
 
 def test_a_name_that_does_not_exist(no_other: dict[str, type[Method]]) -> None:
-    """The nearest one is suggested, and a module that is missing is no crash."""
+    """The message suggests the nearest name; a missing module is an UnknownName."""
     with pytest.raises(UnknownName, match="'kickstart'"):
         load_method("kickstarts")
     with pytest.raises(UnknownName, match="no_such_module:patient"):
@@ -71,7 +71,7 @@ def test_a_name_that_does_not_exist(no_other: dict[str, type[Method]]) -> None:
 
 
 def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
-    """Two methods of one name would share a folder; the same class again is no other."""
+    """A second method of one name is refused; the same class again is not."""
 
     class First(Method):
         name = "mine"
@@ -99,7 +99,7 @@ def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
 def test_methods_of_other_packages(
     monkeypatch: pytest.MonkeyPatch, no_other: dict[str, type[Method]], plugin: str
 ) -> None:
-    """An entry point is a method's name; one that is no method is refused."""
+    """Methods load from entry points; other objects are refused."""
     points = {
         "patient": EntryPoint("patient", "my_methods:Patient", methods._GROUP),
         "broken": EntryPoint("broken", "pathlib:Path", methods._GROUP),
@@ -117,7 +117,7 @@ def test_methods_of_other_packages(
 
 
 def test_a_method_of_ones_own_is_an_arm(plugin: str, tmp_path: Path) -> None:
-    """In other processes too, which import its module; it does what scratch does."""
+    """A plug-in method runs in worker processes, with the numbers of scratch."""
     plan = tiny_plan(arms=("scratch", plugin), steps=32)
     study = run_study(plan, tmp_path / "study", executor=Processes(1))
     assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", plugin}
@@ -129,7 +129,7 @@ def test_a_method_of_ones_own_is_an_arm(plugin: str, tmp_path: Path) -> None:
 
 
 def test_a_study_grows_by_arms(tmp_path: Path) -> None:
-    """Runs that have ended count, and a smaller study in a larger one's folder is refused."""
+    """A study can be resumed with more arms, and not with fewer."""
     first = tiny_plan(steps=32)
     run_study(first, tmp_path / "study", executor=Serial())
     grown = tiny_plan(steps=32, arms=(*ARMS, "kickstart"))
@@ -139,7 +139,7 @@ def test_a_study_grows_by_arms(tmp_path: Path) -> None:
 
 
 def test_seeds_do_not_depend_on_other_arms() -> None:
-    """Nor on their order; those of a plug-in follow from its name."""
+    """Seeds follow from the name of a method, not from the other arms."""
     small, large = tiny_plan(), tiny_plan(arms=("scratch", "kickstart", "fine-tune"))
     assert small.seed_of(Run("fine-tune", 1)) == large.seed_of(Run("fine-tune", 1))
     kinds = ("scratch", "fine-tune", "kickstart", "evolution", "a:b")
@@ -147,7 +147,7 @@ def test_seeds_do_not_depend_on_other_arms() -> None:
 
 
 def test_a_method_must_say_what_it_does() -> None:
-    """The base class does nothing."""
+    """`Method.learn` raises NotImplementedError."""
     run: Any = None
     with pytest.raises(NotImplementedError):
         Method().learn(run)

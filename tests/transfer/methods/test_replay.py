@@ -13,7 +13,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.sb3 import train
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import OffPolicySettings, resolve_learner
 from shapechanger.transfer.methods.replay import (
     DomainClassifiers,
@@ -37,7 +37,7 @@ SHORT: dict[str, Any] = {
 
 
 def short(**more: Any) -> OffPolicySettings:
-    """Settings of SAC that learn nothing in a second."""
+    """Return settings of SAC for trainings of a second."""
     _, settings = resolve_learner("sac", {**SHORT, **more})
     assert isinstance(settings, OffPolicySettings)
     return settings
@@ -45,7 +45,7 @@ def short(**more: Any) -> OffPolicySettings:
 
 @pytest.mark.parametrize("more", [{}, {"n_envs": 2}], ids=["one env", "two envs"])
 def test_a_study_with_both(tmp_path: Path, more: dict[str, Any]) -> None:
-    """Both are evaluated on the target at the steps at which scratch is."""
+    """Both methods are evaluated at the steps of scratch."""
     plan = tiny_plan(
         short(**more),
         steps=64,
@@ -59,7 +59,7 @@ def test_a_study_with_both(tmp_path: Path, more: dict[str, Any]) -> None:
 
 
 def test_corrections_are_of_what_differs() -> None:
-    """A step that only the source makes counts less, one of the target more, a common one 0."""
+    """Steps of the source alone are penalised, of the target alone rewarded."""
     torch.manual_seed(0)
     classifiers = DomainClassifiers(1, 1, learning_rate=3e-3)
 
@@ -80,8 +80,8 @@ def test_corrections_are_of_what_differs() -> None:
 
 
 def test_transitions_are_those_of_the_env() -> None:
-    """Each starts where the last one went, unless the episode ended."""
-    policy = train(SMALL, "sac", short(), 32, 0, on_evaluation=_ignore)
+    """Each transition starts where the last one ended, unless the episode ended."""
+    policy = Sb3Learner("sac", short()).train(SMALL, 32, 0, on_evaluation=_ignore)
     seen = collect(SMALL, policy, 50, 3)
     assert seen.observations.shape == seen.next_observations.shape == (50, 4)
     goes_on = ~seen.terminated[:-1]
@@ -94,7 +94,7 @@ def test_transitions_are_those_of_the_env() -> None:
 
 
 def test_mapped_transitions_are_those_of_the_target() -> None:
-    """In its sizes, with each number under its name."""
+    """Mapped transitions have the target's sizes, matched by name."""
     bodies = [EnvRef(f"shapechanger/{name}-v1").make() for name in ("Ant", "ExtendedAnt")]
     (seen, acts), (sees, does) = (layouts_of(body) for body in bodies)
     for body in bodies:
@@ -119,13 +119,13 @@ def test_mapped_transitions_are_those_of_the_target() -> None:
 
 @pytest.mark.parametrize("arm", ["prefilled-replay", "off-dynamics"])
 def test_learners_without_a_replay_buffer_are_refused(arm: str) -> None:
-    """PPO has none."""
+    """Both methods refuse PPO."""
     with pytest.raises(StudyError, match=f"{arm} needs a learner with a replay buffer"):
         tiny_plan(TINY, arms=("scratch", arm))
 
 
 def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
-    """Its classifiers compare numbers of the two bodies."""
+    """off-dynamics refuses other spaces and normalisation."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     with pytest.raises(StudyError, match="the same spaces"):
         tiny_plan(short(), task=ants, arms=("scratch", "off-dynamics"))

@@ -64,7 +64,7 @@ CASES = [
 
 
 def draw(case: Case, trials: int, rng: np.random.Generator) -> tuple[Array, Array, float]:
-    """Both arms of many studies, each of shape (trials, n_seeds), and the true ratio."""
+    """Return both arms of many studies, each of shape (trials, n_seeds), and the true ratio."""
     shape = (trials, case.n_seeds)
     spread = case.spread / 100.0
 
@@ -77,7 +77,7 @@ def draw(case: Case, trials: int, rng: np.random.Generator) -> tuple[Array, Arra
         return rng.lognormal(np.log(mean) - square / 2.0, np.sqrt(square), shape)
 
     def failures(mean: float) -> Array:
-        """One run in five stays at a tenth of what the others reach."""
+        """Areas of which one in five is a tenth of the others."""
         failed = rng.random(shape) < 0.2
         return np.where(failed, 0.1 * mean, rng.normal(mean, spread * mean, shape))
 
@@ -119,7 +119,7 @@ def bca(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array,
 
 
 def studentised(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Ours; NaN where there is none."""
+    """The package's interval; NaN where there is none."""
     estimates = [
         estimate_ratio(a, b, least=1e-9, too_small="-", rng=rng, n_resamples=N_RESAMPLES)
         for a, b in zip(arms, scratches, strict=True)
@@ -154,7 +154,7 @@ METHODS: dict[str, Callable[[Array, Array, np.random.Generator], tuple[Array, Ar
 
 
 def measure(case: Case, trials: int, seed: int) -> dict[str, Measured]:
-    """Every method on the same studies."""
+    """Measure every method on the same studies."""
     rng = np.random.default_rng(seed)
     arms, scratches, truth = draw(case, trials, rng)
     measured: dict[str, Measured] = {}
@@ -167,7 +167,7 @@ def measure(case: Case, trials: int, seed: int) -> dict[str, Measured]:
 
 
 def row(case: Case, measured: dict[str, Measured]) -> str:
-    """One row of the table in docs/statistics.md."""
+    """Return a row of the table in docs/statistics.md."""
     cells = (f"{100 * m.coverage:.1f} · {m.width:.2f}" for m in measured.values())
     return f"| {case.data} | {case.spread} | {case.n_seeds} | {' | '.join(cells)} |"
 

@@ -1,4 +1,4 @@
-"""Forward transfer, against hand numbers and at its edges."""
+"""Forward transfer: values by hand, and edge cases."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ STEPS = np.array([0.0, 10.0, 20.0])
 
 
 def curves(*rows: tuple[float, float, float]) -> LearningCurves:
-    """Scores of a few seeds."""
+    """Return scores of a few seeds."""
     return LearningCurves(STEPS, np.array(rows))
 
 
 def transfer(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
-    """`forward_transfer` with few resamples."""
+    """Return `forward_transfer` with few resamples."""
     return forward_transfer(arm, scratch, rng=np.random.default_rng(0), n_resamples=500)
 
 
@@ -38,7 +38,7 @@ def test_forward_transfer() -> None:
 
 
 def test_interval() -> None:
-    """A bootstrap interval around the value, once there are seeds enough, and no end above 1."""
+    """With enough seeds there is a bootstrap interval, whose ends are at most 1."""
     heights = np.linspace(0.0, 0.3, 5)
     arm = curves(*((h, 0.3 + h, 0.6 + h) for h in heights))
     scratch = curves(*((h, h, h) for h in heights))
@@ -54,12 +54,12 @@ def test_interval() -> None:
 
 
 def test_forward_transfer_in_total_steps() -> None:
-    """Half the budget on the source leaves areas of 0.1 and 0.2: (0.15 - 0.2) / (1 - 0.2)."""
+    """With half the budget on the source: (0.15 - 0.2) / (1 - 0.2)."""
     assert transfer(in_total_steps(ARM, 10, 0.0), SCRATCH).value == pytest.approx(-0.0625)
 
 
 def test_perfect_from_the_start_is_1() -> None:
-    """An arm that can do everything at once wins all there is."""
+    """An arm whose scores are all 1 has a forward transfer of 1."""
     assert transfer(curves((1.0, 1.0, 1.0)), SCRATCH).value == pytest.approx(1.0)
 
 
@@ -67,7 +67,7 @@ def test_perfect_from_the_start_is_1() -> None:
     ("height", "is_defined"), [(1.0, False), (0.995, False), (0.98, True), (0.0, True)]
 )
 def test_headroom_is_needed(height: float, is_defined: bool) -> None:
-    """Where scratch leaves nothing to be won, a share of it is undefined and says so."""
+    """Without headroom it is undefined, with a note."""
     estimate = transfer(ARM, curves((height, height, height)))
     assert (estimate.value is not None) is is_defined
     if not is_defined:
@@ -76,7 +76,7 @@ def test_headroom_is_needed(height: float, is_defined: bool) -> None:
 
 @pytest.mark.parametrize("outside", [-0.1, 1.1])
 def test_scores_must_be_clipped(outside: float) -> None:
-    """Raw returns, or scores above 1, would give a number without a meaning."""
+    """Values outside [0, 1] are refused."""
     wild = curves((0.0, 0.5, outside))
     for arm, scratch in ((wild, SCRATCH), (ARM, wild), (in_total_steps(ARM, 5, outside), SCRATCH)):
         with pytest.raises(StudyError, match="clip=True"):

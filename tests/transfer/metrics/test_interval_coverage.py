@@ -1,4 +1,4 @@
-"""The numbers about coverage that docstrings and docs/statistics.md claim, measured."""
+"""The coverage that docstrings and docs/statistics.md state, measured."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ ARM, SCRATCH = (0.8, 0.1), (0.5, 0.1)
 
 
 def draw(n_seeds: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Scores of both arms in many studies, each of shape (TRIALS, n_seeds)."""
+    """Return scores of both arms in many studies, each of shape (TRIALS, n_seeds)."""
     rng = np.random.default_rng(seed)
     return rng.normal(*ARM, (TRIALS, n_seeds)), rng.normal(*SCRATCH, (TRIALS, n_seeds))
 
 
 def coverage(estimates: list[Estimate], truth: float) -> float:
-    """Share of the intervals that hold the truth; all of them must exist."""
+    """Return the share of the intervals that contain the true value; all must exist."""
     held = [e.low <= truth <= e.high for e in estimates if e.low is not None and e.high is not None]
     assert len(held) == TRIALS
     return sum(held) / TRIALS
@@ -35,7 +35,7 @@ def coverage(estimates: list[Estimate], truth: float) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("spread", [0.1, 0.3], ids=["equal spread", "threefold spread"])
 def test_welch_covers_what_it_says_at_five_seeds(spread: float) -> None:
-    """A 95 % Welch interval over five seeds holds the truth 95 times in 100, within 2."""
+    """A 95 % Welch interval over five seeds covers 95 ± 2 %."""
     arms, scratches = draw(n_seeds=5, seed=0)
     arms = ARM[0] + (arms - ARM[0]) * spread / ARM[1]
     estimates = [estimate_difference(a, b) for a, b in zip(arms, scratches, strict=True)]
@@ -44,7 +44,7 @@ def test_welch_covers_what_it_says_at_five_seeds(spread: float) -> None:
 
 @pytest.mark.slow
 def test_percentile_bootstrap_covers_87_percent_at_five_seeds() -> None:
-    """Why differences have Welch's interval: the usual bootstrap is too narrow, 87 % for 95 %."""
+    """A 95 % percentile bootstrap over five seeds covers 87 %."""
     arms, scratches = draw(n_seeds=5, seed=1)
     interval = stats.bootstrap(
         (arms, scratches),
@@ -61,7 +61,7 @@ def test_percentile_bootstrap_covers_87_percent_at_five_seeds() -> None:
 
 
 def table() -> dict[Case, list[Measured]]:
-    """The rows of the table in docs/statistics.md."""
+    """Return the rows of the table in docs/statistics.md."""
     rows: dict[Case, list[Measured]] = {}
     for line in PAGE.read_text(encoding="utf-8").splitlines():
         data, *cells = (cell.strip() for cell in line.strip("|").split("|"))
@@ -75,12 +75,12 @@ def table() -> dict[Case, list[Measured]]:
 
 
 def test_the_table_holds_every_case() -> None:
-    """No row that was measured is kept from the reader."""
+    """The table has a row for each case."""
     assert list(table()) == CASES
 
 
 def test_ratios_cover_what_the_page_says() -> None:
-    """94 to 96.5 % at 5 and 10 seeds, but for the last four rows; and BCa is always too narrow."""
+    """94 to 96.5 % at 5 and 10 seeds except in the last four rows; BCa always less."""
     methods = list(METHODS)
     rows = table()
     for case, measured in rows.items():
@@ -93,7 +93,7 @@ def test_ratios_cover_what_the_page_says() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(map(str, case)))
 def test_the_table_can_be_measured_again(case: Case) -> None:
-    """With other draws, each method covers what the table says, within four standard errors."""
+    """With other draws the coverage is within four standard errors of the table."""
     trials, of_table = 1500, 4000
     for found, claimed in zip(measure(case, trials, seed=1).values(), table()[case], strict=True):
         share = claimed.coverage

@@ -1,4 +1,4 @@
-"""Intervals: agreement with scipy, and honesty where there is nothing to say."""
+"""Intervals: agreement with scipy, and samples without an interval."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def ratio(
     confidence: float = 0.95,
     n_resamples: int = 2000,
 ) -> Estimate:
-    """The ratio of two samples over a mean of at least 0.01, with few resamples."""
+    """Return `estimate_ratio` with few resamples and a least mean of 0.01."""
     return estimate_ratio(
         arm,
         scratch,
@@ -42,7 +42,7 @@ def ratio(
 
 @pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
 def test_welch_agrees_with_scipy(confidence: float) -> None:
-    """The six lines here are scipy's Welch test, which warns where these need not."""
+    """Ours equals scipy's interval; scipy's test also warns about samples without spread."""
     ours = estimate_difference(ARM, SCRATCH, confidence=confidence)
     theirs = stats.ttest_ind(ARM, SCRATCH, equal_var=False).confidence_interval(confidence)
     assert ours.method == "Welch's t"
@@ -59,7 +59,7 @@ def test_welch_by_hand() -> None:
 
 
 def test_welch_takes_one_arm_without_spread() -> None:
-    """Seeds that all hit the horizon leave the other arm's degrees of freedom."""
+    """Where one arm has no spread, the other gives the degrees of freedom."""
     estimate = estimate_difference(np.array([1.0, 2.0, 3.0]), np.zeros(5))
     half = float(stats.t.ppf(0.975, 2)) * np.sqrt(1.0 / 3.0)
     np.testing.assert_allclose([estimate.low, estimate.high], [2 - half, 2 + half])
@@ -105,7 +105,7 @@ def test_studentised_bootstrap_by_the_book(confidence: float, scratch: NDArray[n
 
 
 def test_many_seeds_make_the_ratio_normal() -> None:
-    """With two hundred seeds the interval is the textbook one, value ± 1.96 errors."""
+    """With 200 seeds the interval is that of a normal distribution, ± 1.96 errors."""
     rng = np.random.default_rng(1)
     arm, scratch = rng.normal(2.0, 0.2, 200), rng.normal(1.0, 0.1, 200)
     estimate = ratio(arm, scratch, n_resamples=10_000)
@@ -118,7 +118,7 @@ def test_many_seeds_make_the_ratio_normal() -> None:
 
 
 def test_same_generator_same_interval() -> None:
-    """The draws come from the generator that is passed and from nowhere else."""
+    """The given generator determines the resamples."""
     assert ratio(ARM, SCRATCH, seed=3) == ratio(ARM, SCRATCH, seed=3)
     assert ratio(ARM, SCRATCH, seed=3) != ratio(ARM, SCRATCH, seed=4)
 
@@ -138,7 +138,7 @@ def test_same_generator_same_interval() -> None:
 def test_no_interval_is_better_than_a_false_one(
     arm: NDArray[np.float64], scratch: NDArray[np.float64], why: str
 ) -> None:
-    """One seed, or no spread at all, leaves the point and a reason."""
+    """One seed, or no spread, gives a value without an interval and a note."""
     for estimate in (estimate_difference(arm, scratch), ratio(arm, scratch)):
         assert estimate.value is not None
         assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
@@ -146,7 +146,7 @@ def test_no_interval_is_better_than_a_false_one(
 
 
 def test_ratio_over_too_little_is_undefined() -> None:
-    """The reason is the caller's, who knows what was divided by."""
+    """Below `least` the ratio is undefined, with the caller's note."""
     assert ratio(ARM, np.array([0.02, -0.02])) == undefined("Undefined: too small.")
 
 
@@ -171,7 +171,7 @@ def test_ratio_over_too_little_is_undefined() -> None:
 def test_resamples_that_say_nothing_are_not_dropped(
     arm: NDArray[np.float64], scratch: NDArray[np.float64]
 ) -> None:
-    """Once they may fill a tail there is no interval; the point and a reason remain."""
+    """If unusable resamples may fill a tail there is no interval, but a note."""
     estimate = ratio(arm, scratch)
     assert estimate.value == pytest.approx(arm.mean() / scratch.mean())
     assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
@@ -180,7 +180,7 @@ def test_resamples_that_say_nothing_are_not_dropped(
 
 @pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
 def test_confidence_is_a_share(confidence: float) -> None:
-    """95 is not 0.95."""
+    """Confidences outside (0, 1) are refused."""
     with pytest.raises(StudyError, match=r"such as 0\.95"):
         estimate_difference(ARM, SCRATCH, confidence=confidence)
     with pytest.raises(StudyError, match=r"such as 0\.95"):
@@ -189,14 +189,14 @@ def test_confidence_is_a_share(confidence: float) -> None:
 
 @pytest.mark.parametrize(("confidence", "fewest"), [(0.9, 20), (0.95, 40), (0.99, 200)])
 def test_each_tail_needs_a_resample(confidence: float, fewest: int) -> None:
-    """Fewer cannot tell how far out the tail is."""
+    """Too few resamples for the confidence are refused."""
     assert ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest).value is not None
     with pytest.raises(StudyError, match=f"at least {fewest} resamples, got {fewest - 1}"):
         ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest - 1)
 
 
 def test_estimates_survive_json() -> None:
-    """Undefined is null on the wire, never NaN, which JSON does not have."""
+    """Undefined values are null in JSON, not NaN."""
     for estimate in (undefined("Undefined: because."), estimate_difference(ARM, SCRATCH)):
         assert msgspec.json.decode(msgspec.json.encode(estimate), type=Estimate) == estimate
     assert b'"value":null' in msgspec.json.encode(undefined("Undefined: because."))

@@ -1,4 +1,4 @@
-"""Learning curves: what they refuse, what they promise, and areas against hand numbers."""
+"""Learning curves: validation, interpolation, and areas by hand."""
 
 from __future__ import annotations
 
@@ -36,27 +36,27 @@ RISING = LearningCurves(STEPS, np.array([[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]))
     ],
 )
 def test_bad_curves_are_refused(steps: object, returns: object, message: str) -> None:
-    """A curve that is none is refused where it is built, with its reason."""
+    """Wrong shapes and values are refused with the reason."""
     with pytest.raises(StudyError, match=message):
         LearningCurves(steps, returns)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("source_steps", [-1.0, np.nan, np.inf])
 def test_source_steps_must_be_a_count(source_steps: float) -> None:
-    """Less than no source, or an endless one, cannot be counted."""
+    """Negative and infinite source steps are refused."""
     with pytest.raises(StudyError, match="source_steps"):
         in_total_steps(RISING, source_steps, 0.0)
 
 
 @pytest.mark.parametrize("floor", [np.nan, -np.inf])
 def test_floor_must_be_finite(floor: float) -> None:
-    """A floor of infinity would make every area infinite."""
+    """An infinite floor is refused."""
     with pytest.raises(StudyError, match="floor"):
         in_total_steps(RISING, 10, floor)
 
 
 def test_refusals_are_ours_and_pythons() -> None:
-    """Code that knows only Python can catch a refusal too."""
+    """StudyError is also a ValueError."""
     with pytest.raises(ShapechangerError):
         LearningCurves(np.array([1.0]), np.array([[1.0]]))
     with pytest.raises(ValueError, match="start at 0"):
@@ -64,7 +64,7 @@ def test_refusals_are_ours_and_pythons() -> None:
 
 
 def test_curves_are_copies() -> None:
-    """Whoever built the curves may go on using the arrays."""
+    """Later changes of the given arrays have no effect."""
     steps, returns = np.array([0.0, 1.0]), np.array([[1.0, 2.0]])
     curves = LearningCurves(steps, returns)
     steps[1], returns[0, 0] = 9.0, 9.0
@@ -83,7 +83,7 @@ def test_curves_are_copies() -> None:
     ids=["built", "copied", "pickled", "counted"],
 )
 def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
-    """Neither the fields nor the arrays change, not even after a trip between processes."""
+    """Fields and arrays are read-only, also in copies and pickles."""
     with pytest.raises(ValueError, match="read-only"):
         copied.returns[0, 0] = 1.0
     with pytest.raises(ValueError, match="read-only"):
@@ -94,30 +94,30 @@ def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
 
 
 def test_sizes_have_names() -> None:
-    """Seeds are rows and evaluations are columns."""
+    """Rows are seeds and columns are evaluations."""
     assert (RISING.n_seeds, RISING.n_evals, RISING.horizon) == (2, 3, 100.0)
 
 
 def test_last_steps() -> None:
-    """The end is a number of evaluations, not of steps."""
+    """`last_steps` returns the steps of the last evaluations."""
     np.testing.assert_array_equal(RISING.last_steps(2), [50.0, 100.0])
 
 
 @pytest.mark.parametrize("last_k", [-1, 0, 4])
 def test_last_steps_must_exist(last_k: int) -> None:
-    """Asking for more evaluations than there are says how many there are."""
+    """The message states how many evaluations there are."""
     with pytest.raises(StudyError, match="from 1 to 3"):
         RISING.last_steps(last_k)
 
 
 def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
-    """A value between two evaluations is on the line, one after the last is the last."""
+    """Values are linear between evaluations and constant after the last."""
     np.testing.assert_allclose(RISING.at([25.0, 100.0, 400.0]), [[0.25, 1, 1], [0.75, 0, 0]])
     np.testing.assert_allclose(RISING.at(25.0), [[0.25], [0.75]])
 
 
 def test_area_is_the_mean_height() -> None:
-    """Both a rise and a fall over the whole range have mean height one half."""
+    """A rise and a fall over the whole range both have the mean height 0.5."""
     np.testing.assert_allclose(RISING.auc(), [0.5, 0.5])
 
 
@@ -128,13 +128,13 @@ def test_area_weighs_uneven_evaluations() -> None:
 
 
 def test_one_evaluation_spans_no_area() -> None:
-    """An arm that is not trained has no learning curve."""
+    """The area of one evaluation is refused."""
     with pytest.raises(StudyError, match="no area"):
         LearningCurves(np.array([0.0]), np.array([[1.0]])).auc()
 
 
 def test_total_steps_jump_without_a_slope() -> None:
-    """The floor holds until the last source step and the first evaluation stands right after."""
+    """The floor holds until the last source step; the first evaluation follows at once."""
     total = in_total_steps(RISING, 30, floor=-2.0)
     just_before = np.nextafter(30.0, 0.0)
     np.testing.assert_allclose(
@@ -160,13 +160,13 @@ def test_total_steps_jump_without_a_slope() -> None:
     ],
 )
 def test_area_in_total_steps_is_exact(source_steps: int, rising: float, falling: float) -> None:
-    """The jump is a rectangle next to a trapezoid, wherever it falls."""
+    """The area is a rectangle and a trapezoid, wherever the jump is."""
     total = in_total_steps(RISING, source_steps, floor=-1.0)
     np.testing.assert_allclose(total.auc(), [rising, falling], rtol=1e-12)
 
 
 def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
-    """The formula equals a brute-force midpoint sum over the same curve."""
+    """The area equals a fine midpoint sum over the curve."""
     rng = np.random.default_rng(0)
     steps = np.array([0.0, 7.0, 20.0, 64.0])
     total = in_total_steps(LearningCurves(steps, rng.normal(size=(3, 4))), 13, floor=0.5)
@@ -175,13 +175,13 @@ def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
 
 
 def test_source_steps_count_once() -> None:
-    """Counting twice is a mistake, not a longer source."""
+    """Curves that already count source steps are refused."""
     with pytest.raises(StudyError, match="already count 30"):
         in_total_steps(in_total_steps(RISING, 30, 0.0), 30, 0.0)
 
 
 def test_comparison_needs_the_same_evaluations() -> None:
-    """Curves on other grids are refused, except an arm that was evaluated once."""
+    """Other evaluations are refused, except a single one."""
     other = LearningCurves(np.array([0.0, 50.0, 99.0]), np.zeros((1, 3)))
     with pytest.raises(StudyError, match="the steps must be the same"):
         check_comparable(other, RISING)
@@ -189,6 +189,6 @@ def test_comparison_needs_the_same_evaluations() -> None:
 
 
 def test_scratch_has_no_source() -> None:
-    """The arguments cannot be swapped without notice."""
+    """Scratch with source steps is refused."""
     with pytest.raises(StudyError, match="cannot count source steps"):
         check_comparable(RISING, in_total_steps(RISING, 30, 0.0))

@@ -1,4 +1,4 @@
-"""The summary: both counts, both units, and the way to a file and back."""
+"""The summary: both ways of counting steps, both units, and JSON."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ZERO_SHOT = LearningCurves(np.array([0.0]), np.array([[90.0], [110.0]]))
 def summary(
     arm: LearningCurves = ARM, reference: Reference = REFERENCE, source_steps: float = 10
 ) -> Summary:
-    """A summary with few resamples."""
+    """Return a summary with few resamples."""
     return summarise(
         SCRATCH,
         arm,
@@ -42,7 +42,7 @@ def summary(
 
 
 def estimates(measures: Measures) -> dict[str, Estimate]:
-    """The five estimates that are not times."""
+    """Return the five estimates that are not times."""
     return {
         "jumpstart": measures.jumpstart,
         "asymptotic_gain": measures.asymptotic_gain,
@@ -53,7 +53,7 @@ def estimates(measures: Measures) -> dict[str, Estimate]:
 
 
 def test_target_steps_by_hand() -> None:
-    """Gains of one half everywhere, and areas of 1 and 0.5."""
+    """Gains of 0.5, and areas of 1 and 0.5."""
     measured = summary().in_target_steps
     values = {name: estimate.value for name, estimate in estimates(measured).items()}
     assert values == pytest.approx(
@@ -70,7 +70,7 @@ def test_target_steps_by_hand() -> None:
 
 
 def test_total_steps_by_hand() -> None:
-    """Ten of twenty steps go to the source: scratch is at 0.5 by then, and the arm ends at 1."""
+    """Ten of twenty steps go to the source: scratch is at 0.5 by then, the arm ends at 1."""
     measured = summary().in_total_steps
     assert measured.jumpstart.value == pytest.approx(0.0)
     assert measured.asymptotic_gain.value == pytest.approx(0.0)
@@ -79,14 +79,14 @@ def test_total_steps_by_hand() -> None:
 
 
 def test_thresholds_are_reported_in_order() -> None:
-    """The declared grid comes back whole, in both counts."""
+    """Both ways of counting have all thresholds in order."""
     for measured in (summary().in_target_steps, summary().in_total_steps):
         assert tuple(t.threshold for t in measured.times_to_threshold) == DEFAULT_THRESHOLDS
         assert all(t.arm is not None for t in measured.times_to_threshold)
 
 
 def test_summary_says_what_it_rests_on() -> None:
-    """Budget, seeds, k and confidence stand next to the numbers."""
+    """Budget, seeds, k and confidence are in the summary."""
     result = summary()
     assert (result.unit, result.reference) == ("score", REFERENCE)
     assert (result.horizon, result.source_steps) == (20.0, 10.0)
@@ -95,18 +95,18 @@ def test_summary_says_what_it_rests_on() -> None:
 
 
 def test_without_source_steps_both_counts_agree() -> None:
-    """To the last digit, intervals included."""
+    """Without source steps both ways of counting are equal, intervals included."""
     result = summary(source_steps=0)
     assert result.in_total_steps == result.in_target_steps
 
 
 def test_same_generator_same_summary() -> None:
-    """A report can be made again."""
+    """Equal generators give equal summaries."""
     assert summary() == summary()
 
 
 def test_arms_that_did_not_learn_leave_values() -> None:
-    """Gains are then in units of the measure, and what needs scores is undefined with a reason."""
+    """Without scores, gains are in units of the measure and the rest is undefined."""
     result = summary(reference=Reference(zero=400.0, one=300.0))
     assert result.unit == "value"
     measured = result.in_target_steps
@@ -126,7 +126,7 @@ def test_arms_that_did_not_learn_leave_values() -> None:
 
 
 def test_zero_shot_is_summarised_without_error() -> None:
-    """An arm that is evaluated once has a start and an end; the rest carries its reason."""
+    """One evaluation has a jumpstart and an end; the rest is undefined, with notes."""
     result = summary(ZERO_SHOT)
     for measured in (result.in_target_steps, result.in_total_steps):
         assert measured.asymptotic_gain.value == pytest.approx(-0.5)
@@ -144,12 +144,12 @@ def test_zero_shot_is_summarised_without_error() -> None:
     ids=["arm", "zero-shot", "no scores"],
 )
 def test_summaries_survive_json(result: Summary) -> None:
-    """What is written is what is read, undefined measures included."""
+    """Summaries round trip through JSON, undefined measures included."""
     assert msgspec.json.decode(msgspec.json.encode(result), type=Summary) == result
 
 
 def test_other_evaluations_are_refused() -> None:
-    """Before anything is measured."""
+    """Curves with other evaluations are refused."""
     shorter = LearningCurves(STEPS[:2], ARM.returns[:, :2])
     with pytest.raises(StudyError, match="must be the same"):
         summary(shorter)

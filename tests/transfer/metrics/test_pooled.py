@@ -1,4 +1,4 @@
-"""Statistics over several studies: by hand, against scipy, and with the right coverage."""
+"""Statistics over several studies: by hand, against scipy, and their coverage."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _rng() -> np.random.Generator:
 
 
 def test_the_middle_half_is_averaged() -> None:
-    """Of eight runs the two worst and the two best do not count."""
+    """Of eight runs the two lowest and the two highest do not count."""
     groups = [np.array([0.0, 1.0, 2.0, 100.0]), np.array([-50.0, 3.0, 4.0, 5.0])]
     found = interquartile_mean(groups, rng=_rng())
     assert found.value == pytest.approx((1.0 + 2.0 + 3.0 + 4.0) / 4)
@@ -40,20 +40,20 @@ def test_improvement_is_mann_whitneys() -> None:
 
 
 def test_always_better_is_one() -> None:
-    """And then there is no spread."""
+    """If every run is better, the value and its interval are 1."""
     found = probability_of_improvement([np.array([2.0, 3.0])], [np.array([0.0, 1.0])], rng=_rng())
     assert (found.value, found.low, found.high) == (1.0, 1.0, 1.0)
 
 
 def test_runs_are_drawn_within_their_study() -> None:
-    """Studies of different levels do not widen the interval, because each keeps its share."""
+    """Different levels of studies do not widen the interval."""
     steady = [np.full(5, level) for level in (0.0, 1.0, 2.0)]
     found = interquartile_mean(steady, rng=_rng())
     assert found.low == found.high == found.value == pytest.approx(1.0)
 
 
 def test_intervals_hold_over_many_studies() -> None:
-    """Of twelve studies of five runs, a 95 % interval holds the truth about as often."""
+    """With twelve studies of five runs the coverage is close to 95 %."""
     rng, held, trials = np.random.default_rng(2), 0, 200
     for _ in range(trials):
         arm = [rng.normal(0.0, 1.0, 5) for _ in range(12)]
@@ -67,13 +67,13 @@ def test_intervals_hold_over_many_studies() -> None:
 
 @pytest.mark.parametrize("groups", [[], [np.empty(0)]])
 def test_no_runs_are_refused(groups: _Groups) -> None:
-    """There is nothing to average."""
+    """Studies without runs are refused."""
     with pytest.raises(StudyError, match="at least one run"):
         interquartile_mean(groups, rng=_rng())
 
 
 def test_as_many_studies_on_both_sides() -> None:
-    """Each study of an arm has its own scratch."""
+    """Different numbers of studies are refused."""
     one = np.ones(2)
     with pytest.raises(StudyError, match="1 studies of the arm and 2 of scratch"):
         probability_of_improvement([one], [one, one], rng=_rng())

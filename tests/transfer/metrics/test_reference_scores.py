@@ -1,4 +1,4 @@
-"""Scores: the scale, its absence, and what clipping does."""
+"""Scores: the reference, undefined scores, and clipping."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SCRATCH = LearningCurves(STEPS, np.array([[-100.0, 200.0, 300.0], [-100.0, 400.0
 
 
 def test_scores_run_from_zero_to_one() -> None:
-    """0 takes no skill, 1 is where the best arm ends, and better than that is above 1."""
+    """0 takes no skill and 1 is the end of the best arm; a better run is above 1."""
     reference = Reference(zero=-100.0, one=300.0)
     scores = reference.scores(LearningCurves(STEPS, np.array([[-200.0, 100.0, 500.0]])))
     np.testing.assert_allclose(scores.returns, [[-0.25, 0.5, 1.5]])
@@ -24,7 +24,7 @@ def test_scores_run_from_zero_to_one() -> None:
 
 
 def test_a_reference_that_ships_wins_over_the_best_arm() -> None:
-    """Its scale is the same for every study of the target, so a better arm scores above 1."""
+    """A shipped reference is 1 in every study, so a better arm scores above 1."""
     floors, ends = {"random actions": -100.0}, {"scratch": 100.0, "fine-tune": 500.0}
     of_arms = Reference.of(floors, ends)
     assert (of_arms.one, of_arms.one_of, of_arms.shipped) == (500.0, "fine-tune", False)
@@ -35,14 +35,14 @@ def test_a_reference_that_ships_wins_over_the_best_arm() -> None:
 
 
 def test_clipped_scores_stay_between_0_and_1() -> None:
-    """Forward transfer takes 1 for the most that can be reached."""
+    """Clipped scores are in [0, 1]."""
     reference = Reference(zero=-100.0, one=300.0)
     curves = LearningCurves(STEPS, np.array([[-200.0, 100.0, 500.0]]))
     np.testing.assert_allclose(reference.scores(curves, clip=True).returns, [[0.0, 0.5, 1.0]])
 
 
 def test_the_floor_is_scored_too() -> None:
-    """Counting source steps and taking scores may be done in either order."""
+    """Counting source steps and scoring commute."""
     reference = Reference(zero=-100.0, one=300.0)
     first_counted = reference.scores(in_total_steps(SCRATCH, 7, reference.zero))
     first_scored = in_total_steps(reference.scores(SCRATCH), 7, 0.0)
@@ -51,14 +51,14 @@ def test_the_floor_is_scored_too() -> None:
 
 
 def test_a_reference_is_the_best_floor_and_the_best_end() -> None:
-    """An ant that stands still earns more than one that moves at random."""
+    """Zero is the highest floor, and one the highest end."""
     floors = {"random actions": -10.0, "the zero action": 997.0, "untrained policies": 994.0}
     reference = Reference.of(floors, {"scratch": 1100.0, "fine-tune": 1500.0})
     assert reference == Reference(997.0, 1500.0, "the zero action", "fine-tune")
 
 
 def test_a_reference_needs_both_ends() -> None:
-    """The best of nothing is no reference."""
+    """A reference without floors or ends is refused."""
     with pytest.raises(StudyError, match="needs a floor"):
         Reference.of({}, {"scratch": 1.0})
     with pytest.raises(StudyError, match="needs a floor"):
@@ -67,7 +67,7 @@ def test_a_reference_needs_both_ends() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_reference_is_finite(bad: float) -> None:
-    """A scale has two ends."""
+    """Infinite values and NaN are refused."""
     with pytest.raises(StudyError, match="finite"):
         Reference(zero=bad, one=1.0)
     with pytest.raises(StudyError, match="finite"):
@@ -85,7 +85,7 @@ def test_reference_is_finite(bad: float) -> None:
     ],
 )
 def test_scores_exist_only_if_an_arm_learned(zero: float, one: float, defined: bool) -> None:
-    """The best arm has to end above what takes no skill, beyond rounding."""
+    """Scores are undefined unless an arm ended above zero, beyond rounding."""
     reference = Reference(zero, one)
     assert reference.defined is defined
     if not defined:
@@ -94,6 +94,6 @@ def test_scores_exist_only_if_an_arm_learned(zero: float, one: float, defined: b
 
 
 def test_reference_survives_json() -> None:
-    """It is part of the report."""
+    """A reference round trips through JSON."""
     reference = Reference(-325.6, 5139.8)
     assert msgspec.json.decode(msgspec.json.encode(reference), type=Reference) == reference

@@ -1,4 +1,4 @@
-"""Jumpstart, asymptotic gain, total reward gain and ratio, against hand numbers."""
+"""Jumpstart, asymptotic gain, total reward gain and ratio, by hand."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ZERO_SHOT = LearningCurves(np.array([0.0]), np.array([[0.5], [0.6]]))
 
 
 def ratio(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
-    """`auc_ratio` with few resamples."""
+    """Return `auc_ratio` with few resamples."""
     return auc_ratio(arm, scratch, rng=np.random.default_rng(0), n_resamples=500)
 
 
@@ -48,7 +48,7 @@ def test_jumpstart() -> None:
     [(0, 0.1), (5, 0.15), (10, 0.2), (30, 0.6), (40, 0.8), (1000, 0.8)],
 )
 def test_jumpstart_in_total_steps(source_steps: int, scratch_by_then: float) -> None:
-    """Scratch has learnt while the arm was busy elsewhere; its end stands for what comes later."""
+    """Scratch is read at the source steps, or at its end if that is earlier."""
     estimate = jumpstart(in_total_steps(ARM, source_steps, 0.0), SCRATCH)
     assert estimate.value == pytest.approx(0.4 - scratch_by_then)
 
@@ -73,7 +73,7 @@ def test_asymptotic_gain(last_k: int, gain: float) -> None:
     ],
 )
 def test_asymptotic_gain_in_total_steps(source_steps: int, gain: float) -> None:
-    """The end is that of the budget, which the source has used up in part."""
+    """The end is that of the budget, which includes source steps."""
     total = in_total_steps(ARM, source_steps, floor=0.0)
     assert asymptotic_gain(total, SCRATCH, last_k=2).value == pytest.approx(gain)
 
@@ -90,7 +90,7 @@ def test_total_reward_gain_in_total_steps() -> None:
 
 
 def test_auc_ratio() -> None:
-    """30 over 16.5, and a bootstrap interval around it once there are seeds enough."""
+    """30 over 16.5, with a bootstrap interval once there are enough seeds."""
     assert ratio(ARM, SCRATCH).value == pytest.approx(30.0 / 16.5)
     twice = [LearningCurves(STEPS, np.tile(c.returns, (2, 1))) for c in (ARM, SCRATCH)]
     estimate = ratio(*twice)
@@ -101,26 +101,26 @@ def test_auc_ratio() -> None:
 
 
 def test_auc_ratio_in_total_steps() -> None:
-    """Nothing for 20 steps and then 12, over 16.5."""
+    """0 for 20 steps and then 12, over 16.5."""
     assert ratio(in_total_steps(ARM, 20, 0.0), SCRATCH).value == pytest.approx(12.0 / 16.5)
 
 
 @pytest.mark.parametrize("height", [0.0, -0.5])
 def test_auc_ratio_needs_an_area_above_zero(height: float) -> None:
-    """Over nothing, or less, a ratio has no meaning, and it says so."""
+    """It is undefined unless scratch's area is above zero."""
     estimate = ratio(ARM, LearningCurves(STEPS, np.full((2, 4), height)))
     assert estimate.value is None
     assert "not above zero" in estimate.note
 
 
 def test_auc_ratio_moves_with_an_offset() -> None:
-    """Why it is taken of scores: the same runs with a bonus added give another ratio."""
+    """A constant added to the returns changes the ratio."""
     shifted = [LearningCurves(STEPS, curves.returns + 1.0) for curves in (ARM, SCRATCH)]
     assert ratio(*shifted).value == pytest.approx((30.0 + 40.0) / (16.5 + 40.0))
 
 
 def test_zero_shot_has_a_start_and_an_end() -> None:
-    """A policy that is not trained ends where it starts, and the note says so."""
+    """The one evaluation stands for the end, and a note states it."""
     assert jumpstart(ZERO_SHOT, SCRATCH).value == pytest.approx(0.45)
     end = asymptotic_gain(ZERO_SHOT, SCRATCH, last_k=2)
     assert end.value == pytest.approx(0.55 - 0.6)
@@ -131,7 +131,7 @@ def test_zero_shot_has_a_start_and_an_end() -> None:
 
 
 def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:
-    """Neither that it is not trained nor that there is no interval gets lost."""
+    """The note states both that it is not trained and that there is no interval."""
     one = LearningCurves(np.array([0.0]), np.array([[0.5]]))
     note = asymptotic_gain(one, SCRATCH, last_k=1).note
     assert "not trained" in note
@@ -139,7 +139,7 @@ def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:
 
 
 def test_zero_shot_has_no_curve() -> None:
-    """What needs a learning curve is undefined for one evaluation, with a reason."""
+    """Measures of a curve are undefined for one evaluation, with a note."""
     for estimate in (total_reward_gain(ZERO_SHOT, SCRATCH), ratio(ZERO_SHOT, SCRATCH)):
         assert estimate.value is None
         assert "one evaluation only" in estimate.note
@@ -160,7 +160,7 @@ def test_zero_shot_has_no_curve() -> None:
 def test_every_measure_refuses_other_evaluations(
     measure: Callable[[LearningCurves, LearningCurves], object],
 ) -> None:
-    """Budgets that differ are no comparison."""
+    """Curves with different steps are refused."""
     shorter = LearningCurves(STEPS[:3], ARM.returns[:, :3])
     with pytest.raises(StudyError, match="must be the same"):
         measure(shorter, SCRATCH)

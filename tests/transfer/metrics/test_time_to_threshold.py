@@ -1,4 +1,4 @@
-"""Time to threshold: crossings, censoring, and medians by hand."""
+"""Time to threshold: crossings, censoring and medians, by hand."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ SCRATCH = LearningCurves(STEPS, np.array([[0, 0, 0, 0.5], [0, 0, 0, 0.4]]))
 
 
 def test_first_crossing_of_the_line() -> None:
-    """Between evaluations the line counts; touching is reaching; falling back does not matter."""
+    """Linear between evaluations; reaching the threshold is enough; later falls do not count."""
     np.testing.assert_allclose(steps_to_reach(ARM, 0.5), [5.0, 30.0, math.inf, 0.0])
     np.testing.assert_allclose(steps_to_reach(SCRATCH, 0.5), [40.0, math.inf])
 
 
 def test_source_steps_delay_and_censor() -> None:
-    """Ten steps on the source push every time by ten, and 35 push one over the horizon."""
+    """10 source steps delay every time by 10; 35 move one beyond the horizon."""
     np.testing.assert_allclose(
         steps_to_reach(in_total_steps(ARM, 10, 0.0), 0.5), [15.0, 40.0, math.inf, 10.0]
     )
@@ -43,13 +43,13 @@ def test_source_steps_delay_and_censor() -> None:
 
 
 def test_a_floor_above_the_threshold_is_there_at_once() -> None:
-    """A threshold below the random policy takes no learning, in either way of counting."""
+    """A threshold below the floor is reached at step 0."""
     assert not steps_to_reach(in_total_steps(ARM, 10, 0.6), 0.5).any()
     np.testing.assert_allclose(steps_to_reach(ARM, -1.0), np.zeros(4))
 
 
 def test_no_seed_is_dropped() -> None:
-    """The seed that never arrives counts as the horizon: (5 + 30 + 40 + 0) / 4 against 40."""
+    """A censored seed counts as the horizon: (5 + 30 + 40 + 0) / 4 against 40."""
     times = time_to_threshold(ARM, SCRATCH, 0.5)
     assert times.threshold == 0.5
     assert times.arm == ReachTimes(fraction=0.75, restricted_mean=18.75, restricted_median=5.0)
@@ -59,7 +59,7 @@ def test_no_seed_is_dropped() -> None:
 
 
 def test_median_is_unknown_if_most_never_arrive() -> None:
-    """Half the seeds must arrive before it can be said when half of them have."""
+    """The median is None if fewer than half the seeds reach the threshold."""
     times = time_to_threshold(ARM, SCRATCH, 0.95)
     assert times.arm is not None
     assert times.arm.restricted_median == pytest.approx(39.0)
@@ -67,7 +67,7 @@ def test_median_is_unknown_if_most_never_arrive() -> None:
 
 
 def test_nobody_arrives() -> None:
-    """Then nothing is saved, and no interval pretends to know it exactly."""
+    """If no seed reaches the threshold, 0 steps are saved, without an interval."""
     times = time_to_threshold(ARM, SCRATCH, 2.0)
     assert times.steps_saved.value == 0.0
     assert times.steps_saved.low is None
@@ -82,7 +82,7 @@ def test_total_steps_can_cost_more_than_they_save() -> None:
 
 
 def test_zero_shot_has_no_times() -> None:
-    """A policy that is not trained does not arrive anywhere."""
+    """Times are undefined for one evaluation."""
     times = time_to_threshold(LearningCurves(np.array([0.0]), np.array([[0.9]])), SCRATCH, 0.5)
     assert (times.arm, times.scratch, times.steps_saved.value) == (None, None, None)
     assert "one evaluation only" in times.steps_saved.note
@@ -90,6 +90,6 @@ def test_zero_shot_has_no_times() -> None:
 
 @pytest.mark.parametrize("threshold", [math.nan, math.inf])
 def test_threshold_is_a_number(threshold: float) -> None:
-    """A threshold nobody can reach by definition is a mistake."""
+    """Thresholds that are not finite are refused."""
     with pytest.raises(StudyError, match="finite"):
         time_to_threshold(ARM, SCRATCH, threshold)

@@ -81,7 +81,8 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
-    from shapechanger.transfer.learners.cloning import is_clone, load_clone
+    from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.transfer.learners.cloning import is_clone
 
     box = cast("gym.spaces.Box", env.action_space)
 
@@ -89,7 +90,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
     if is_clone(path):
-        clone = load_clone(path)
+        clone = CameraPolicy.load(path)
         part = _parts(clone, path, env)
         return lambda seen: fitting(clone.predict_many(part(seen, "image"), part(seen, "state")))
     from shapechanger.transfer.env_ref import layouts_of

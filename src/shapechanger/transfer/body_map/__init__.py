@@ -15,7 +15,7 @@ action       knee/motor  hip/motor  rule 'knee/motor'
 array([0.5, 0.5])
 """
 
-from shapechanger.transfer.body_map.envs import MappedEnv, body_map, wrap
+from shapechanger.transfer.body_map.envs import MappedEnv, body_map
 from shapechanger.transfer.body_map.map import BodyMap, MapRow
 from shapechanger.transfer.body_map.matching import Units
 from shapechanger.transfer.body_map.rules import Copy, Hold, Learn, MapEntry, Rule, RuleLike, Zero
@@ -36,5 +36,4 @@ __all__ = [
     "Zero",
     "body_map",
     "mirror",
-    "wrap",
 ]

@@ -10,11 +10,12 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from shapechanger.errors import MapError, SpaceMismatch
+from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Layout
 from shapechanger.transfer.body_map.map import BodyMap
 from shapechanger.transfer.body_map.matching import Units
 from shapechanger.transfer.body_map.rules import RuleLike, Zero
+from shapechanger.transfer.env_ref import layouts_of
 
 Array = NDArray[Any]
 
@@ -41,39 +42,22 @@ def body_map(
         units: What the action numbers preserve: their value, or the torque.
 
     Raises:
-        MapError: If an env publishes no layouts, or the two cannot be mapped.
+        LayoutError: If an env publishes no layouts.
+        MapError: If the two cannot be mapped.
         UnknownName: If a rule matches no feature, or copies one that does not exist.
     """
+    source_observation, source_action = layouts_of(source_env)
+    target_observation, target_action = layouts_of(target_env)
     return BodyMap.between(
-        _published(source_env, "observation_layout"),
-        _published(target_env, "observation_layout"),
-        _published(source_env, "action_layout"),
-        _published(target_env, "action_layout"),
+        source_observation,
+        target_observation,
+        source_action,
+        target_action,
         rules=rules,
         observation_rules=observation_rules,
         action_rules=action_rules,
         otherwise=otherwise,
         units=units,
-    )
-
-
-def wrap(
-    target_env: gym.Env[Any, Any],
-    body_map: BodyMap,
-    *,
-    observation_space: Box | None = None,
-    action_space: Box | None = None,
-) -> MappedEnv:
-    """Give a target env the source's spaces; see `MappedEnv`.
-
-    Args:
-        target_env: The target env.
-        body_map: Map between the bodies.
-        observation_space: As in `MappedEnv`.
-        action_space: As in `MappedEnv`.
-    """
-    return MappedEnv(
-        target_env, body_map, observation_space=observation_space, action_space=action_space
     )
 
 
@@ -157,20 +141,6 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
     def _sensed(self, observation: Array) -> Array:
         return self.body_map.adapt_observation(np.asarray(observation, dtype=np.float64))
-
-
-def _published(env: gym.Env[Any, Any], name: str) -> Layout:
-    """The layout that an env, or its outermost wrapper with one, publishes."""
-    try:
-        layout = env.get_wrapper_attr(name)
-    except AttributeError:
-        layout = None
-    if not isinstance(layout, Layout):
-        raise MapError(
-            f"{env} publishes no {name}: add a property of that name and of type "
-            f"shapechanger.layout.Layout to {type(env.unwrapped).__name__}."
-        )
-    return layout
 
 
 def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:

@@ -187,24 +187,21 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         """
         shared = dict(rules or {})
         on_observation, on_action = dict(observation_rules or {}), dict(action_rules or {})
-        sides = (
-            Side("observation", source_observation, target_observation),
-            Side("action", target_action, source_action),
-        )
-        resolutions = (
-            resolve(sides[0], on_observation | _missing(shared, on_observation), otherwise, units),
-            resolve(sides[1], on_action | _missing(shared, on_action), otherwise, units),
-        )
-        check_patterns(shared, sides, resolutions)
-        check_patterns(on_observation, sides[:1], resolutions[:1])
-        check_patterns(on_action, sides[1:], resolutions[1:])
+        sensed = Side("observation", source_observation, target_observation)
+        moved = Side("action", target_action, source_action)
+        # Special rules come first and are not overridden.
+        observation = resolve(sensed, on_observation | shared | on_observation, otherwise, units)
+        action = resolve(moved, on_action | shared | on_action, otherwise, units)
+        check_patterns(shared, [(sensed, observation), (moved, action)])
+        check_patterns(on_observation, [(sensed, observation)])
+        check_patterns(on_action, [(moved, action)])
         return cls(
             source_observation=source_observation,
             target_observation=target_observation,
             source_action=source_action,
             target_action=target_action,
-            observation=resolutions[0].entries,
-            action=resolutions[1].entries,
+            observation=observation,
+            action=action,
         )
 
     @classmethod
@@ -257,22 +254,22 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     @cached_property
     def observation_matrix(self) -> NDArray[np.float64]:
         """M, shape (source_observation.size, target_observation.size); read-only."""
-        return _read_only(self._observation_gather.matrix())
+        return self._observation_gather.matrix()
 
-    @cached_property
+    @property
     def observation_offset(self) -> NDArray[np.float64]:
         """c, shape (source_observation.size,); read-only."""
-        return _read_only(self._observation_gather.offset)
+        return self._observation_gather.offset
 
     @cached_property
     def action_matrix(self) -> NDArray[np.float64]:
         """N, shape (target_action.size, source_action.size); read-only."""
-        return _read_only(self._action_gather.matrix())
+        return self._action_gather.matrix()
 
-    @cached_property
+    @property
     def action_offset(self) -> NDArray[np.float64]:
         """d, shape (target_action.size,); read-only."""
-        return _read_only(self._action_gather.offset)
+        return self._action_gather.offset
 
     def then(self, following: BodyMap) -> BodyMap:
         """Compose: the map from this source to the target of `following`.
@@ -471,19 +468,6 @@ def _symmetry_map(symmetry: Symmetry, observation: Layout, action: Layout) -> Bo
     )
 
 
-def _missing(
-    shared: Mapping[str, RuleLike], special: Mapping[str, RuleLike]
-) -> dict[str, RuleLike]:
-    """The shared rules that no special rule overrides."""
-    return {pattern: rule for pattern, rule in shared.items() if pattern not in special}
-
-
 def _counted(entries: tuple[MapEntry, ...]) -> str:
     counts = Counter(type(entry.rule).__name__ for entry in entries)
     return ", ".join(f"{number} {kind}" for kind, number in counts.items()) or "none"
-
-
-def _read_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    copy = values.copy()
-    copy.setflags(write=False)
-    return copy

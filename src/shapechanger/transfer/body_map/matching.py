@@ -54,23 +54,9 @@ _MOST_NAMES_LISTED: Final = 8
 _SPELLED: Final[dict[str, Rule]] = {"zero": Zero(), "learn": Learn()}
 
 
-class Resolution(NamedTuple):
-    """The rules of one side, and the patterns that gave them.
-
-    Attributes:
-        entries: One for each feature that is filled.
-        fitting: The patterns that match a feature.
-        used: The patterns that gave a feature its rule.
-    """
-
-    entries: tuple[MapEntry, ...]
-    fitting: frozenset[str]
-    used: frozenset[str]
-
-
 def resolve(
     side: Side, rules: Mapping[str, RuleLike], otherwise: RuleLike, units: Units
-) -> Resolution:
+) -> tuple[MapEntry, ...]:
     """Resolve the rule of each feature of `side.into`.
 
     Args:
@@ -85,58 +71,60 @@ def resolve(
         UnknownName: If a rule copies a feature that does not exist.
     """
     entries: list[MapEntry] = []
-    fitting: set[str] = set()
-    used: set[str] = set()
     for feature in side.into:
-        fits = [
-            pattern
-            for pattern in rules
-            if pattern == feature.name
-            or (pattern not in side.into and fnmatch.fnmatchcase(feature.name, pattern))
-        ]
-        fitting.update(fits)
+        matching = (pattern for pattern in rules if _matches(pattern, feature.name, side))
         if feature.name in rules:
             pattern = feature.name
         elif feature.name in side.over:
             rule = _suited(Copy(feature.name), feature, side, units)
             entries.append(MapEntry(feature.name, rule, SAME_NAME))
             continue
-        elif fits:
-            pattern = fits[0]
         else:
+            pattern = next(matching, None)
+        if pattern is None:
             entries.append(MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT))
             continue
-        used.add(pattern)
         rule = _suited(_read(rules[pattern], pattern, feature, side), feature, side, units)
-        entries.append(MapEntry(feature.name, rule, f"rule {pattern!r}"))
+        entries.append(MapEntry(feature.name, rule, _by_rule(pattern)))
     _require_match(side, entries)
-    return Resolution(tuple(entries), frozenset(fitting), frozenset(used))
+    return tuple(entries)
+
+
+def _matches(pattern: str, name: str, side: Side) -> bool:
+    """Return whether a pattern is the name of a feature, or a glob that matches it."""
+    return pattern == name or (pattern not in side.into and fnmatch.fnmatchcase(name, pattern))
+
+
+def _by_rule(pattern: str) -> str:
+    """The reason of an entry that has its rule from a pattern."""
+    return f"rule {pattern!r}"
 
 
 def check_patterns(
-    patterns: Iterable[str], sides: Iterable[Side], resolutions: Iterable[Resolution]
+    patterns: Iterable[str], halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]
 ) -> None:
     """Check that each pattern gave at least one feature its rule.
 
     Args:
         patterns: The patterns.
-        sides: The halves that they apply to.
-        resolutions: The resolution of each half.
+        halves: The halves of the map that they apply to, with their resolved entries.
 
     Raises:
         UnknownName: If a pattern matches no feature of any side.
         MapError: If each feature that it matches has its rule from elsewhere.
     """
-    sides, resolutions = tuple(sides), tuple(resolutions)
+    reasons = {entry.why for _, entries in halves for entry in entries}
     for pattern in patterns:
-        if not any(pattern in resolution.fitting for resolution in resolutions):
-            kind = " or ".join(side.into_kind for side in sides)
-            raise UnknownName(kind, pattern, [name for side in sides for name in side.into.names])
-        if not any(pattern in resolution.used for resolution in resolutions):
-            raise MapError(
-                f"The rule {pattern!r} changes nothing: each feature that it matches has a partner "
-                "of the same name or an earlier rule; name a feature exactly to override that."
-            )
+        if _by_rule(pattern) in reasons:
+            continue
+        names = [(name, side) for side, _ in halves for name in side.into.names]
+        if not any(_matches(pattern, name, side) for name, side in names):
+            kind = " or ".join(side.into_kind for side, _ in halves)
+            raise UnknownName(kind, pattern, [name for name, _ in names])
+        raise MapError(
+            f"The rule {pattern!r} changes nothing: each feature that it matches has a partner "
+            "of the same name or an earlier rule; name a feature exactly to override that."
+        )
 
 
 def constant_rule(like: RuleLike, feature: Feature) -> Rule:

@@ -268,7 +268,7 @@ class Gather:
         rows: Output indices that are copied, shape (n_copied,).
         columns: Their input indices, shape (n_copied,).
         scale: Their factors, shape (n_copied,).
-        offset: Constant of each output, 0 where it is copied, shape (n_into,).
+        offset: Constant of each output, 0 where it is copied, shape (n_into,); read-only.
     """
 
     kind: str
@@ -303,6 +303,7 @@ class Gather:
                     offset[place] = value
                 case Zero() | Learn():
                     pass
+        offset.setflags(write=False)
         return cls(
             kind=side.over_kind,
             n_over=side.over.size,
@@ -338,7 +339,8 @@ class Gather:
         return filled
 
     def matrix(self) -> NDArray[np.float64]:
-        """The linear part, shape (n_into, n_over)."""
+        """The linear part, shape (n_into, n_over); read-only."""
         dense = np.zeros((self.offset.size, self.n_over))
         dense[self.rows, self.columns] = self.scale
+        dense.setflags(write=False)
         return dense

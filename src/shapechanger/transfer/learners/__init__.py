@@ -10,10 +10,21 @@ from shapechanger.transfer.env_ref import EnvRef, EnvTraits
 
 if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
-    from shapechanger.transfer.learners.cloning import DemonstrationFile
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["Learner", "PolicyOrigin"]
+__all__ = ["DemonstrationFile", "Learner", "PolicyOrigin"]
+
+
+class DemonstrationFile(NamedTuple):
+    """File of demonstrations, shared by the runs that learn from them.
+
+    Attributes:
+        path: The file.
+        seed: Seed of the recording.
+    """
+
+    path: Path
+    seed: int
 
 
 class PolicyOrigin(NamedTuple):
@@ -88,11 +99,7 @@ class Learner(Protocol):
         ...
 
     def load(self, path: Path) -> Any:
-        """Load a policy.
-
-        Args:
-            path: The file.
-        """
+        """Load a policy."""
         ...
 
     def save(self, policy: Any, path: Path) -> None:
@@ -106,9 +113,6 @@ class Learner(Protocol):
 
     def origin(self, path: Path) -> PolicyOrigin:
         """Read where a stored policy comes from.
-
-        Args:
-            path: The file.
 
         Raises:
             StudyError: If another kind of learner trained it.

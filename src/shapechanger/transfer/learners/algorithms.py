@@ -61,19 +61,12 @@ def build_model(
 
 
 def _is_class(algorithm: object) -> bool:
-    """Return whether this is a class of models, not a function that builds one.
-
-    Args:
-        algorithm: The object.
-    """
+    """Return whether this is a class of models, not a function that builds one."""
     return isinstance(algorithm, type) and issubclass(algorithm, BaseAlgorithm)
 
 
 def require_class(algorithm: str) -> None:
-    """Refuse an algorithm that is not a class of models.
-
-    Args:
-        algorithm: Its name.
+    """Refuse the name of an algorithm that is not a class of models.
 
     Raises:
         ValueError: If it is a function, or cannot be imported.

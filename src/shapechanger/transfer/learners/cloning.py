@@ -1,9 +1,10 @@
-"""Behavioural cloning in a study: record demonstrations, clone them, evaluate at each budget."""
+"""Behavioural cloning as a learner: record demonstrations, clone them, evaluate at each budget."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -17,13 +18,18 @@ from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.tensor_file import kind_of
-from shapechanger.transfer.env_ref import EnvRef, HasDemonstrator
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
 from shapechanger.transfer.files import make_folder
-from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_envs
+from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
+from shapechanger.transfer.learners.evaluation import (
+    EVALUATION_SEED,
+    Evaluation,
+    evaluate,
+    evaluation_envs,
+)
+from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import CloningSettings
-
-_CLONE_EVALUATION_SEED = 10_000_000
-"""Seed of the first evaluation episode, the same for every run and arm."""
 
 
 class Demonstrations(NamedTuple):
@@ -60,25 +66,12 @@ class Demonstrations(NamedTuple):
         )
 
 
-class DemonstrationFile(NamedTuple):
-    """File of demonstrations, shared by the runs that learn from them.
-
-    Attributes:
-        path: The file.
-        seed: Seed of the recording.
-    """
-
-    path: Path
-    seed: int
-
-
 def record_demonstrations(
     env: EnvRef,
     steps: int,
     episode_steps: int,
     seed: int,
     framing: Framing,
-    on_steps: Callable[[int], None] = lambda steps: None,
 ) -> Demonstrations:
     """Record the demonstrator of an env.
 
@@ -88,13 +81,11 @@ def record_demonstrations(
         episode_steps: Maximum number of steps of an episode.
         seed: Seed of the starts and of the demonstrator's mistakes.
         framing: The part and size of a picture that a policy sees.
-        on_steps: Called with the number of steps from time to time.
 
     Raises:
         StudyError: If the env has no demonstrator.
     """
-    made = env.make(max_episode_steps=episode_steps)
-    try:
+    with closing(env.make(max_episode_steps=episode_steps)) as made:
         if not isinstance(made.unwrapped, HasDemonstrator):
             raise StudyError(f"{env} has no demonstrator to learn from.")
         driver = made.unwrapped.demonstrator(seed)
@@ -102,21 +93,18 @@ def record_demonstrations(
         actions, executed = np.empty((2, steps, 2), np.float32)
         rewards = np.empty(steps, np.float32)
         episodes: list[int] = []
-        while sum(episodes) < steps:
+        while len(pictures) < steps:
             seen = made.reset(seed=seed if not episodes else None)[0]
             driver.begin()
             episodes.append(0)
             over = False
-            while not over and sum(episodes) < steps:
-                step = sum(episodes)
+            while not over and len(pictures) < steps:
+                step = len(pictures)
                 actions[step], executed[step] = driver.act()
                 pictures.append(prepare(seen[np.newaxis], framing)[0])
                 seen, rewards[step], terminated, truncated, _ = made.step(executed[step])
                 episodes[-1] += 1
                 over = terminated or truncated
-            on_steps(sum(episodes))
-    finally:
-        made.close()
     return Demonstrations(np.stack(pictures), actions, executed, rewards, tuple(episodes))
 
 
@@ -148,54 +136,140 @@ def load_or_record(
     return recorded
 
 
-def train_clones(
-    env: EnvRef,
-    settings: CloningSettings,
-    steps: int,
-    seed: int,
-    *,
-    demonstrations: DemonstrationFile,
-    start: CameraPolicy | None = None,
-    only_last: bool = False,
-    on_evaluation: Callable[[Evaluation], None],
-    on_steps: Callable[[int], None] = lambda steps: None,
-) -> CameraPolicy:
-    """Clone the demonstrator at each budget, and evaluate each clone.
+class _CardData(msgspec.Struct):
+    """Provenance in the card of a clone that a study or `shapechanger train` wrote."""
+
+    env: str
+    arguments: dict[str, Any]
+    demonstrated_steps: int
+
+
+class CloneLearner:
+    """Behavioural cloning of an env's demonstrator: a `shapechanger.transfer.learners.Learner`.
+
+    All vehicles share one camera and action, so body maps are not used.
 
     Args:
-        env: The env.
-        settings: The settings.
-        steps: The last budget.
-        seed: Seed of the trainings.
-        demonstrations: File of the demonstrations; recorded if missing.
-        start: The policy to start from at each budget; None for a new one.
-        only_last: Skip all budgets but the last.
-        on_evaluation: Called with each evaluation.
-        on_steps: Called with the number of demonstrated steps used.
-
-    Returns:
-        The clone of the last budget.
+        name: Name of the learner.
+        settings: Its settings.
     """
-    policy = CameraPolicy.fresh(settings.clone, seed) if start is None else start
-    on_evaluation(evaluate_clone(env, policy, settings))
-    recorded = load_or_record(
-        demonstrations, env, steps, settings.episode_steps, settings.clone.framing
-    )
-    for budget in (steps,) if only_last else settings.within(steps):
-        part = recorded.first(budget)
-        policy, _ = clone(
-            part.pictures,
-            part.actions,
-            settings=settings.clone,
-            seed=seed % 2**31,
-            episodes=part.episodes,
-            start=start,
+
+    def __init__(self, name: str, settings: CloningSettings) -> None:
+        self._name = name
+        self._settings = settings
+
+    def require(self, env: EnvRef, traits: EnvTraits) -> None:
+        """Refuse an env without a camera or a demonstrator."""
+        space = traits.observation_space
+        is_camera = (
+            isinstance(space, gym.spaces.Box)
+            and np.dtype(np.uint8) == cast("Any", space).dtype
+            and len(space.shape) == 3
         )
-        on_evaluation(evaluate_clone(env, policy, settings, budget))
-        on_steps(budget)
-    return state_actions(policy, env).described(
-        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed
-    )
+        missing: list[str] = []
+        if not is_camera:
+            missing.append("no camera")
+        if not traits.has_demonstrator:
+            missing.append("no demonstrator")
+        if missing:
+            raise StudyError(
+                f"{env} has {' and '.join(missing)}, and {self._name} learns from the pictures of "
+                "a demonstrator: give a --learner that begins with ppo."
+            )
+
+    def train(
+        self,
+        env: EnvRef,
+        steps: int,
+        seed: int,
+        *,
+        demonstrations: DemonstrationFile,
+        start: CameraPolicy | None = None,
+        body_map: BodyMap | None = None,
+        only_last: bool = False,
+        callback: Any = None,
+        on_evaluation: Callable[[Evaluation], None],
+        on_steps: Callable[[int], None] = lambda steps: None,
+    ) -> CameraPolicy:
+        """Clone the demonstrator at each budget, from the same start, and evaluate each clone.
+
+        Returns:
+            The clone of the last budget.
+        """
+        del body_map
+        if callback is not None:
+            raise StudyError(f"{self._name} takes no callback of Stable-Baselines3.")
+        settings = self._settings.clone
+        policy = CameraPolicy.fresh(settings, seed) if start is None else start
+        on_evaluation(self.evaluate(env, policy))
+        recorded = load_or_record(
+            demonstrations, env, steps, self._settings.episode_steps, settings.framing
+        )
+        for budget in (steps,) if only_last else self._settings.within(steps):
+            part = recorded.first(budget)
+            policy, _ = clone(
+                part.pictures,
+                part.actions,
+                settings=settings,
+                seed=seed % 2**31,
+                episodes=part.episodes,
+                start=start,
+            )
+            on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
+            on_steps(budget)
+        return state_actions(policy, env).described(
+            env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed
+        )
+
+    def evaluate(
+        self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap | None = None
+    ) -> Evaluation:
+        """Evaluate a policy."""
+        del body_map
+        envs = evaluation_envs(env, self._settings)
+        try:
+            return evaluate(policy.predict_many, envs, EVALUATION_SEED)
+        finally:
+            for one in envs:
+                one.close()
+
+    def load(self, path: Path) -> CameraPolicy:
+        """Load a clone."""
+        return CameraPolicy.load(path)
+
+    def save(self, policy: CameraPolicy, path: Path) -> None:
+        """Write a clone to a file."""
+        policy.save(path)
+
+    def origin(self, path: Path) -> PolicyOrigin:
+        """Read where a clone comes from.
+
+        Raises:
+            StudyError: If the policy is not a clone, or takes other pictures.
+        """
+        if not is_clone(path):
+            card = load_policy(path).card
+            raise StudyError(
+                f"{path} was trained with {card.learner}, and {self._name} starts from "
+                f"demonstrations: give --learner {card.learner}, or a clone."
+            )
+        card = CameraPolicy.load(path).card
+        wanted = self._settings.clone.framing
+        if card.framing != wanted:
+            raise StudyError(
+                f"{path} takes pictures of {card.framing.height} x {card.framing.width} pixels "
+                f"from {card.framing.top:g} of their height on, and {self._name} "
+                f"{wanted.height} x {wanted.width} from {wanted.top:g}: give a clone that takes "
+                "the same pictures."
+            )
+        try:
+            data = msgspec.convert(card.data, _CardData)
+        except msgspec.ValidationError as error:
+            raise StudyError(
+                f"The card of {path} lacks the demonstrations that it was cloned from ({error}): "
+                "give a clone that `shapechanger train` or a study has written."
+            ) from error
+        return PolicyOrigin(EnvRef(data.env, data.arguments), data.demonstrated_steps)
 
 
 def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
@@ -205,76 +279,14 @@ def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
         policy: A clone of the env's demonstrator.
         env: The env.
     """
-    made = env.make()
-    try:
-        layout = getattr(made.unwrapped, "action_layout", None)
-    finally:
-        made.close()
-    if layout is None or layout.names == ("steering", "throttle"):
+    with closing(env.make()) as made:
+        _, layout = layouts_of(made)
+    if layout.names == ("steering", "throttle"):
         return policy
     card = msgspec.structs.replace(policy.card, action_layout=layout)
     return CameraPolicy(policy.network, card)
 
 
-def evaluate_clone(
-    env: EnvRef, policy: CameraPolicy, settings: CloningSettings, steps: int = 0
-) -> Evaluation:
-    """Evaluate a clone.
-
-    Args:
-        env: The env.
-        policy: The clone.
-        settings: Settings of its learner.
-        steps: Training steps so far, for the result.
-    """
-    envs = evaluation_envs(env, settings)
-    try:
-        return evaluate(policy.predict_many, envs, _CLONE_EVALUATION_SEED, steps)
-    finally:
-        for one in envs:
-            one.close()
-
-
-def require_camera_env(
-    name: str, observation_space: gym.Space[Any], has_demonstrator: bool, learner: str
-) -> None:
-    """Refuse an env without a camera or a demonstrator.
-
-    Args:
-        name: Name of the env, for the message.
-        observation_space: Its observation space.
-        has_demonstrator: Whether it has an expert for its task.
-        learner: Name of the learner, for the message.
-
-    Raises:
-        StudyError: If it lacks one.
-    """
-    is_camera = (
-        isinstance(observation_space, gym.spaces.Box)
-        and np.dtype(np.uint8) == cast("Any", observation_space).dtype
-        and len(observation_space.shape) == 3
-    )
-    missing = [
-        what
-        for what, there in (("no camera", is_camera), ("no demonstrator", has_demonstrator))
-        if not there
-    ]
-    if missing:
-        raise StudyError(
-            f"{name} has {' and '.join(missing)}, and {learner} learns from the pictures of a "
-            "demonstrator: give a --learner that begins with ppo."
-        )
-
-
 def is_clone(path: Path) -> bool:
     """Return whether a file holds a clone, rather than another policy or something else."""
     return kind_of(path) == KIND
-
-
-def load_clone(path: Path) -> CameraPolicy:
-    """Load a clone.
-
-    Raises:
-        PolicyError: If the file holds none.
-    """
-    return CameraPolicy.load(path)

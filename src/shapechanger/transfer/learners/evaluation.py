@@ -132,7 +132,7 @@ class _Episode:
         self.total += reward
         self.length += 1
         for name, value in info.items():
-            # NumPy's float32 is no Python float, and ants report their control cost as one.
+            # NumPy's float32 is not a Python float; ants report their control cost as one.
             if name.startswith("reward_") and isinstance(value, int | float | np.floating):
                 self.terms[name] = self.terms.get(name, 0.0) + float(cast("float", value))
         if "is_success" in info:

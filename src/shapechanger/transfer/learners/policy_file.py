@@ -25,6 +25,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
 from shapechanger.transfer.learners.settings import Sb3Settings
+from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
 try:
     import torch
@@ -147,14 +148,9 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     return act
 
 
-# Defaults of Stable-Baselines3's `VecNormalize`.
-_EPSILON: Final = 1e-8
-_CLIP: Final = 10.0
-
-
 def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArray[np.float32]:
-    scaled = (observations - statistics.mean) / np.sqrt(statistics.var + _EPSILON)
-    return np.clip(scaled, -_CLIP, _CLIP).astype(np.float32)
+    scaled = (observations - statistics.mean) / np.sqrt(statistics.var + EPSILON)
+    return np.clip(scaled, -CLIP, CLIP).astype(np.float32)
 
 
 def save_policy(policy: TrainedPolicy, path: Path) -> None:

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, Literal, Self, TypeVar
+from typing import Any, ClassVar, Final, Literal, Self, TypeVar
 
 import msgspec
 
@@ -39,6 +39,9 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     eval_every: int
     eval_episodes: int = 5
 
+    # Name of the setting that is the steps of each env between two updates.
+    _steps_per_update: ClassVar[str]
+
     def __post_init__(self) -> None:
         if min(self.n_envs, self.update_steps, self.eval_episodes) < 1:
             raise StudyError("A learner needs at least one env, one step and one episode.")
@@ -51,7 +54,7 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def update_steps(self) -> int:
         """Env steps between two updates; budgets are rounded up to a multiple of it."""
-        raise NotImplementedError
+        return self.n_envs * getattr(self, self._steps_per_update)
 
     @property
     def model_arguments(self) -> dict[str, Any]:
@@ -72,10 +75,24 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
         """Round `steps` up to whole updates."""
         return -(-steps // self.update_steps) * self.update_steps
 
+    def for_one_env(self) -> Self:
+        """Return settings with as many steps per update in a single env.
+
+        Raises:
+            StudyError: If that is not possible.
+        """
+        changed: dict[str, Any] = {"n_envs": 1, self._steps_per_update: self.update_steps}
+        return msgspec.structs.replace(self, **changed)
+
     def for_budget(self, steps: int) -> Self:
         """Return the settings for a shorter budget: four evaluations, no source default."""
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
+
+    def _own(self) -> dict[str, Any]:
+        """The settings that not all learners share, by name."""
+        shared = _Sb3Base.__struct_fields__
+        return {name: getattr(self, name) for name in self.__struct_fields__ if name not in shared}
 
 
 class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
@@ -104,31 +121,20 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
     ent_coef: float = 0.0
     log_std_init: float = 0.0
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.n_steps
+    _steps_per_update = "n_steps"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
-        return {
-            "policy_kwargs": {
-                "net_arch": list(self.net_arch),
-                "log_std_init": self.log_std_init,
-                # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python,
-                # for equal numbers.
-                "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
-            },
-            "n_steps": self.n_steps,
-            "batch_size": self.batch_size,
-            "n_epochs": self.n_epochs,
-            "learning_rate": self.learning_rate,
-            "gamma": self.gamma,
-            "gae_lambda": self.gae_lambda,
-            "clip_range": self.clip_range,
-            "ent_coef": self.ent_coef,
+        arguments = self._own()
+        arguments["policy_kwargs"] = {
+            "net_arch": list(self.net_arch),
+            "log_std_init": arguments.pop("log_std_init"),
+            # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python, for
+            # equal numbers.
+            "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
         }
+        return arguments
 
 
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
@@ -161,29 +167,13 @@ class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     tau: float = 0.005
     ent_coef: float | str = "auto"
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.train_freq
+    _steps_per_update = "train_freq"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
-        return {
-            "policy_kwargs": {
-                "net_arch": list(self.net_arch),
-                "optimizer_kwargs": {"foreach": True},
-            },
-            "learning_rate": self.learning_rate,
-            "batch_size": self.batch_size,
-            "buffer_size": self.buffer_size,
-            "learning_starts": self.learning_starts,
-            "train_freq": self.train_freq,
-            "gradient_steps": self.gradient_steps,
-            "gamma": self.gamma,
-            "tau": self.tau,
-            "ent_coef": self.ent_coef,
-        }
+        policy = {"net_arch": list(self.net_arch), "optimizer_kwargs": {"foreach": True}}
+        return {"policy_kwargs": policy, **self._own()}
 
 
 class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
@@ -204,15 +194,20 @@ class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
     eval_every: int = 10_000
     arguments: dict[str, Any] = {}
 
-    @property
-    def update_steps(self) -> int:
-        """Env steps between two updates."""
-        return self.n_envs * self.steps_per_update
+    _steps_per_update = "steps_per_update"
 
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class or function besides policy, env and seed."""
         return self.arguments
+
+    def for_one_env(self) -> Self:
+        """Refuse more than one env: the argument that sets the steps of an update is not known."""
+        if self.n_envs > 1:
+            raise StudyError(
+                f"Only one instance of this env can exist: set n_envs=1, not {self.n_envs}."
+            )
+        return self
 
 
 class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
@@ -288,6 +283,26 @@ Settings = Sb3Settings | CloningSettings
 
 _Kind = TypeVar("_Kind", bound=msgspec.Struct)
 
+
+def require_budget(steps: int, settings: Settings, which: str = "") -> None:
+    """Refuse a budget that ends before the first evaluation.
+
+    Args:
+        steps: The budget.
+        settings: Settings of the learner.
+        which: "target" or "source", where there are two budgets.
+
+    Raises:
+        StudyError: If it does.
+    """
+    if steps < settings.eval_every:
+        budget = f"{steps} {which} steps" if which else f"{steps} steps"
+        raise StudyError(
+            f"A budget of {budget} is smaller than one evaluation, which comes every "
+            f"{settings.eval_every} steps: give at least that."
+        )
+
+
 # Tuned on the reaching finger only: each of four seeds ends with 200 of 200
 # targets reached (`python -m benchmarks.run finger-learned`).
 _FINGER: Final = PpoSettings(
@@ -311,8 +326,8 @@ _FINGER: Final = PpoSettings(
 # harder: both of two seeds reach 1,000, and one has dropped to 744 at the end.
 # `ppo-run` was tuned on the ant, seed 0: three seeds walk at 2.1, 2.0 and 1.5 m/s after 1,048,576
 # steps (the sources in benchmarks/results/atlas-ants-runs.json). `ppo-planar` has four times as
-# many updates and more noise at the start, which half cheetahs do not like. What each reaches
-# stands in `transfer/references`, and why it was chosen in docs/decisions.md.
+# many updates and more exploration noise at the start, with which half cheetahs end lower. The
+# results are in `transfer/references`, and the reasons in docs/decisions.md.
 LEARNERS: Final[dict[str, Settings]] = {
     "ppo-balance": PpoSettings(
         n_envs=16,
@@ -322,7 +337,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         learning_rate=1e-3,
         steps=24_576,
         eval_every=3072,
-        eval_episodes=5,
     ),
     "ppo-run": PpoSettings(
         n_envs=64,
@@ -334,7 +348,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
     "ppo-planar": PpoSettings(
         n_envs=16,
@@ -345,9 +358,8 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
-    # A stroke takes long: the learner looks farther ahead than for those that run.
+    # A swimming stroke takes longer than a stride, so the discount is closer to 1.
     "ppo-swim": PpoSettings(
         n_envs=16,
         n_steps=512,
@@ -359,10 +371,9 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
-        eval_episodes=5,
     ),
     "ppo-finger": _FINGER,
-    # Ten minutes of a rig's motion; source steps in simulation are cheap.
+    # Ten minutes of motion of the rig; source steps are simulated, and so cheap.
     "ppo-rig": msgspec.structs.replace(
         _FINGER, steps=30_720, source_steps=307_200, eval_every=6144
     ),
@@ -376,7 +387,6 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=81_920,
         eval_every=20_480,
-        eval_episodes=5,
     ),
     # Half a minute, and 1, 2, 5 and 10 minutes, at 20 steps a second.
     "cloning": CloningSettings(
@@ -415,7 +425,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "sac": (),
     "tqc": (),
 }
-"""The envs that the settings of each learner were tuned on; all others inherit them."""
+"""The envs that the settings of each learner were tuned on."""
 
 
 def tuning_text(learner: str, env: str) -> str:
@@ -426,7 +436,7 @@ def tuning_text(learner: str, env: str) -> str:
         env: Id of the env.
     """
     if not TUNED_ON.get(learner):
-        return "Nobody has stated what these settings were tuned on."
+        return "It is not stated what these settings were tuned on."
     name = env.rpartition("/")[2].removesuffix("-v1")
     tuned = " and ".join(TUNED_ON[learner])
     if name in TUNED_ON[learner]:

@@ -1,15 +1,16 @@
-"""A camera policy that learns from a teacher which sees what no camera shows.
+"""Train a camera policy from a teacher with privileged observations.
 
-The teacher drives on distances, speed and rate of turn, where learning by trial takes two minutes.
-It shows its driving to the student, which sees pictures alone (D. Chen et al., "Learning by
-Cheating", CoRL 2019). Then the student drives, and the teacher says what it would have done (S.
-Ross et al., "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online
-Learning", AISTATS 2011).
+The teacher observes distances, speed and rate of turn, from which reinforcement learning takes two
+minutes. First it drives, and the student clones it from pictures alone (D. Chen et al., "Learning
+by Cheating", CoRL 2019). Then the student drives, and its pictures are labelled with the teacher's
+actions (S. Ross et al., "A Reduction of Imitation Learning and Structured Prediction to No-Regret
+Online Learning", AISTATS 2011).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any, Final
 
 import gymnasium as gym
@@ -32,14 +33,14 @@ STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=300
 """Default settings of its cloning."""
 
 _EPISODE_STEPS: Final = 200
-# The teacher drives once, and the student, trained anew each time, this often. After one round of
-# as many steps students had 1.8 collisions per 100 m.
+# Rounds that the student drives, trained anew before each, after one round of the teacher. With one
+# round of as many steps students had 1.8 collisions per 100 m.
 _ROUNDS: Final = 2
-# A picture does not show the speed. Where a teacher brakes when it is fast and starts when it is
-# slow, a clone does the mean of both, and stood still for good on one course of 17. Less throttle
-# than this does not overcome the friction of all vehicles.
+# Pictures do not show the speed. Where the teacher brakes or starts depending on it, a clone takes
+# the mean of both actions; one stood still on one course of 17. Less throttle than this does not
+# overcome the friction of every vehicle.
 _LEAST_THROTTLE: Final = 0.25
-# Steps of a cloning that only serves to drive the next round.
+# Limit of the training steps of the clones that drive a round.
 _BETWEEN: Final = 1500
 
 
@@ -70,11 +71,12 @@ def train_student(
         raise StudyError(
             f"The teacher drives at least one step and the student {_ROUNDS}, got {steps} in total."
         )
-    made = env.make(max_episode_steps=_EPISODE_STEPS)
-    try:
+    with closing(env.make(max_episode_steps=_EPISODE_STEPS)) as made:
         inner = made.unwrapped
         if not isinstance(inner, CanBeTaught):
-            raise StudyError(f"{env} has no teachers: those that a vehicle's camera drives have.")
+            raise StudyError(
+                f"{env} has no teachers: choose an env of a vehicle's camera, such as Car."
+            )
         wanted, taught = inner.teacher_env, teacher.card.env.id
         if taught != wanted:
             name = wanted.rpartition("/")[2].removesuffix("-v1")
@@ -88,15 +90,13 @@ def train_student(
         for _ in range(_ROUNDS):
             lessons.drive(each, lessons.learned(most_steps=_BETWEEN))
         policy = lessons.learned()
-    finally:
-        made.close()
     return policy.described(
         env=env.id, arguments=env.kwargs, demonstrated_steps=steps, teacher=taught
     )
 
 
 class _Lessons:
-    """Pictures, and what the teacher would do where they were taken.
+    """Recorded pictures, labelled with the teacher's actions.
 
     Args:
         env: The student's env.
@@ -124,7 +124,12 @@ class _Lessons:
         self._episodes: list[int] = []
 
     def drive(self, steps: int, student: CameraPolicy | None = None) -> None:
-        """Drive and record; the teacher makes mistakes on purpose, the student its own."""
+        """Drive and record.
+
+        Args:
+            steps: Number of steps.
+            student: The policy that drives; None for the teacher, with its disturbances.
+        """
         end = len(self._actions) + steps
         while len(self._actions) < end:
             picture = self._env.reset(seed=None if self._episodes else self._seed)[0]

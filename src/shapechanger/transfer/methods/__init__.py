@@ -9,14 +9,16 @@ as `my_package:warm-start`, which imports `my_package` first, as Gymnasium's ids
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import msgspec
 
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners import DemonstrationFile
 
 if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
@@ -24,8 +26,9 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners import Learner
     from shapechanger.transfer.learners.evaluation import Evaluation
     from shapechanger.transfer.learners.settings import Settings
+    from shapechanger.transfer.plan import Plan, Run
 
-__all__ = ["Method", "MethodRun", "TrainFunction", "load_method", "method_names", "register"]
+__all__ = ["Method", "MethodRun", "load_method", "method_names", "register"]
 
 _GROUP: Final = "shapechanger.methods"
 _HERE: Final = "shapechanger.transfer.methods"
@@ -45,7 +48,6 @@ _SHIPPED: Final = {
 }
 
 
-@dataclass(frozen=True)
 class MethodRun:
     """One run of a method: the bodies, the budget, and how to train and to evaluate.
 
@@ -59,24 +61,93 @@ class MethodRun:
         source_steps: Source steps that a policy of the method's own may be trained for.
         seed: Seed of the run; everything random follows from it.
         folder: Folder of the run, for files of the method's own.
-        source_policy: Loads the source policy of this run's seed.
         report: Records an evaluation on the target. Those of a method that learns on the target are
             at the same steps as those of scratch.
-        train: Trains a policy, see `TrainFunction`.
+
+    Args:
+        plan: The plan of the study.
+        run: The run.
+        study: Folder of the study.
+        learner: The learner.
+        given: File of the given source policy; None if the study trains its own.
+        report: See the attribute.
+        on_steps: Called with the number of steps done in all trainings of this run.
     """
 
-    source: EnvRef
-    target: EnvRef
-    body_map: BodyMap
-    learner: Learner
-    settings: Settings
-    steps: int
-    source_steps: int
-    seed: int
-    folder: Path
-    source_policy: Callable[[], Any]
-    report: Callable[[Evaluation], None]
-    train: TrainFunction
+    def __init__(
+        self,
+        plan: Plan,
+        run: Run,
+        study: Path,
+        learner: Learner,
+        *,
+        given: Path | None,
+        report: Callable[[Evaluation], None],
+        on_steps: Callable[[int], None],
+    ) -> None:
+        self.source = plan.task.source
+        self.target = plan.target_of(run)
+        self.body_map = plan.body_map
+        self.learner = learner
+        self.settings = plan.settings
+        self.steps = plan.steps
+        self.source_steps = plan.source_steps
+        self.seed = plan.seed_of(run)
+        self.folder = run.folder(study)
+        self.report = report
+        self._plan = plan
+        self._run = run
+        self._study = study
+        self._given = given
+        self._on_steps = on_steps
+        self._done = 0
+
+    def source_policy(self) -> Any:
+        """Load the source policy of this run's seed."""
+        trained = msgspec.structs.replace(self._run, kind="source").policy_file(self._study)
+        return self.learner.load(self._given or trained)
+
+    def train(
+        self,
+        env: EnvRef,
+        steps: int,
+        *,
+        start: Any = None,
+        body_map: BodyMap | None = None,
+        callback: Any = None,
+        on_evaluation: Callable[[Evaluation], None] = lambda evaluation: None,
+    ) -> Any:
+        """Train a policy with the study's learner.
+
+        Args:
+            env: The env to train in.
+            steps: Its steps.
+            start: A policy of another body to start from; None for a new one.
+            body_map: Map from that body to that of `env`.
+            callback: A callback of Stable-Baselines3 for the training; learners that are not of
+                Stable-Baselines3 refuse one.
+            on_evaluation: Called with each evaluation in `env`.
+        """
+        run, before = self._run, self._done
+        if env == self.target:
+            # All arms share the demonstrations of a target: they differ only in where they start.
+            run = msgspec.structs.replace(run, kind="scratch")
+        policy = self.learner.train(
+            env,
+            steps,
+            self.seed,
+            demonstrations=DemonstrationFile(
+                self._study / "demonstrations" / f"{run.name}.npz", self._plan.seed_of(run)
+            ),
+            start=start,
+            body_map=body_map,
+            only_last=env != self.target,
+            callback=callback,
+            on_evaluation=on_evaluation,
+            on_steps=lambda now: self._on_steps(before + now),
+        )
+        self._done += steps
+        return policy
 
     def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:
         """Evaluate a policy on the target, without training it.
@@ -86,33 +157,6 @@ class MethodRun:
             body_map: Map from its body to the target's; the study's if not given.
         """
         return self.learner.evaluate(self.target, policy, body_map or self.body_map)
-
-
-class TrainFunction(Protocol):
-    """Train a policy with the study's learner: the type of `MethodRun.train`."""
-
-    def __call__(
-        self,
-        env: EnvRef,
-        steps: int,
-        *,
-        start: Any = None,
-        body_map: BodyMap | None = None,
-        callback: Any = None,
-        on_evaluation: Callable[[Evaluation], None] | None = None,
-    ) -> Any:
-        """Train a policy.
-
-        Args:
-            env: The env to train in.
-            steps: Its steps.
-            start: A policy of another body to start from; None for a new one.
-            body_map: Map from that body to that of `env`.
-            callback: A callback of Stable-Baselines3 for the training; learners that are not of
-                Stable-Baselines3 refuse one.
-            on_evaluation: Called with each evaluation in `env`; None if there is no need of them.
-        """
-        ...
 
 
 class Method:
@@ -145,6 +189,10 @@ class Method:
         Raises:
             StudyError: With the reason.
         """
+
+    def _lacks(self, needed: str) -> StudyError:
+        """Return the error for a study without what the method needs."""
+        return StudyError(f"{self.name} needs {needed}: leave this arm out.")
 
     def learn(self, run: MethodRun) -> Any:
         """Run the method once, and return its policy; None if it trains none.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from contextlib import closing
 from typing import Any, Final, cast
 
-from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
 from shapechanger.transfer.files import write_json
 from shapechanger.transfer.learners.settings import Settings
@@ -23,12 +23,8 @@ class AdaptedSource(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Adapt the source, train in it, and evaluate on the target."""
-        source, target = run.source.make(), run.target.make()
-        try:
+        with closing(run.source.make()) as source, closing(run.target.make()) as target:
             env = run.source.having(self.arguments(source.unwrapped, target.unwrapped, run.seed))
-        finally:
-            source.close()
-            target.close()
         write_json(run.folder / _SOURCE, env)
         policy = run.train(env, run.source_steps)
         run.report(run.evaluate(policy))
@@ -59,11 +55,11 @@ class Randomised(AdaptedSource):
         """Require two bodies of one family and space, or a target that knows its own range."""
         del settings
         alike = source.family and source.family == target.family
-        if target.adapts_source or (alike and _same_layouts(source, target)):
+        if target.adapts_source or (alike and source.same_layouts(target)):
             return
-        raise StudyError(
-            f"{self.name} needs two bodies of one family with the same spaces, or a target that "
-            "can adapt the source to itself, such as a finger: leave this arm out."
+        raise self._lacks(
+            "two bodies of one family with the same spaces, or a target that can adapt the source "
+            "to itself, such as a finger"
         )
 
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
@@ -84,19 +80,9 @@ class Identified(AdaptedSource):
         """Refuse a target that cannot adapt its source."""
         del source, settings
         if not target.adapts_source:
-            raise StudyError(
-                f"{self.name} needs a target that can adapt the source to itself, such as a "
-                "finger: leave this arm out."
-            )
+            raise self._lacks("a target that can adapt the source to itself, such as a finger")
 
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Move the target, and return what was identified."""
         del source
         return cast("SourceAdaptation", target).identified_source(seed)
-
-
-def _same_layouts(source: EnvTraits, target: EnvTraits) -> bool:
-    return (source.observation_layout, source.action_layout) == (
-        target.observation_layout,
-        target.action_layout,
-    )

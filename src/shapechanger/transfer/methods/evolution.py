@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any, Final
 
 import msgspec
@@ -32,17 +33,12 @@ class Evolution(Method):
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
         """Refuse bodies of two families, and learners that are not of Stable-Baselines3."""
         if not isinstance(settings, Sb3Settings):
-            raise StudyError(
-                f"{self.name} needs a learner of Stable-Baselines3: leave this arm out."
-            )
+            raise self._lacks("a learner of Stable-Baselines3")
         if not source.family or source.family != target.family:
-            raise StudyError(
-                f"{self.name} needs two bodies of one family, such as two ants: leave this arm out."
-            )
+            raise self._lacks("two bodies of one family, such as two ants")
 
     def learn(self, run: MethodRun) -> Any:
         """Train along the path, and then on the target."""
-        assert isinstance(run.settings, Sb3Settings)  # As `require` has seen.
         stage = run.settings.whole_updates(run.settings.eval_every)
         n_stages = int(_ON_THE_WAY * run.steps) // stage
         path = bodies_between(run.source, run.target, n_stages)
@@ -73,9 +69,8 @@ def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
     Raises:
         StudyError: If the bodies are not of one family.
     """
-    both = [source.make(), target.make()]
-    try:
-        start, end = (env.unwrapped for env in both)
+    with closing(source.make()) as first, closing(target.make()) as last:
+        start, end = first.unwrapped, last.unwrapped
         if not (
             isinstance(start, HasBodyFamily)
             and isinstance(end, HasBodyFamily)
@@ -86,19 +81,12 @@ def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
             target.having(start.arguments_towards(end, k / (count + 1)))
             for k in range(1, count + 1)
         ]
-    finally:
-        for env in both:
-            env.close()
 
 
 def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
     """The study's map where the layouts change as from source to target, else one by name."""
-    layouts: list[Any] = []
-    for ref in (one, other):
-        made = ref.make()
-        layouts.append(layouts_of(made))
-        made.close()
-    (seen, acted), (sees, acts) = layouts
+    with closing(one.make()) as before, closing(other.make()) as after:
+        (seen, acted), (sees, acts) = layouts_of(before), layouts_of(after)
     planned = run.body_map
     if (seen, acted) == (sees, acts):
         return BodyMap.identity(seen, acted)

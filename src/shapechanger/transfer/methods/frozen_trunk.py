@@ -7,7 +7,6 @@ from typing import Any, cast
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import nn
 
-from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvTraits
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
@@ -18,8 +17,8 @@ _LEAST_LAYERS = 2
 class FrozenTrunk(Method):
     """Fine-tune the first and the last layer of the policy, and keep those between.
 
-    The first layer reads the body's sensors and the last one moves its motors; what lies between
-    holds the skill, if it can be told apart from the body. The value network learns as a whole.
+    The first layer reads the body's sensors and the last one moves its motors; the layers between
+    hold the skill, as far as it is independent of the body. The whole value network learns.
     """
 
     name = "frozen-trunk"
@@ -29,10 +28,7 @@ class FrozenTrunk(Method):
         """Refuse learners other than PPO, and networks without a layer in the middle."""
         del source, target
         if not isinstance(settings, PpoSettings) or len(settings.net_arch) < _LEAST_LAYERS:
-            raise StudyError(
-                f"{self.name} needs PPO with at least {_LEAST_LAYERS} hidden layers: leave this "
-                "arm out."
-            )
+            raise self._lacks(f"PPO with at least {_LEAST_LAYERS} hidden layers")
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target, starting from the source policy."""

@@ -11,7 +11,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.nn.utils import clip_grad_norm_
 
-from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Learn
 from shapechanger.transfer.env_ref import EnvTraits
@@ -40,7 +39,7 @@ class Kickstart(Method):
         """Refuse learners other than PPO."""
         del source, target
         if not isinstance(settings, PpoSettings):
-            raise StudyError(f"{self.name} needs PPO: leave this arm out.")
+            raise self._lacks("PPO")
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target with the source policy as the teacher."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import Any, Final, NamedTuple, cast
 
 import msgspec
@@ -14,7 +15,6 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor, nn
 from torch.nn import functional
 
-from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate, evaluation_envs
@@ -31,8 +31,9 @@ _NOISE: Final = 0.1
 _BATCH: Final = 256
 # Source steps between two gradient steps of the classifiers.
 _CLASSIFY_EVERY: Final = 4
-# Limits what one transition that the classifiers are sure of can cost or earn.
+# Bound on the correction of a single transition's reward.
 _LARGEST_CORRECTION: Final = 10.0
+_REPLAY: Final = "a learner with a replay buffer, sac or tqc"
 
 
 class Transitions(NamedTuple):
@@ -58,7 +59,7 @@ class PrefilledReplay(Method):
 
     The source policy acts in the source with its exploration noise for half as many steps as there
     are target steps. Observations are mapped by the names of the two bodies, actions by the study's
-    body map, rewards stay. Nothing marks them as another body's.
+    body map, rewards stay. They are not marked as those of another body.
     """
 
     name = "prefilled-replay"
@@ -67,7 +68,8 @@ class PrefilledReplay(Method):
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
         """Refuse learners without a replay buffer."""
         del source, target
-        _require_replay(self.name, settings)
+        if not isinstance(settings, OffPolicySettings):
+            raise self._lacks(_REPLAY)
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target."""
@@ -86,9 +88,9 @@ class OffDynamics(Method):
 
     Two classifiers tell source from target, one by (s, a, s') and one by (s, a). Their difference
     estimates log p_target(s' | s, a) - log p_source(s' | s, a), which is added to the source's
-    reward: what only the source's body can do is no longer worth doing. The policy learns from
-    source steps alone, as many as a source policy has; it also acts on the target for the budget of
-    target steps, from which only the classifiers learn.
+    reward, so that transitions which only the source's body can make are penalised. The policy
+    learns from source steps alone, as many as a source policy has; it also acts on the target for
+    the budget of target steps, from which only the classifiers learn.
     """
 
     name = "off-dynamics"
@@ -97,15 +99,12 @@ class OffDynamics(Method):
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
         """Refuse learners without a replay buffer, or that normalise, and bodies of two spaces."""
-        _require_replay(self.name, settings)
-        same = (source.observation_layout, source.action_layout) == (
-            target.observation_layout,
-            target.action_layout,
-        )
-        if not same:
-            raise StudyError(f"{self.name} needs two bodies with the same spaces: leave it out.")
-        if cast("OffPolicySettings", settings).normalise:
-            raise StudyError(f"{self.name} needs a learner with normalise=false: leave it out.")
+        if not isinstance(settings, OffPolicySettings):
+            raise self._lacks(_REPLAY)
+        if not source.same_layouts(target):
+            raise self._lacks("two bodies with the same spaces")
+        if settings.normalise:
+            raise self._lacks("a learner with normalise=false")
 
     def learn(self, run: MethodRun) -> Any:
         """Train in the source, beside acting on the target."""
@@ -114,13 +113,6 @@ class OffDynamics(Method):
             return run.train(run.source, run.source_steps, callback=correction)
         finally:
             correction.close()
-
-
-def _require_replay(name: str, settings: Settings) -> None:
-    if not isinstance(settings, OffPolicySettings):
-        raise StudyError(
-            f"{name} needs a learner with a replay buffer, sac or tqc: leave this arm out."
-        )
 
 
 def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:
@@ -132,10 +124,9 @@ def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transi
         steps: Number of steps.
         seed: Seed of the first start; it increases by one per episode.
     """
-    made = env.make()
     act = actor(policy.model, policy.normalisation, deterministic=False)
     rows: list[tuple[Any, ...]] = []
-    try:
+    with closing(env.make()) as made:
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
         seen, _ = made.reset(seed=seed)
         for _ in range(steps):
@@ -146,8 +137,6 @@ def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transi
             if terminated or truncated:
                 seed += 1
                 seen, _ = made.reset(seed=seed)
-    finally:
-        made.close()
     return Transitions(*(np.asarray(column) for column in zip(*rows, strict=True)))
 
 

@@ -17,9 +17,9 @@ _WHY = "shuffled"
 
 
 class ShuffledMap(Method):
-    """Fine-tune through a body map that confuses all entries: a control of what the map is worth.
+    """Fine-tune through a body map with exchanged entries: a control of what the map contributes.
 
-    Weights of the source policy that help whatever their inputs and outputs mean help here, too.
+    A gain that remains does not depend on which inputs and outputs correspond.
     """
 
     name = "shuffled-map"

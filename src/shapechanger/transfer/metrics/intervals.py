@@ -19,6 +19,9 @@ from shapechanger.errors import StudyError
 
 IntervalKind = Literal["Welch's t", "studentised bootstrap", "stratified bootstrap", "none"]
 
+CONFIDENCE: Final = 0.95
+"""Confidence of the intervals of studies."""
+
 # Numbers that differ by a smaller share of their size are equal up to rounding.
 _ROUNDING: Final = 1e-12
 # The square of a smaller spread, divided by another one, would underflow.
@@ -53,7 +56,7 @@ def undefined(note: str) -> Estimate:
 
 
 def estimate_difference(
-    arm: NDArray[np.float64], scratch: NDArray[np.float64], *, confidence: float = 0.95
+    arm: NDArray[np.float64], scratch: NDArray[np.float64], *, confidence: float = CONFIDENCE
 ) -> Estimate:
     """Difference of means, arm minus scratch, with Welch's t-interval.
 
@@ -88,7 +91,7 @@ def estimate_ratio(
     least: float,
     too_small: str,
     rng: np.random.Generator,
-    confidence: float = 0.95,
+    confidence: float = CONFIDENCE,
     n_resamples: int = 10_000,
 ) -> Estimate:
     """Ratio of means, arm over scratch, with its studentised bootstrap interval.

@@ -10,7 +10,6 @@ through `in_total_steps`, in total steps. Positive differences mean that transfe
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final, Literal
 
 import msgspec
@@ -25,6 +24,7 @@ from shapechanger.transfer.metrics.curves import (
     in_total_steps,
 )
 from shapechanger.transfer.metrics.intervals import (
+    CONFIDENCE,
     Estimate,
     estimate_difference,
     estimate_ratio,
@@ -39,9 +39,7 @@ _NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation 
 _ZERO_AREA: Final = 1e-9
 
 
-def jumpstart(
-    arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
-) -> Estimate:
+def jumpstart(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
     """Initial advantage of the arm on the target, in units of the curves.
 
     p_arm(0) - p_scratch(0) in target steps; in total steps p_arm(0) - p_scratch(source_steps),
@@ -51,20 +49,15 @@ def jumpstart(
     Args:
         arm: Curves of the arm; one evaluation is enough.
         scratch: Curves of the baseline, evaluated at the same steps.
-        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared.
     """
     check_comparable(arm, scratch)
-    return estimate_difference(
-        arm.returns[:, 0], scratch.at(arm.source_steps)[:, 0], confidence=confidence
-    )
+    return estimate_difference(arm.returns[:, 0], scratch.at(arm.source_steps)[:, 0])
 
 
-def asymptotic_gain(
-    arm: LearningCurves, scratch: LearningCurves, *, last_k: int, confidence: float = 0.95
-) -> Estimate:
+def asymptotic_gain(arm: LearningCurves, scratch: LearningCurves, *, last_k: int) -> Estimate:
     """Final advantage of the arm, in units of the curves.
 
     Mean of p_arm over the last k evaluations minus that of p_scratch. In total steps the arm is
@@ -75,26 +68,19 @@ def asymptotic_gain(
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
         last_k: k, number of final evaluations, >= 1. The definition uses one; more reduce noise.
-        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared or have fewer than k evaluations.
     """
     check_comparable(arm, scratch)
     steps = scratch.last_steps(last_k)
-    gain = estimate_difference(
-        arm.at(steps).mean(axis=1), scratch.at(steps).mean(axis=1), confidence=confidence
-    )
+    gain = estimate_difference(arm.at(steps).mean(axis=1), scratch.at(steps).mean(axis=1))
     if arm.n_evals > 1:
         return gain
-    return Estimate(
-        gain.value, gain.low, gain.high, gain.method, f"{_NOT_TRAINED} {gain.note}".rstrip()
-    )
+    return msgspec.structs.replace(gain, note=f"{_NOT_TRAINED} {gain.note}".rstrip())
 
 
-def total_reward_gain(
-    arm: LearningCurves, scratch: LearningCurves, *, confidence: float = 0.95
-) -> Estimate:
+def total_reward_gain(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
     """Advantage of the arm averaged over the budget, in units of the curves.
 
     (∫ p_arm - ∫ p_scratch) / H by the trapezoid rule. Taylor & Stone's total reward is the area;
@@ -104,7 +90,6 @@ def total_reward_gain(
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
-        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -112,7 +97,7 @@ def total_reward_gain(
     check_comparable(arm, scratch)
     if arm.n_evals == 1:
         return undefined(_NO_CURVE)
-    return estimate_difference(arm.auc(), scratch.auc(), confidence=confidence)
+    return estimate_difference(arm.auc(), scratch.auc())
 
 
 def auc_ratio(
@@ -120,7 +105,6 @@ def auc_ratio(
     scratch: LearningCurves,
     *,
     rng: np.random.Generator,
-    confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Estimate:
     """Area under the arm's curve over that of scratch, a pure number; 1 if they are equal.
@@ -133,7 +117,6 @@ def auc_ratio(
         arm: Scores of the arm.
         scratch: Scores of the baseline, evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Confidence of the studentised bootstrap interval.
         n_resamples: Number of resamples.
 
     Raises:
@@ -148,7 +131,6 @@ def auc_ratio(
         least=_ZERO_AREA,
         too_small="Undefined: the area under scratch's curve is not above zero.",
         rng=rng,
-        confidence=confidence,
         n_resamples=n_resamples,
     )
 
@@ -163,7 +145,6 @@ def forward_transfer(
     scratch: LearningCurves,
     *,
     rng: np.random.Generator,
-    confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Estimate:
     """Forward transfer of Continual World, a pure number of at most 1; 0 means no effect.
@@ -177,7 +158,6 @@ def forward_transfer(
         arm: Scores of the arm from `Reference.scores(..., clip=True)`.
         scratch: Scores of the baseline, clipped too and evaluated at the same steps.
         rng: Draws the resamples.
-        confidence: Confidence of the studentised bootstrap interval.
         n_resamples: Number of resamples.
 
     Raises:
@@ -199,7 +179,6 @@ def forward_transfer(
         least=MIN_HEADROOM,
         too_small=f"Undefined: scratch leaves a headroom of less than {MIN_HEADROOM:g}.",
         rng=rng,
-        confidence=confidence,
         n_resamples=n_resamples,
     )
     return Estimate(
@@ -271,7 +250,7 @@ def steps_to_reach(curves: LearningCurves, threshold: float) -> NDArray[np.float
 
 
 def time_to_threshold(
-    arm: LearningCurves, scratch: LearningCurves, threshold: float, *, confidence: float = 0.95
+    arm: LearningCurves, scratch: LearningCurves, threshold: float
 ) -> TimeToThreshold:
     """Taylor & Stone's time to threshold (JMLR 10, 2009, section 2), without dropping seeds.
 
@@ -282,7 +261,6 @@ def time_to_threshold(
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
         threshold: Declared before the study, in units of the curves.
-        confidence: Confidence of Welch's interval.
 
     Raises:
         StudyError: If the curves cannot be compared or the threshold is not finite.
@@ -298,7 +276,6 @@ def time_to_threshold(
         # Swapped: fewer steps are the gain.
         np.minimum(scratch_steps, scratch.horizon),
         np.minimum(arm_steps, arm.horizon),
-        confidence=confidence,
     )
     return TimeToThreshold(
         threshold,
@@ -393,9 +370,7 @@ def summarise(
     *,
     source_steps: float,
     rng: np.random.Generator,
-    thresholds: Sequence[float] = DEFAULT_THRESHOLDS,
     last_k: int = 5,
-    confidence: float = 0.95,
     n_resamples: int = 10_000,
 ) -> Summary:
     """Compute all measures of one arm against scratch, in target steps and in total steps.
@@ -408,9 +383,7 @@ def summarise(
         source_steps: Training steps of the arm on the source, >= 0.
         rng: Draws the resamples. Both ways of counting use the same ones, so that without source
             steps they are equal.
-        thresholds: Thresholds, in units of score.
         last_k: Number of final evaluations that are averaged.
-        confidence: Confidence of every interval, between 0 and 1.
         n_resamples: Resamples of each bootstrap interval.
 
     Raises:
@@ -420,9 +393,7 @@ def summarise(
     draws = int(rng.integers(2**63))
 
     def measure(counted: LearningCurves) -> Measures:
-        return _measure(
-            counted, scratch, reference, thresholds, last_k, draws, confidence, n_resamples
-        )
+        return _measure(counted, scratch, reference, last_k, draws, n_resamples)
 
     return Summary(
         unit="score" if reference.defined else "value",
@@ -432,7 +403,7 @@ def summarise(
         n_seeds_arm=arm.n_seeds,
         n_seeds_scratch=scratch.n_seeds,
         last_k=last_k,
-        confidence=confidence,
+        confidence=CONFIDENCE,
         in_target_steps=measure(arm),
         in_total_steps=measure(in_total_steps(arm, source_steps, floor=reference.zero)),
     )
@@ -442,38 +413,27 @@ def _measure(
     arm: LearningCurves,
     scratch: LearningCurves,
     reference: Reference,
-    thresholds: Sequence[float],
     last_k: int,
     draws: int,
-    confidence: float,
     n_resamples: int,
 ) -> Measures:
     """Compute all measures in one way of counting; the curves are in units of return."""
     ratio, transfer = undefined(_NO_SCORES), undefined(_NO_SCORES)
-    times = tuple(TimeToThreshold(height, None, None, ratio) for height in thresholds)
+    times = tuple(TimeToThreshold(height, None, None, ratio) for height in DEFAULT_THRESHOLDS)
     if reference.defined:
         transfer = forward_transfer(
             reference.scores(arm, clip=True),
             reference.scores(scratch, clip=True),
             rng=np.random.default_rng(draws),
-            confidence=confidence,
             n_resamples=n_resamples,
         )
         arm, scratch = reference.scores(arm), reference.scores(scratch)
-        ratio = auc_ratio(
-            arm,
-            scratch,
-            rng=np.random.default_rng(draws),
-            confidence=confidence,
-            n_resamples=n_resamples,
-        )
-        times = tuple(
-            time_to_threshold(arm, scratch, height, confidence=confidence) for height in thresholds
-        )
+        ratio = auc_ratio(arm, scratch, rng=np.random.default_rng(draws), n_resamples=n_resamples)
+        times = tuple(time_to_threshold(arm, scratch, height) for height in DEFAULT_THRESHOLDS)
     return Measures(
-        jumpstart=jumpstart(arm, scratch, confidence=confidence),
-        asymptotic_gain=asymptotic_gain(arm, scratch, last_k=last_k, confidence=confidence),
-        total_reward_gain=total_reward_gain(arm, scratch, confidence=confidence),
+        jumpstart=jumpstart(arm, scratch),
+        asymptotic_gain=asymptotic_gain(arm, scratch, last_k=last_k),
+        total_reward_gain=total_reward_gain(arm, scratch),
         auc_ratio=ratio,
         forward_transfer=transfer,
         times_to_threshold=times,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.intervals import CONFIDENCE, Estimate
 
 # A quarter of the runs is left out at each end.
 _TRIMMED = 0.25
@@ -28,7 +28,6 @@ def interquartile_mean(
     scores: _Groups,
     *,
     rng: np.random.Generator,
-    confidence: float = 0.95,
     n_resamples: int = 2000,
 ) -> Estimate:
     """Mean of the middle half of all runs, in units of score.
@@ -36,7 +35,6 @@ def interquartile_mean(
     Args:
         scores: For each study one number for each run, shape (n_runs,).
         rng: Draws the resamples.
-        confidence: Confidence of the interval, between 0 and 1.
         n_resamples: Number of resamples.
 
     Raises:
@@ -46,7 +44,7 @@ def interquartile_mean(
     mean: Any = stats.trim_mean(np.concatenate(scores), _TRIMMED)
     drawn = np.concatenate([_drawn(group, n_resamples, rng) for group in scores], axis=1)
     means: Any = stats.trim_mean(drawn, _TRIMMED, axis=1)
-    return _between(float(mean), means, confidence)
+    return _between(float(mean), means)
 
 
 def probability_of_improvement(
@@ -54,7 +52,6 @@ def probability_of_improvement(
     scratch: _Groups,
     *,
     rng: np.random.Generator,
-    confidence: float = 0.95,
     n_resamples: int = 2000,
 ) -> Estimate:
     """Probability that a run of the arm ends above a run of scratch, averaged over studies.
@@ -65,7 +62,6 @@ def probability_of_improvement(
         arm: For each study one number for each run of the arm.
         scratch: The same of scratch, in the same order of studies.
         rng: Draws the resamples.
-        confidence: Confidence of the interval, between 0 and 1.
         n_resamples: Number of resamples.
 
     Raises:
@@ -81,7 +77,7 @@ def probability_of_improvement(
         for x, y in zip(arm, scratch, strict=True)
     ]
     value = np.mean([_chance(x[None], y[None]) for x, y in zip(arm, scratch, strict=True)])
-    return _between(float(value), np.mean(chances, axis=0), confidence)
+    return _between(float(value), np.mean(chances, axis=0))
 
 
 def _chance(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,7 +97,7 @@ def _drawn(
     return group[rng.integers(group.size, size=(n_resamples, group.size))]
 
 
-def _between(value: float, draws: NDArray[np.float64], confidence: float) -> Estimate:
-    tail = (1.0 - confidence) / 2.0
+def _between(value: float, draws: NDArray[np.float64]) -> Estimate:
+    tail = (1.0 - CONFIDENCE) / 2.0
     low, high = (float(np.quantile(draws, q)) for q in (tail, 1.0 - tail))
     return Estimate(value, low, high, "stratified bootstrap")

@@ -55,7 +55,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def text(self) -> str:
-        """Where it comes from, in words."""
+        """Its origin as text."""
         return f"the reference ({self.learner}, {self.steps:,} steps, {len(self.seeds)} seeds)"
 
 
@@ -67,19 +67,12 @@ def load_references() -> dict[str, EnvReference]:
 
 
 def reference_of(env: EnvRef) -> EnvReference | None:
-    """Return the reference of an env; None if there is none for this env with these arguments.
-
-    Args:
-        env: The env.
-    """
+    """Return the reference of an env; None if there is none for this env with these arguments."""
     return None if env.kwargs else load_references().get(env.id)
 
 
 def reference_policy(env_id: str) -> Path:
     """Return the file of the policy that ships for an env.
-
-    Args:
-        env_id: Id of the env.
 
     Raises:
         UnknownName: If none ships.

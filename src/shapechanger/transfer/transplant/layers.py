@@ -18,7 +18,12 @@ from shapechanger.errors import TransplantError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 
-Vector = NDArray[np.float64]
+EPSILON: Final = 1e-8
+"""Default of Stable-Baselines3's `VecNormalize`: what is added to a variance."""
+CLIP: Final = 10.0
+"""Default of `VecNormalize`: the largest magnitude of a normalised number."""
+
+Array = NDArray[np.float64]
 
 
 class Affine(NamedTuple):
@@ -29,8 +34,8 @@ class Affine(NamedTuple):
         offset: Shape (n_source,).
     """
 
-    matrix: Vector
-    offset: Vector
+    matrix: Array
+    offset: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +48,8 @@ class Scaling:
         clip: Largest magnitude of z.
     """
 
-    mean: Vector
-    sigma: Vector
+    mean: Array
+    sigma: Array
     clip: float = math.inf
 
     @classmethod
@@ -132,8 +137,6 @@ def _guessed_variance(feature: Feature) -> float:
 _CLOSEST_TO_BOUND: Final = 1.0 - 1e-6
 # Bounds of a Box are in single precision.
 _SAME: Final = 1e-6
-
-Array = NDArray[np.float64]
 
 
 class OutputMap(NamedTuple):

@@ -27,6 +27,8 @@ from shapechanger.errors import TransplantError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.transplant.layers import (
+    CLIP,
+    EPSILON,
     Affine,
     Edges,
     PolicyOutputs,
@@ -55,18 +57,7 @@ def _new_model(
     device: torch.device | str,
     changes: dict[str, Any],
 ) -> Model:
-    """Build an untrained model with the class and settings of `source`.
-
-    Args:
-        source: The source model.
-        env: The env of the new model.
-        seed: Its seed.
-        device: Its device.
-        changes: Arguments of the class that differ.
-
-    Raises:
-        TransplantError: If the source uses action noise and `changes` does not replace it.
-    """
+    """Build an untrained model with the class and settings of `source`, except for `changes`."""
     kept: dict[str, Any] = {}
     for name in inspect.signature(cast("Any", type(source)).__init__).parameters:
         attribute = _KEPT_AS.get(name, name)
@@ -145,11 +136,6 @@ def _problem(model: object) -> str:
     return ""
 
 
-# Defaults of VecNormalize.
-_EPSILON = 1e-8
-_CLIP = 10.0
-
-
 def transplant(
     source_model: Model,
     body_map: BodyMap,
@@ -163,10 +149,10 @@ def transplant(
     """Return a model that does in the target what the source model does through the map.
 
     The actor, PPO's value network, the critics of SAC and TQC and their targets, log standard
-    deviations and the
-    entropy coefficient are moved; optimisers, buffers and step counts are new. An action to be
-    learned gets the weights, and with PPO the log standard deviation, of an untrained policy. A
-    constant action gets the mean log standard deviation of the source, so that it is explored.
+    deviations and the entropy coefficient are moved; optimisers, buffers and step counts are new.
+    An action to be learned gets the weights, and with PPO the log standard deviation, of an
+    untrained policy. A constant action gets the mean log standard deviation of the source, so that
+    it is explored.
 
     Observations: where the target env normalises them with `VecNormalize`, its statistics become
     those of the source, see `transplant_normalisation`. Where it does not, the source's statistics
@@ -245,8 +231,8 @@ def _sensed(
         if statistics is not None:
             target.epsilon, target.clip_obs = source.epsilon, source.clip_obs
     settings = source if isinstance(source, VecNormalize) else target
-    epsilon = settings.epsilon if settings is not None else _EPSILON
-    clip = settings.clip_obs if settings is not None else _CLIP
+    epsilon = settings.epsilon if settings is not None else EPSILON
+    clip = settings.clip_obs if settings is not None else CLIP
     before = Scaling.none(body_map.source_observation.size)
     after = Scaling.none(body_map.target_observation.size)
     if statistics is not None:

@@ -1,0 +1,96 @@
+"""The parallel envs of a training with Stable-Baselines3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import shapechanger
+from shapechanger.errors import MissingExtra
+from shapechanger.transfer.env_ref import EnvRef
+
+try:
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+except ImportError as error:
+    raise MissingExtra("stable-baselines3", "learn") from error
+
+
+class ThreadVecEnv(DummyVecEnv):
+    """Envs of one id, stepped by threads, bitwise equal to `DummyVecEnv`.
+
+    As in `DummyVecEnv`, an env that has ended is reset in the same step; its info then holds the
+    last observation as `terminal_observation`, `TimeLimit.truncated` in every info tells whether
+    only the time limit ended the episode, and rewards are float32.
+
+    Args:
+        env_id: A registered id.
+        num_envs: Number of envs.
+        threads: As in `shapechanger.make_vec`.
+        **arguments: All other arguments of `shapechanger.make_vec`.
+    """
+
+    def __init__(
+        self, env_id: str, num_envs: int, *, threads: int | None = None, **arguments: Any
+    ) -> None:
+        self._envs = shapechanger.make_vec(
+            env_id, num_envs, threads=threads, autoreset_mode="SameStep", **arguments
+        )
+        self.envs = self._envs.envs
+        # Not that of DummyVecEnv, which makes envs and buffers of its own.
+        cast("Any", VecEnv).__init__(
+            self, num_envs, self._envs.single_observation_space, self._envs.single_action_space
+        )
+        # As DummyVecEnv, which replaces what the base class assembled.
+        self.metadata = self.envs[0].metadata
+
+    def reset(self) -> NDArray[Any]:
+        """Reset each env with the seeds and options set before."""
+        options = [each or None for each in self._options]
+        observations, self.reset_infos = self._envs.reset_each(self._seeds, options)
+        self._reset_seeds()
+        self._reset_options()
+        return observations
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[Any], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Step each env; return observations, rewards, dones and infos."""
+        observations, results = self._envs.step_each(self.actions)
+        infos = results.of_each()
+        cut_off = results.truncated & ~results.terminated
+        for info, cut in zip(infos, cut_off.tolist(), strict=True):
+            info["TimeLimit.truncated"] = cut
+        for i, restart in results.restarts.items():
+            infos[i]["terminal_observation"] = restart.final_observation
+            self.reset_infos[i] = restart.info
+        ends = results.terminated | results.truncated
+        return observations, results.rewards.astype(np.float32), ends, infos
+
+    def close(self) -> None:
+        """Close the envs; may be called twice."""
+        self._envs.close()
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """Render one picture per env."""
+        return self._envs.render()
+
+
+def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
+    """Make the parallel envs of a training.
+
+    Envs of the catalogue are stepped by threads. Those of others may share state, so they are
+    stepped one after another; the numbers would be the same.
+
+    Args:
+        env: The env.
+        num_envs: Number of envs.
+        threads: As in `shapechanger.make_vec`.
+    """
+    spec = gym.registry.get(env.id.rpartition(":")[2])
+    if spec is not None and str(spec.vector_entry_point).startswith("shapechanger."):
+        return ThreadVecEnv(env.id, num_envs, threads=threads, **env.kwargs)
+    return DummyVecEnv([env.make for _ in range(num_envs)])
