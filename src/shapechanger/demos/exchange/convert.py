@@ -21,8 +21,12 @@ from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
-from shapechanger.demos.exchange.minari_export import require_dataset_name, write_minari
-from shapechanger.demos.exchange.minari_format import METADATA, is_minari
+from shapechanger.demos.exchange.minari_export import (
+    METADATA,
+    is_minari,
+    require_dataset_name,
+    write_minari,
+)
 from shapechanger.demos.exchange.minari_import import read_minari
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub

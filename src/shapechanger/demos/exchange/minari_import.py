@@ -24,14 +24,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
-from shapechanger.demos.exchange import minari_format as names
+from shapechanger.demos.exchange import minari_export as names
 from shapechanger.demos.exchange.files import (
     Pictures,
     parse_json_object,
     read_text,
     resolve_file,
 )
-from shapechanger.demos.exchange.minari_format import library, stored_as_jpeg
+from shapechanger.demos.exchange.minari_export import library, stored_as_jpeg
 from shapechanger.demos.exchange.recorded import DEFAULT_HZ, ExchangeEpisode, ExchangeStep
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
 from shapechanger.errors import DemosError, MissingExtra, UnknownName
