@@ -43,7 +43,8 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.row import Row
-from shapechanger.demos.cloning.judge import class_numbers, goal_of, macro_f1
+from shapechanger.demos.cloning.card import class_numbers
+from shapechanger.demos.cloning.judge import macro_f1, output_fields
 from shapechanger.demos.cloning.learn import DEMOS, clone, learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -168,7 +169,7 @@ def scores(
     data: Dataset, seeds: int = SEEDS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Accuracy, macro-F1 and seconds of ours and of the plain network, each (splits, seeds, 3)."""
-    classes = goal_of(data.actions, data.action_layout, "class").classes
+    classes = output_fields(data.actions, data.action_layout, "class")["classes"]
     truth = class_numbers(data.actions, classes)
     pictures = prepare(_pictures(data), DEMOS.framing)
     squares = prepare(_pictures(data), _PLAIN_SEES)
@@ -248,9 +249,9 @@ def rows(ours: NDArray[np.float64], theirs: NDArray[np.float64], straight: float
 def _from_simulation(data: Dataset) -> list[Row]:
     """What clones of the simulated expert are worth on the real frames."""
     pictures = _pictures(data)
-    names = goal_of(data.actions, data.action_layout, "class")
-    truth = class_numbers(data.actions, names.classes)
-    left, right, forward = (truth == names.names.index(n) for n in ("left", "right", "forward"))
+    fields = output_fields(data.actions, data.action_layout, "class")
+    truth, names = class_numbers(data.actions, fields["classes"]), fields["class_names"]
+    left, right, forward = (truth == names.index(n) for n in ("left", "right", "forward"))
     # The keys as a clone's action: full left or right, or straight on.
     keys = np.stack((right.astype(np.float32) - left, np.ones(len(truth), np.float32)), axis=1)
     later = np.arange(len(truth)) >= FEW

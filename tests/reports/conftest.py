@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.reports.study import report_html
+from shapechanger.reports.study import study_html
 from shapechanger.transfer.study import Study
 from tests.reports.studies import make_study
 
@@ -18,4 +18,4 @@ def study() -> Study:
 @pytest.fixture(scope="session")
 def page(study: Study) -> str:
     """Its report."""
-    return report_html(study, picture_note="No picture can be drawn here.")
+    return study_html(study, picture_note="No picture can be drawn here.")

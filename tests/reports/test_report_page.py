@@ -7,15 +7,13 @@ import io
 import re
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from shapechanger.errors import MissingExtra, OutputError
-from shapechanger.reports.page import png
-from shapechanger.reports.study import report_html, write_report
+from shapechanger.errors import MissingExtra
+from shapechanger.reports.study import study_html
 from shapechanger.reports.verdict import measure_rows, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.study import Study
@@ -152,7 +150,7 @@ def test_the_body_map_is_told(page: str) -> None:
 
 def test_bodies_that_match_have_no_list_of_strangers() -> None:
     """The page says that all is well instead of showing an empty table."""
-    read = Reader(report_html(make_study(the_map=same_body())))
+    read = Reader(study_html(make_study(the_map=same_body())))
     assert "Every entry has such a partner." in read.words
     assert "does not see" not in read.words
 
@@ -160,14 +158,14 @@ def test_bodies_that_match_have_no_list_of_strangers() -> None:
 def test_one_action_is_singular() -> None:
     """A pendulum has one motor."""
     pictures = (np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3), np.uint8))
-    read = Reader(report_html(make_study(the_map=same_body()), pictures))
+    read = Reader(study_html(make_study(the_map=same_body()), pictures))
     assert "Target: BigAnt-v1, 1 observation, 1 action" in read.words
 
 
 def test_reward_terms_show_what_a_return_is_made_of(page: str) -> None:
     """One column for each kind of run."""
     assert "forward 469.4 5 2.500 440.3 200 502.3" in Reader(page).words
-    assert "Reward terms" not in Reader(report_html(make_study())).words
+    assert "Reward terms" not in Reader(study_html(make_study())).words
 
 
 def test_names_cannot_break_the_page() -> None:
@@ -178,7 +176,7 @@ def test_names_cannot_break_the_page() -> None:
         shift=EVIL,
         terms=("reward_" + EVIL,),
     )
-    page = report_html(study, picture_note=EVIL)
+    page = study_html(study, picture_note=EVIL)
     read = Reader(page)
     assert "<script" not in page
     assert "script" not in read.tags
@@ -193,7 +191,8 @@ def test_pictures_are_in_the_page(study: Study) -> None:
         np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8),
         np.zeros((6, 8, 3), np.uint8)[:, ::-1],
     )
-    page = report_html(study, pictures, "To one scale.")
+    page = study_html(study, pictures, "To one scale.")
+    assert page == study_html(study, pictures, "To one scale.")
     found = re.findall(r'src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page)
     assert [alternative for _, alternative in found] == [
         "The body of shapechanger/Ant-v1",
@@ -207,16 +206,10 @@ def test_pictures_are_in_the_page(study: Study) -> None:
     assert "To one scale." in read.words
 
 
-def test_a_png_is_the_same_every_time() -> None:
-    """So that two reports of one study are one file."""
-    picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
-    assert png(picture) == png(picture.copy())
-
-
 def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
     """In the words given, or at least that there are none."""
     assert "No picture can be drawn here." in Reader(page).words
-    assert "There are no pictures." in Reader(report_html(study)).words
+    assert "There are no pictures." in Reader(study_html(study)).words
 
 
 @pytest.mark.parametrize(
@@ -234,31 +227,22 @@ def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
 )
 def test_whatever_is_missing_is_said(study: Study, words: str) -> None:
     """The page is whole in each case, and nowhere shows a hole of the program."""
-    read = Reader(report_html(study))
+    read = Reader(study_html(study))
     assert words in read.words
     assert re.search(r"\b(nan|inf|None|undefined \[)\b", read.words) is None
 
 
 def test_normalisation_is_told() -> None:
     """A reader must know whether returns are what the env gave: they always are."""
-    assert "reach the learner as they are" in Reader(report_html(make_study())).words
-    normal = Reader(report_html(make_study(normalise=True))).words
+    assert "reach the learner as they are" in Reader(study_html(make_study())).words
+    normal = Reader(study_html(make_study(normalise=True))).words
     assert "Returns in this report never are." in normal
 
 
-def test_the_file_is_written(study: Study, tmp_path: Path) -> None:
-    """The same bytes each time, as UTF-8."""
-    path = tmp_path / "report.html"
-    write_report(study, path)
-    assert path.read_text("utf-8") == report_html(study)
-    with pytest.raises(OutputError, match="missing"):
-        write_report(study, tmp_path / "missing" / "report.html")
-
-
 def test_without_matplotlib_the_extra_is_named(
-    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rows and verdict do without it; the page says what to install, and nothing is written."""
+    """Rows and verdict do without it; the error says what to install."""
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
@@ -266,5 +250,4 @@ def test_without_matplotlib_the_extra_is_named(
     assert measure_rows(study)
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):
-        write_report(study, tmp_path / "report.html")
-    assert list(tmp_path.iterdir()) == []
+        study_html(study)

@@ -13,7 +13,7 @@ import torch
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.reports.study import write_report
+from shapechanger.reports.study import study_html
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import DemonstrationFile, cloning
 from shapechanger.transfer.learners.cloning import (
@@ -207,11 +207,9 @@ def test_a_study_that_was_killed_ends_with_the_same_numbers(
     assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
 
 
-def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path], tmp_path: Path) -> None:
+def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path]) -> None:
     """The report has the learner and the curves."""
-    path = tmp_path / "report.html"
-    write_report(finished[0], path)
-    page = path.read_text(encoding="utf-8")
+    page = study_html(finished[0])
     assert "cloning" in page
     assert "tests/Lane-v0" in page
     assert "data:image/" in page

@@ -458,8 +458,8 @@ class _Page:
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it, and write the page."""
         from shapechanger.cli.films import film_study
-        from shapechanger.reports.suite import Sweep, write_suite_report
-        from shapechanger.transfer.files import write_json
+        from shapechanger.reports.suite import Sweep, suite_html
+        from shapechanger.transfer.files import write_atomic, write_json
 
         self._studies[name] = study
         for one in self._studies:
@@ -471,10 +471,9 @@ class _Page:
                     )
         ordered = {one: self._studies[one] for one in self._tasks if one in self._studies}
         swept = self._suite.sweep
-        write_suite_report(
+        page = suite_html(
             self._name,
             ordered,
-            self.path,
             seeds=self._suite.seeds,
             strips=self._strips,
             films={one: f"{one}/{_FILM}" for one, strips in self._strips.items() if strips},
@@ -489,6 +488,7 @@ class _Page:
             if swept and len(self._suite.sources) == 1 and not self._suite.targets
             else None,
         )
+        write_atomic(self.path, page.encode())
         write_json(self._out / _SUMMARY, self.outcomes())
 
     def outcomes(self) -> list[StudyOutcome]:

@@ -209,7 +209,8 @@ class Transfer:
 
 def write_study_report(study: Study, out: Path) -> Path:
     """Write the report, without pictures of the bodies if they cannot be rendered."""
-    from shapechanger.reports.study import write_report
+    from shapechanger.reports.study import study_html
+    from shapechanger.transfer.files import write_atomic
 
     path = out / "report.html"
     pictures, note = None, ""
@@ -217,7 +218,7 @@ def write_study_report(study: Study, out: Path) -> Path:
         pictures = _pictures(study.plan.task.source, study.plan.task.target)
     except RenderError as error:
         note = str(error)
-    write_report(study, path, pictures=pictures, picture_note=note)
+    write_atomic(path, study_html(study, pictures, note).encode())
     return path
 
 

@@ -89,21 +89,21 @@ def load_dataset(
     for driver in drivers:
         if driver not in DRIVERS:
             raise UnknownName("driver", driver, DRIVERS)
-    parts = [part for part in _parts(data, drivers, shrink) if part.actions]
+    parts = [part for part in _parts(data, drivers, shrink) if part.steps]
     if not parts:
         raise DemosError(f"There is no step of {' or '.join(sorted(drivers))} in {data}.")
     _require_same(parts)
     first = parts[0]
     pictures = [picture for part in parts for picture in part.pictures]
-    states = [state for part in parts for state in part.states]
+    steps = [step for part in parts for step in part.steps]
     layout = first.header.state_layout
     return Dataset(
         pictures=np.stack(pictures) if pictures else None,
-        states=np.array(states, np.float32) if layout else None,
-        actions=np.array([action for part in parts for action in part.actions], np.float32),
-        episodes=tuple(len(part.actions) for part in parts),
+        states=np.array([step.state for step in steps], np.float32) if layout else None,
+        actions=np.array([step.action for step in steps], np.float32),
+        episodes=tuple(len(part.steps) for part in parts),
         times_s=np.concatenate([part.times_s() for part in parts]),
-        files=tuple(file for part in parts for file in part.files),
+        files=tuple(f"{part.name}, step {step.index}" for part in parts for step in part.steps),
         action_layout=Layout.from_json(first.header.action_layout),
         state_layout=Layout.from_json(layout) if layout else None,
         control_hz=first.header.control_hz,
@@ -121,28 +121,25 @@ def count_steps(data: Path, *, drivers: Collection[str] = ("person", "expert")) 
 
 
 class _Part(NamedTuple):
-    """The steps of one episode."""
+    """The chosen steps of one episode, each with its picture if there are any."""
 
     name: str
     header: EpisodeHeader
+    steps: list[Step]
     pictures: list[NDArray[np.uint8]]
-    states: list[tuple[float, ...]]
-    actions: list[tuple[float, ...]]
-    captured: list[int | None]
-    indices: list[int]
-    files: list[str]
 
     def times_s(self) -> NDArray[np.float64]:
         """Return the time of each step, s; from the rate where a time is missing."""
-        known = [ns for ns in self.captured if ns is not None]
-        if len(known) < len(self.captured):
-            return (np.array(self.indices) - self.indices[0]) / self.header.control_hz
+        indices = [step.index for step in self.steps]
+        known = [step.captured_ns for step in self.steps if step.captured_ns is not None]
+        if len(known) < len(self.steps):
+            return (np.array(indices) - indices[0]) / self.header.control_hz
         times_s = (np.array(known, np.int64) - known[0]) / _NS_PER_S
         if (np.diff(times_s) < 0.0).any():
             worst = int(np.diff(times_s).argmin())
             raise DemosError(
-                f"Time runs backwards in {self.name} after step {self.indices[worst]}: exclude "
-                "steps with `shapechanger demos bad`."
+                f"Time runs backwards in {self.name} after step {indices[worst]}: exclude steps "
+                "with `shapechanger demos bad`."
             )
         return times_s
 
@@ -150,7 +147,7 @@ class _Part(NamedTuple):
 def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Iterator[_Part]:
     """Yield each episode, in order."""
     for name, header, steps in _episodes(data):
-        part = _Part(name, header, [], [], [], [], [], [])
+        part = _Part(name, header, [], [])
         newest: bytes | None = None
         decoded: bytes | None = None
         pixels = np.empty((0, 0, 3), np.uint8)
@@ -158,27 +155,23 @@ def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Itera
             newest = jpeg or newest
             if step.driver not in drivers:
                 continue
+            part.steps.append(step)
             if newest is not None:
                 if newest is not decoded and newest != decoded:
                     pixels = _pixels(part, newest, f"{name}/{step.frame or step.index}", shrink)
                     decoded = newest
                 part.pictures.append(pixels)
-            part.states.append(step.state)
-            part.actions.append(step.action)
-            part.captured.append(step.captured_ns)
-            part.indices.append(step.index)
-            part.files.append(f"{name}, step {step.index}")
-        if len(part.pictures) not in {0, len(part.actions)}:
+        if len(part.pictures) not in {0, len(part.steps)}:
             raise DemosError(f"Only some steps of {name} have pictures.")
         yield part
 
 
-_Steps = Iterator[tuple[Step, bytes | None]]
-
-
-def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, _Steps]]:
+def _episodes(
+    data: Path,
+) -> Iterator[tuple[str, EpisodeHeader, Iterator[tuple[Step, bytes | None]]]]:
     """Yield the name, the header, and the kept steps with their pictures, of each episode."""
-    if not data.exists() or _is_ours(data):
+    is_recording = data.is_dir() and any(map(is_episode, (data, *data.iterdir())))
+    if is_recording or not data.exists():
         for path in episodes_of(data):
             episode = read_episode(path)
             kept = ((step, episode.jpeg(step)) for step in episode.kept)
@@ -190,16 +183,8 @@ def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, _Steps]]:
         yield f"{data}, episode {number}", header, iter(steps)
 
 
-def _is_ours(data: Path) -> bool:
-    return data.is_dir() and (is_episode(data) or any(is_episode(p) for p in data.iterdir()))
-
-
 def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDArray[np.uint8]:
-    """Decode a picture, and reduce it.
-
-    Raises:
-        DemosError: If it is damaged, or its size differs from the header's.
-    """
+    """Decode a picture, and reduce it."""
     pixels = decode_picture(jpeg, where)
     size = pixels.shape[1], pixels.shape[0]
     if part.header.image_size not in {None, size}:
@@ -211,11 +196,7 @@ def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDAr
 
 
 def _require_same(parts: list[_Part]) -> None:
-    """Refuse episodes that differ in layout, picture size or rate.
-
-    Raises:
-        DemosError: If one differs from the first.
-    """
+    """Refuse episodes that differ in layout, picture size or rate."""
     first = parts[0]
     for part in parts[1:]:
         ratio = part.header.control_hz / first.header.control_hz
@@ -226,9 +207,7 @@ def _require_same(parts: list[_Part]) -> None:
             and bool(part.pictures) == bool(first.pictures),
             "steps a second": abs(ratio - 1.0) < _RATE_TOLERANCE,
         }
-        for what in same:
-            if not same[what]:
-                raise DemosError(
-                    f"{part.name} has other {what} than {first.name}: learn from one kind at a "
-                    "time."
-                )
+        if other := next((what for what, is_same in same.items() if not is_same), ""):
+            raise DemosError(
+                f"{part.name} has other {other} than {first.name}: learn from one kind at a time."
+            )

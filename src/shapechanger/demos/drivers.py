@@ -144,18 +144,6 @@ class DriverDecision:
     remark: str = ""
 
 
-class EpisodeDriver(Protocol):
-    """Interface of everything that can drive during a recording."""
-
-    def begin(self) -> None:
-        """Start an episode."""
-        ...
-
-    def decide(self, observation: Any) -> DriverDecision:
-        """Return the decision for an observation."""
-        ...
-
-
 class ExpertPilot:
     """An expert drives.
 
@@ -222,6 +210,10 @@ class CorrectedPilot:
         if self._gate.corrects:
             return DriverDecision(right, right, "expert", wanted, remark)
         return DriverDecision(wanted, wanted, "policy", None, remark)
+
+
+EpisodeDriver = ExpertPilot | PolicyPilot | CorrectedPilot
+"""Who drives while recording."""
 
 
 def record_steps(

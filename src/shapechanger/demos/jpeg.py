@@ -80,7 +80,12 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
 
 
 def is_grey(jpeg: bytes, name: str) -> bool:
-    """Return whether a JPEG has no colours; arguments and errors are those of `picture_size`."""
+    """Return whether a JPEG has no colours; errors are those of `picture_size`.
+
+    Args:
+        jpeg: Its bytes.
+        name: How to name the picture in errors.
+    """
     return _header(jpeg, name)[2] == _GREY
 
 

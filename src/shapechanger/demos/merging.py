@@ -71,11 +71,7 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
 
 
 def _episodes_in(out: Path) -> tuple[Path, ...]:
-    """Return the episodes that are already in the target recording.
-
-    Raises:
-        DemosError: If the folder is not a recording.
-    """
+    """Return the episodes that are already in the target recording."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return ()
     found = episodes_of(out)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -45,6 +44,10 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
     large = picture.repeat(times, axis=0).repeat(times, axis=1)
     width = large.shape[1] - large.shape[1] % 2
     large = large[: large.shape[0] - large.shape[0] % 2, :width]
+    # The ends of the bars; for an unbounded value its magnitude, at least 1.
+    reach = np.maximum(1.0, np.abs(step.action))
+    lows = np.where(np.isfinite(layout.low), layout.low, -reach).tolist()
+    highs = np.where(np.isfinite(layout.high), layout.high, reach).tolist()
     strips = [
         _strip(
             width,
@@ -53,9 +56,7 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
             None if step.wanted is None else _share(step.wanted[place], low, high),
             COLOURS[step.driver],
         )
-        for place, (value, low, high) in enumerate(
-            zip(step.action, *_bounds(layout, step.action), strict=True)
-        )
+        for place, (value, low, high) in enumerate(zip(step.action, lows, highs, strict=True))
     ]
     return np.concatenate([large, *strips])
 
@@ -67,19 +68,6 @@ def blank(size: tuple[int, int]) -> NDArray[np.uint8]:
         size: Width and height in pixels.
     """
     return np.full((size[1], size[0], 3), _BACKGROUND, np.uint8)
-
-
-def _bounds(layout: Layout, action: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return the ends of the bars; for an unbounded value its magnitude, at least 1."""
-    lows = [
-        low if math.isfinite(low) else -max(1.0, abs(value))
-        for low, value in zip(layout.low.tolist(), action, strict=True)
-    ]
-    highs = [
-        high if math.isfinite(high) else max(1.0, abs(value))
-        for high, value in zip(layout.high.tolist(), action, strict=True)
-    ]
-    return lows, highs
 
 
 def _share(value: float, low: float, high: float) -> float:

@@ -22,6 +22,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader, EpisodeWriter, Step
+from shapechanger.demos.episodes.writer import SPARE_BYTES
 from shapechanger.demos.jpeg import encode_picture, picture_size
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
@@ -31,7 +32,7 @@ _CHANNELS: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class EncodedObservation:
     """An observation in the form in which it is recorded.
 
     Attributes:
@@ -45,7 +46,7 @@ class Seen:
     captured_ns: int | None
 
 
-class Sight:
+class ObservationEncoder:
     """Splits the observations of an env into a JPEG and a state.
 
     Args:
@@ -102,14 +103,14 @@ class Sight:
                     f"{name}: the {what} space is {part}, but its layout has {layout.size} values."
                 )
 
-    def seen(self, observation: Any, info: Mapping[str, Any]) -> Seen:
+    def encode(self, observation: Any, info: Mapping[str, Any]) -> EncodedObservation:
         """Return an observation as it is recorded.
 
         Args:
             observation: Observation of the env.
             info: The info that came with it.
         """
-        return Seen(
+        return EncodedObservation(
             self._jpeg(observation["image"] if self._is_dict else observation)
             if self.has_picture
             else None,
@@ -155,9 +156,6 @@ def _layout(env: gym.Env[Any, Any], name: str, side: str) -> Layout:
 
 QUALITY: Final = 95
 """JPEG quality in percent for pictures that an env returns as arrays."""
-
-_SPARE_BYTES: Final = 64 << 20
-"""Disk space to leave free."""
 
 _COLLISION: Final = "reward_collision"
 _SECRET: Final = frozenset({"key"})
@@ -209,10 +207,10 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         driver: Driver = "program",
         about: Mapping[str, Any] | None = None,
         quality: int = QUALITY,
-        spare_bytes: int = _SPARE_BYTES,
+        spare_bytes: int = SPARE_BYTES,
     ) -> None:
         super().__init__(env)
-        self._sight = Sight(env, quality)
+        self._encoder = ObservationEncoder(env, quality)
         self._recording, self._spare_bytes = recording, spare_bytes
         self._by_default: Driver = driver
         self._about = dict(about or {})
@@ -221,9 +219,9 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self.episodes = 0
         self.outcome = ""
         self._writer: EpisodeWriter | None = None
-        self._seen: Seen | None = None
+        self._seen: EncodedObservation | None = None
         self._jpeg: bytes | None = None
-        self._begun: dict[str, Any] = {}
+        self._start: dict[str, Any] = {}
         self._decision: _Decision | None = None
 
     @property
@@ -258,10 +256,8 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """
         self.end()
         observation, info = super().reset(seed=seed, options=options)
-        self._seen = self._sight.seen(observation, info)
-        self._begun = {"seed": seed}
-        if options:
-            self._begun["options"] = _plain(options)
+        self._seen = self._encoder.encode(observation, info)
+        self._start = {"seed": seed, "options": options}
         return observation, info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -290,7 +286,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             )
             self.steps += 1
             self._jpeg = seen.jpeg
-            self._seen = None if over else self._sight.seen(observation, info)
+            self._seen = None if over else self._encoder.encode(observation, info)
             if over:
                 self.end(_outcome(bool(terminated), info))
         except ShapechangerError as error:
@@ -342,7 +338,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         finally:
             self.end()
 
-    def _begin(self, seen: Seen) -> EpisodeWriter:
+    def _begin(self, seen: EncodedObservation) -> EpisodeWriter:
         self._writer = EpisodeWriter.create(
             self._recording, self._header(seen), spare_bytes=self._spare_bytes
         )
@@ -350,33 +346,34 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self.episodes += 1
         return self._writer
 
-    def _header(self, seen: Seen) -> EpisodeHeader:
+    def _header(self, seen: EncodedObservation) -> EpisodeHeader:
         spec, inner = self.env.spec, self.env.unwrapped
         clock = getattr(inner, "record_clock", "none")
-        layout = self._sight.state_layout
+        layout = self._encoder.state_layout
         notes = dict(self._about.get("notes", {}))
-        if "options" in self._begun:
-            notes["reset_options"] = self._begun["options"]
+        if self._start["options"]:
+            notes["reset_options"] = _plain(self._start["options"])
+        kwargs = spec.kwargs if spec else {}
         robot = getattr(inner, "welcome", None)  # Of a robot on the network.
         fields: dict[str, Any] = {
             "robot": getattr(robot, "robot", ""),
             "body": getattr(robot, "body", ""),
-            "action_layout": self._sight.action_layout.to_json(),
+            "action_layout": self._encoder.action_layout.to_json(),
             "state_layout": layout.to_json() if layout else "",
             "image_size": picture_size(seen.jpeg, "from the env") if seen.jpeg else None,
             "control_hz": self.control_hz,
             "env": spec.id if spec else "",
-            "env_kwargs": _plain(_public(spec.kwargs)) if spec else {},
+            "env_kwargs": _plain({n: v for n, v in kwargs.items() if n not in _SECRET}),
             "driver": self._by_default,
             "clock": clock if seen.captured_ns is not None else "none",
-            "seed": self._begun["seed"],
+            "seed": self._start["seed"],
         }
-        whole: dict[str, Any] = {**fields, **self._about, "notes": notes}
-        return EpisodeHeader(**whole)
+        fields |= {**self._about, "notes": notes}
+        return EpisodeHeader(**fields)
 
     def _step(
         self,
-        seen: Seen,
+        seen: EncodedObservation,
         action: Any,
         reward: float,
         terminated: bool,
@@ -408,8 +405,11 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     def _give_up(self, why: ShapechangerError, *, over: bool) -> None:
         """Stop the env, and close the episode, even if either fails."""
         if not over:
+            # The action that moves nothing: 0, or the bound nearest to 0.
+            box = cast("gym.spaces.Box", self.env.action_space)
+            still = np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32)
             try:
-                super().step(_rest(self.env.action_space))
+                super().step(still)
             except (ShapechangerError, gym.error.Error) as error:
                 why.add_note(f"Stopping the env failed too: {error}")
         try:
@@ -438,16 +438,6 @@ def _outcome(terminated: bool, info: Mapping[str, Any]) -> str:
     if _terms(info).get(_COLLISION, 0.0) < 0.0:
         return "collision"
     return "success" if info.get("is_success") else "terminated"
-
-
-def _rest(space: gym.Space[Any]) -> NDArray[np.float32]:
-    """Return the action that moves nothing: 0, or the bound nearest to 0."""
-    box = cast("gym.spaces.Box", space)
-    return np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32)
-
-
-def _public(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in arguments.items() if name not in _SECRET}
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
+from shapechanger.demos.episodes import DRIVERS, Driver, Episode
 
 _NS_PER_S: Final = 1e9
 _COLLISION: Final = "reward_collision"
@@ -27,7 +28,7 @@ class EpisodeStatistics:
         steps: Number of all steps.
         kept: Number of kept steps.
         seconds: Duration of the kept steps, s.
-        drivers: Number of kept steps by driver.
+        drivers: Number of kept steps by driver, most frequent first.
         marks: Number of marks.
         reward: Sum of the rewards of the kept steps; None if none has a reward.
         collisions: Kept steps with a collision penalty.
@@ -55,6 +56,7 @@ def summary(episode: Episode) -> EpisodeStatistics:
     """Summarise an episode."""
     header, kept = episode.header, episode.kept
     rewards = [step.reward for step in kept if step.reward is not None]
+    counts = Counter(step.driver for step in kept)
     return EpisodeStatistics(
         name=episode.path.name,
         what=header.env.split("/")[-1] or header.robot or header.body or header.source,
@@ -62,7 +64,7 @@ def summary(episode: Episode) -> EpisodeStatistics:
         steps=len(episode.steps),
         kept=len(kept),
         seconds=episode.seconds,
-        drivers=_drivers(kept),
+        drivers={d: counts[d] for d in sorted(DRIVERS, key=lambda d: -counts[d]) if counts[d]},
         marks=len(episode.marks),
         reward=sum(rewards) if rewards else None,
         collisions=sum(step.terms.get(_COLLISION, 0.0) < 0.0 for step in kept),
@@ -70,13 +72,6 @@ def summary(episode: Episode) -> EpisodeStatistics:
         outcome=episode.outcome,
         closed=episode.closed,
     )
-
-
-def _drivers(steps: Sequence[Step]) -> dict[Driver, int]:
-    """Count the steps by driver, most frequent first."""
-    counts = {driver: sum(step.driver == driver for step in steps) for driver in DRIVERS}
-    most = sorted(DRIVERS, key=lambda driver: -counts[driver])
-    return {driver: counts[driver] for driver in most if counts[driver]}
 
 
 def gaps_s(episode: Episode) -> list[float]:
@@ -88,13 +83,9 @@ def gaps_s(episode: Episode) -> list[float]:
         (at - before) / _NS_PER_S
         for one, two in pairwise(episode.kept)
         if two.index == one.index + 1
-        and (before := _time_ns(one)) is not None
-        and (at := _time_ns(two)) is not None
+        and (before := one.clock_ns) is not None
+        and (at := two.clock_ns) is not None
     ]
-
-
-def _time_ns(step: Step) -> int | None:
-    return step.captured_ns if step.captured_ns is not None else step.decided_ns
 
 
 _BINS: Final = 21

@@ -182,7 +182,7 @@ def training_chart(training: Training) -> str:
             axes.plot(steps, [c.loss for c in own], color=colour, linestyle="--", linewidth=0.9)
             axes.plot(steps, [c.error for c in own], color=colour, linewidth=1.6)
             for check in own:
-                if check.step == training.steps[member]:
+                if check.step == training.best_steps[member]:
                     axes.plot([check.step], [check.error], color=colour, marker="o")
         axes.set_xlabel("steps of training")
         axes.set_ylabel("loss")
@@ -249,72 +249,51 @@ def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
             transform=axes.get_xaxis_transform(),
         )
     for arm in study.plan.arms:
-        method = load_method(arm)
-        start = source_steps if method.uses_source else 0.0
-        if not method.learns_on_target:
-            _draw_level(axes, study, arm, start, start + last)
-        else:
-            _draw_curves(axes, study, arm, start)
+        _draw_arm(axes, study, arm, source_steps)
 
 
-def _draw_curves(axes: Axes, study: Study, kind: str, start: float) -> None:
-    """Draw an arm that is trained on the target."""
-    style, curves = _line_style(study, kind), study.curves(kind)
-    steps = curves.steps + start
-    spread = t_interval(curves.returns)
-    axes.plot(steps, curves.returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
-    if curves.n_seeds >= _BAND_SEEDS:
-        axes.fill_between(
-            steps, spread.low, spread.high, color=style.colour, alpha=0.18, linewidth=0.0
-        )
+def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
+    """Draw an arm as curves, or as a level if it is not trained on the target."""
+    method, style, curves = load_method(arm), _line_style(study, arm), study.curves(arm)
+    start = source_steps if method.uses_source else 0.0
+    is_level = not method.learns_on_target
+    steps, returns = curves.steps + start, curves.returns
+    if is_level:
+        steps = np.array([start, start + study.plan.steps])
+        returns = np.repeat(returns[:, :1], 2, axis=1)
     else:
-        axes.plot(steps, curves.returns.T, style.marker, color=style.colour, markersize=2.5)
+        axes.plot(steps, returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
+    spread = t_interval(returns)
+    if curves.n_seeds >= _BAND_SEEDS:
+        shade = 0.12 if is_level else 0.18
+        axes.fill_between(
+            steps, spread.low, spread.high, color=style.colour, alpha=shade, linewidth=0.0
+        )
+    elif is_level:
+        axes.plot([start] * curves.n_seeds, returns[:, 0], "o", color=style.colour, markersize=3.5)
+    else:
+        axes.plot(steps, returns.T, style.marker, color=style.colour, markersize=2.5)
     axes.plot(
         steps,
         spread.mean,
         color=style.colour,
         linestyle=style.line,
-        linewidth=2.2,
-        marker=style.marker,
+        linewidth=1.8 if is_level else 2.2,
+        marker="" if is_level else style.marker,
         markersize=4.5,
         markevery=max(1, curves.n_evals // 8),
-        label=f"{kind}, {curves.n_seeds} seeds",
-    )
-
-
-def _draw_level(axes: Axes, study: Study, kind: str, start: float, end: float) -> None:
-    """Draw a policy that is not trained on the target as a level with its interval."""
-    style, returns = _line_style(study, kind), study.curves(kind).returns[:, :1]
-    spread = t_interval(returns)
-    if returns.size >= _BAND_SEEDS:
-        axes.fill_between(
-            [start, end],
-            spread.low[0],
-            spread.high[0],
-            color=style.colour,
-            alpha=0.12,
-            linewidth=0.0,
-        )
-    else:
-        axes.plot([start] * returns.size, returns[:, 0], "o", color=style.colour, markersize=3.5)
-    axes.plot(
-        [start, end],
-        np.repeat(spread.mean, 2),
-        color=style.colour,
-        linestyle=style.line,
-        linewidth=1.8,
-        label=f"{kind}, {returns.size} seeds",
+        label=f"{arm}, {curves.n_seeds} seeds",
     )
 
 
 def _axis_label(study: Study) -> str:
-    """Name of the measure with its unit."""
+    """Return the name of the measure with its unit."""
     unit = "" if study.plan.unit == "1" else f", {study.plan.unit}"
     return f"{study.plan.measure.capitalize()} on the target{unit}"
 
 
 def _return_limits(study: Study) -> tuple[float, float]:
-    """Limits of the y axis: they contain every run; intervals are clipped."""
+    """Return limits of the y axis that contain every run; intervals are clipped."""
     returns: NDArray[np.float64] = np.concatenate(
         [study.curves(arm).returns.ravel() for arm in study.plan.arms]
         + [np.array([next(iter(study.summaries.values())).reference.zero])]
@@ -365,6 +344,6 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
 
 
 def _ends(study: Study, arm: str) -> NDArray[np.float64]:
-    """Mean of the last evaluations of each run of an arm."""
+    """Return the mean of the last evaluations of each run of an arm."""
     returns = study.curves(arm).returns
     return returns[:, -min(study.plan.last_k, returns.shape[1]) :].mean(axis=1)

@@ -9,7 +9,7 @@ from shapechanger.demos.cloning.judge import Judgement, named
 from shapechanger.demos.cloning.learn import Training
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.reports.page import png_uri, render, svg_uri
-from shapechanger.transfer.files import write_atomic, write_json
+from shapechanger.transfer.files import write_json
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
@@ -32,38 +32,20 @@ def write_numbers(
     Raises:
         OutputError: If it cannot be written.
     """
-    write_json(
-        path,
-        {
-            "judgement": judgement,
-            "training": None
-            if training is None
-            else {
-                "checks": training.checks,
-                "best_steps": training.steps,
-                "learned": training.learned,
-                "mirrored": training.mirrored,
-                "mirror_note": training.mirror_note,
-                "seconds": training.seconds,
-            },
-            "policy": policy.card,
-        },
-    )
+    write_json(path, {"judgement": judgement, "training": training, "policy": policy.card})
 
 
-def write_clone_report(
-    path: Path,
+def clone_html(
     name: str,
     policy: CameraPolicy,
     data: Dataset,
     judgement: Judgement,
     training: Training | None,
     data_note: str,
-) -> None:
-    """Write the page.
+) -> str:
+    """Render the report.
 
     Args:
-        path: The file.
         name: Name of the policy.
         policy: The policy.
         data: The steps that it was evaluated on, which `judgement.worst` indexes.
@@ -73,13 +55,12 @@ def write_clone_report(
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
-        OutputError: If it cannot be written.
     """
     from shapechanger.reports.charts import calibration_chart, scatter_chart, training_chart
 
     card = policy.card
     by_class = judgement.head == "class"
-    page = render(
+    return render(
         "clone.html",
         title=name,
         verdict=_verdict(judgement, data_note),
@@ -106,7 +87,6 @@ def write_clone_report(
         ),
         weights=sum(p.numel() for p in policy.network.parameters()),
     )
-    write_atomic(path, page.encode())
 
 
 def _verdict(judgement: Judgement, data_note: str) -> str:

@@ -30,9 +30,6 @@ _MAX_WIDTH: Final = 200  # Pixels; wider pictures are downsampled.
 _DROPPED: Final = "#d5d9de"
 # Colours of the numbers of an action, by Okabe and Ito, as those of the drivers.
 _TRACE_COLOURS: Final = ("#1b1f24", "#d55e00", "#cc79a7", "#56b4e9")
-# Geometry of the charts in `recording.html`, in units of the viewBox.
-_HISTOGRAM_WIDTH, _HISTOGRAM_HEIGHT = 320.0, 120.0
-_TIMELINE_WIDTH, _TRACE_MIDDLE, _TRACE_HEIGHT = 1000.0, 65.0, 70.0
 _MAX_POINTS: Final = 1000
 
 # Numbers of a state that are shown; outputs are shown with the actions.
@@ -168,23 +165,13 @@ def _episode(episode: Episode, one: EpisodeStatistics, pictures: int) -> dict[st
 
 
 def _histogram(name: str, unit: str, found: Distribution) -> dict[str, Any]:
-    most = max(found.counts)
-    step = _HISTOGRAM_WIDTH / len(found.counts)
     width = (found.high - found.low) / len(found.counts)
-    bars: list[dict[str, str]] = []
+    bars: list[tuple[float, str]] = []
     for place, count in enumerate(found.counts):
         low = found.low + place * width
         share = 100.0 * count / found.total
-        bars.append(
-            {
-                "x": f"{place * step + 0.5:.1f}",
-                "y": f"{_HISTOGRAM_HEIGHT * (1.0 - count / most):.1f}",
-                "width": f"{step - 1.0:.1f}",
-                "height": f"{_HISTOGRAM_HEIGHT * count / most:.1f}",
-                "title": f"{low:.3g} to {low + width:.3g}{_unit(unit)}: "
-                f"{count} steps, {share:.1f} %",
-            }
-        )
+        title = f"{low:.3g} to {low + width:.3g}{_unit(unit)}: {count} steps, {share:.1f} %"
+        bars.append((count / max(found.counts), title))
     extent = f"{found.least:.3g} to {found.most:.3g}{_unit(unit)}"
     missing = f" · {found.missing} without a value" if found.missing else ""
     return {
@@ -205,47 +192,31 @@ def _timeline(episode: Episode) -> dict[str, Any]:
     layout = Layout.from_json(episode.header.action_layout)
     kept = {step.index for step in episode.kept}
     first, last = episode.steps[0].index, episode.steps[-1].index
-    scale = _TIMELINE_WIDTH / max(1, last - first + 1)
-
-    def at(index: int) -> float:
-        return (index - first) * scale
-
-    bars: list[dict[str, str]] = []
+    bars: list[tuple[int, int, str, str]] = []
     for (is_kept, driver), group in groupby(
         episode.steps, lambda step: (step.index in kept, step.driver)
     ):
         steps = list(group)
-        begin, end = at(steps[0].index), at(steps[-1].index + 1)
-        bars.append(
-            {
-                "x": f"{begin:.1f}",
-                "width": f"{max(end - begin, 0.5):.1f}",
-                "colour": _colour(driver) if is_kept else _DROPPED,
-                "title": f"{driver if is_kept else 'dropped'}: "
-                f"steps {steps[0].index} to {steps[-1].index}",
-            }
-        )
-    stride = max(1, math.ceil(len(episode.steps) / _MAX_POINTS))
-    names = layout.names[: len(_TRACE_COLOURS)]
-    traces: list[dict[str, str]] = []
-    for place, name in enumerate(names):
+        begin, end = steps[0].index, steps[-1].index
+        title = f"{driver if is_kept else 'dropped'}: steps {begin} to {end}"
+        colour = _colour(driver) if is_kept else _DROPPED
+        bars.append((begin - first, end + 1 - begin, colour, title))
+    drawn = episode.steps[:: math.ceil(len(episode.steps) / _MAX_POINTS)]
+    traces: list[dict[str, Any]] = []
+    for place, (name, colour) in enumerate(zip(layout.names, _TRACE_COLOURS, strict=False)):
         reach = _reach(float(layout.low[place]), float(layout.high[place])) or 1.0
-        heights = [min(max(s.action[place] / reach, -1.0), 1.0) for s in episode.steps[::stride]]
-        points = (
-            f"{at(step.index) + scale / 2:.1f},{_TRACE_MIDDLE - _TRACE_HEIGHT / 2 * height:.1f}"
-            for step, height in zip(episode.steps[::stride], heights, strict=True)
-        )
-        traces.append({"name": name, "colour": _TRACE_COLOURS[place], "points": " ".join(points)})
+        points = [
+            (step.index - first, min(max(step.action[place] / reach, -1.0), 1.0)) for step in drawn
+        ]
+        traces.append({"name": name, "colour": colour, "points": points})
     reach = _reach(*layout.low.tolist(), *layout.high.tolist())
     return {
         "label": f"{len(episode.steps)} steps, {len(kept)} kept; {len(episode.marks)} marks; "
         f"{' and '.join(layout.names)} over time",
+        "length": last - first + 1,
         "bars": bars,
         "marks": [
-            {
-                "x": f"{at(mark.step) + scale / 2:.1f}",
-                "title": f"step {mark.step}: {mark.text or 'marked'}",
-            }
+            (mark.step - first, f"step {mark.step}: {mark.text or 'marked'}")
             for mark in episode.marks
         ],
         "traces": traces,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import base64
 import functools
-import struct
-import zlib
-from typing import TYPE_CHECKING, Any, Final, cast
+import io
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +15,6 @@ from shapechanger.reports.numbers import count
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
-# Bits per channel; RGB; the only compression and filter methods there are; no interlacing.
-# Source: ISO/IEC 15948.
-_RGB8: Final = bytes([8, 2, 0, 0, 0])
-_UP: Final = 2  # The filter that stores each row as its difference from the row above.
 
 
 def render(template: str, **values: Any) -> str:
@@ -52,29 +45,17 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    cast("Any", environment).filters["count"] = count
+    cast("Any", environment).filters.update(count=count, decimal="{:.1f}".format)
     return environment
-
-
-def png(picture: NDArray[np.uint8]) -> bytes:
-    """Encode a picture, shape (height, width, 3), as a PNG file."""
-    height, width, _ = picture.shape
-    above = np.concatenate([np.zeros_like(picture[:1]), picture[:-1]])
-    rows = (picture - above).reshape(height, -1)  # Bytes wrap around, as the filter requires.
-    filters = np.full((height, 1), _UP, np.uint8)
-    return b"".join(
-        (
-            _SIGNATURE,
-            _chunk(b"IHDR", struct.pack(">II", width, height) + _RGB8),
-            _chunk(b"IDAT", zlib.compress(np.hstack([filters, rows]).tobytes(), 9)),
-            _chunk(b"IEND", b""),
-        )
-    )
 
 
 def png_uri(picture: NDArray[np.uint8]) -> str:
     """Lossless data URI of a picture, shape (height, width, 3)."""
-    return _uri("image/png", png(picture))
+    from PIL import Image  # Installed with matplotlib.
+
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "png", optimize=True)
+    return _uri("image/png", file.getvalue())
 
 
 def jpeg_uri(jpeg: bytes) -> str:
@@ -85,11 +66,6 @@ def jpeg_uri(jpeg: bytes) -> str:
 def svg_uri(svg: str) -> str:
     """Data URI of an SVG drawing; as a separate image, its ids cannot clash with another's."""
     return _uri("image/svg+xml", svg.encode())
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    check = zlib.crc32(kind + content)
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
 
 
 def _uri(kind: str, content: bytes) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final, cast
 
 import msgspec
@@ -29,7 +28,6 @@ from shapechanger.reports.verdict import (
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.settings import (
     CloningSettings,
     Settings,
@@ -45,26 +43,17 @@ _HEADLINE: Final = (TOTAL_REWARD_GAIN, JUMPSTART, ASYMPTOTIC_GAIN)
 _MAX_ARGUMENT_LENGTH: Final = 40
 
 
-def write_report(
-    study: Study, path: Path, pictures: Pictures | None = None, picture_note: str = ""
-) -> None:
-    """Write the report of a study.
+def study_html(study: Study, pictures: Pictures | None = None, picture_note: str = "") -> str:
+    """Render the report of a study.
 
     Args:
         study: The study.
-        path: The file, such as `results/demo/report.html`; its folder must exist.
         pictures: The two bodies; None if there are none.
         picture_note: Why there are no pictures, or what they show.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
-        OutputError: If the file cannot be written.
     """
-    write_atomic(path, report_html(study, pictures, picture_note).encode())
-
-
-def report_html(study: Study, pictures: Pictures | None = None, picture_note: str = "") -> str:
-    """Render the report of a study; see `write_report`."""
     from shapechanger.reports.charts import learning_curves
 
     plan = study.plan

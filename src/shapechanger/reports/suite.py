@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,7 +12,6 @@ from shapechanger.reports.numbers import count, estimate_text, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
 from shapechanger.reports.verdict import direction, finals, headline_arm, is_flat, verdict
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.metrics import (
     Estimate,
     Reference,
@@ -55,35 +53,6 @@ class Sweep(NamedTuple):
     values: Mapping[str, float]
 
 
-def write_suite_report(
-    name: str,
-    studies: Mapping[str, Study],
-    path: Path,
-    *,
-    seeds: int,
-    strips: Mapping[str, Sequence[FilmStrip]] | None = None,
-    films: Mapping[str, str] | None = None,
-    sweep: Sweep | None = None,
-) -> None:
-    """Write the page of a suite.
-
-    Args:
-        name: Name of the suite.
-        studies: Its studies by name; at least one.
-        path: The file, such as `results/ants/index.html`; its folder must exist.
-        seeds: Number of seeds that the suite's file declares.
-        strips: Film strips of a study, by its name.
-        films: Film of a study, relative to the page, by the study's name.
-        sweep: The number in which targets differ; None if they differ in more.
-
-    Raises:
-        MissingExtra: If matplotlib or Jinja2 is not installed.
-        OutputError: If the file cannot be written.
-    """
-    page = suite_html(name, studies, seeds=seeds, strips=strips, films=films, sweep=sweep)
-    write_atomic(path, page.encode())
-
-
 def suite_html(
     name: str,
     studies: Mapping[str, Study],
@@ -93,7 +62,19 @@ def suite_html(
     films: Mapping[str, str] | None = None,
     sweep: Sweep | None = None,
 ) -> str:
-    """Render the page of a suite; see `write_suite_report`."""
+    """Render the page of a suite.
+
+    Args:
+        name: Name of the suite.
+        studies: Its studies by name; at least one.
+        seeds: Number of seeds that the suite's file declares.
+        strips: Film strips of a study, by its name.
+        films: Film of a study, relative to the page, by the study's name.
+        sweep: The number in which targets differ; None if they differ in more.
+
+    Raises:
+        MissingExtra: If matplotlib or Jinja2 is not installed.
+    """
     from shapechanger.reports.charts import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))
@@ -185,34 +166,24 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
         return None
     # The same bodies in the same order on both sides.
     targets.sort(key=lambda one: sources.index(one) if one in sources else len(sources))
-    cells = {
+    pairs = {
         (_name(study.plan.task.source), _name(study.plan.task.target)): (one, study)
         for one, study in studies.items()
     }
-    gains = {pair: gain_over_scratch(study) for pair, (_, study) in cells.items()}
+    gains = {pair: gain_over_scratch(study) for pair, (_, study) in pairs.items()}
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
-    rows: list[dict[str, Any]] = []
-    for source in sources:
-        row: list[dict[str, str] | None] = []
-        for target in targets:
-            if (source, target) not in cells:
-                row.append(None)
-                continue
-            one, study = cells[source, target]
-            gain = gains[source, target]
-            row.append(
-                {
-                    "name": one,
-                    "gain": estimate_text(gain, signed=True),
-                    "colour": _colour((gain.value or 0.0) / widest),
-                    "ends": ", ".join(
-                        f"{arm} {number(float(finals(study, arm).mean()), 2)}"
-                        for arm in study.plan.arms
-                    ),
-                }
-            )
-        rows.append({"source": source, "cells": row})
-    return {"targets": targets, "rows": rows}
+    cells = {
+        pair: {
+            "name": one,
+            "gain": estimate_text(gains[pair], signed=True),
+            "colour": _colour((gains[pair].value or 0.0) / widest),
+            "ends": ", ".join(
+                f"{arm} {number(float(finals(study, arm).mean()), 2)}" for arm in study.plan.arms
+            ),
+        }
+        for pair, (one, study) in pairs.items()
+    }
+    return {"sources": sources, "targets": targets, "cells": cells}
 
 
 def _colour(share: float) -> str:

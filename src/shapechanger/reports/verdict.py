@@ -233,7 +233,12 @@ def successes(study: Study, kind: str) -> NDArray[np.float64]:
 
 
 def finals(study: Study, kind: str) -> NDArray[np.float64]:
-    """Final value of each run, shape (n_seeds,)."""
+    """Final value of each run, shape (n_seeds,).
+
+    Args:
+        study: The study.
+        kind: Kind of the runs, such as "scratch".
+    """
     ends = (_end(study, result) for result in study.of(kind))
     return np.array([float(np.mean([_value(study, e) for e in end])) for end in ends])
 

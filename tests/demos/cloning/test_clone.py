@@ -41,7 +41,7 @@ def test_the_course_is_of_this_training(learned: tuple[CameraPolicy, Training]) 
     assert training.learned == 540
     assert [check.step for check in training.checks] == [0, 30, 60, 90, 120, 150]
     best = min(training.checks, key=lambda check: check.error)
-    assert training.steps == (best.step,)
+    assert training.best_steps == (best.step,)
     exam = shown(600, 1)
     done = policy.predict_many(exam.pictures[540:])
     errors = np.abs(done - exam.actions[540:]).mean(axis=0)
@@ -120,7 +120,7 @@ def test_one_picture_is_enough_to_begin() -> None:
     """Nothing is held out then, and the last policy is kept."""
     one = shown(1, 0)
     policy, training = clone(one.pictures, one.actions, settings=_QUICK, seed=0)
-    assert (training.steps, training.learned) == ((4,), 1)
+    assert (training.best_steps, training.learned) == ((4,), 1)
     assert all(math.isnan(check.error) for check in training.checks)
     assert np.isfinite(policy.predict(one.pictures[0])).all()
 
@@ -135,7 +135,7 @@ def test_it_stops_when_it_gets_no_better() -> None:
     checks: list[MemberCheck] = []
     _, training = clone(noise.pictures, actions, settings=settings, seed=0, on_check=checks.append)
     assert checks[-1].step < 60
-    assert training.steps == (checks[-1].step - 6,)
+    assert training.best_steps == (checks[-1].step - 6,)
     assert repr(tuple(checks)) == repr(training.checks)  # NaN is not equal to itself.
 
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.judge import class_numbers, goal_of
-from shapechanger.demos.cloning.pictures import CloningError
+from shapechanger.demos.cloning.card import CloneCard, class_numbers
+from shapechanger.demos.cloning.judge import AskedHead, output_fields
+from shapechanger.demos.cloning.pictures import CloningError, Framing
 from shapechanger.layout import Feature, Layout
 
 _KEYS = Layout(
@@ -25,34 +26,41 @@ def _keys(text: str) -> np.ndarray:
     return held
 
 
+def _card(
+    actions: np.ndarray, layout: Layout, asked: AskedHead, mirrored: np.ndarray | None = None
+) -> CloneCard:
+    fields = output_fields(actions, layout, asked, mirrored)
+    return CloneCard(framing=Framing(), channels=(8,), features=8, action_layout=layout, **fields)
+
+
 def test_keys_become_classes_with_names() -> None:
     """The most frequent first."""
-    goal = goal_of(_keys("FFFFFFFFFFLLLLLLNNNN"), _KEYS, "auto")
-    assert (goal.head, goal.names) == ("class", ("forward", "left", "none"))
-    assert goal.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
+    card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), _KEYS, "auto")
+    assert (card.head, card.class_names) == ("class", ("forward", "left", "none"))
+    assert card.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
 
 
 def test_what_only_the_mirror_shows_is_a_class_too() -> None:
     """A mirrored picture needs something to be learned with it."""
     actions = _keys("FFFFFFFFLLLLLLLL")
-    goal = goal_of(actions, _KEYS, "class", actions[:, [0, 1, 3, 2]])
-    assert set(goal.names) == {"forward", "left", "right"}
+    card = _card(actions, _KEYS, "class", actions[:, [0, 1, 3, 2]])
+    assert set(card.class_names) == {"forward", "left", "right"}
 
 
 def test_numbers_are_scaled_by_their_layout() -> None:
     """Or by what was shown, where the layout has no bound; what never changes is no harm."""
     layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
     actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
-    goal = goal_of(actions.astype(np.float32), layout, "auto")
-    assert (goal.head, goal.low, goal.high[:2]) == ("regression", (0.0, -3.0, 1.0), (10.0, 5.0))
-    np.testing.assert_allclose(goal.targets(actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
+    card = _card(actions.astype(np.float32), layout, "auto")
+    assert (card.head, card.low, card.high[:2]) == ("regression", (0.0, -3.0, 1.0), (10.0, 5.0))
+    np.testing.assert_allclose(card.targets(actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
 
 
 def test_few_steps_of_many_actions_are_no_choice() -> None:
     """Ten different actions in ten steps are numbers."""
     rng = np.random.default_rng(0)
-    goal = goal_of(rng.uniform(-1, 1, (10, 2)).astype(np.float32), _STEERS, "auto")
-    assert goal.head == "regression"
+    card = _card(rng.uniform(-1, 1, (10, 2)).astype(np.float32), _STEERS, "auto")
+    assert card.head == "regression"
 
 
 def test_what_cannot_be_chosen_from_is_refused() -> None:
@@ -60,9 +68,9 @@ def test_what_cannot_be_chosen_from_is_refused() -> None:
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
     with pytest.raises(CloningError, match="200 different actions, but at most 16"):
-        goal_of(many, _STEERS, "class")
+        output_fields(many, _STEERS, "class")
     with pytest.raises(CloningError, match=r"All of 5 actions are equal \(left\)"):
-        goal_of(_keys("LLLLL"), _KEYS, "auto")
+        output_fields(_keys("LLLLL"), _KEYS, "auto")
 
 
 def test_an_action_that_is_no_class() -> None:

@@ -57,7 +57,7 @@ def test_how_evenly_a_driver_goes_to_both_sides() -> None:
     """From never to as much."""
     keys = mirror_of(_layout("forward", "backward", "right", "left", low=0.0))
     forward, _, right, left = np.eye(4, dtype=np.float32)
-    assert keys.even(np.stack([left, left, forward])) == 0.0
-    assert keys.even(np.stack([left, left, right])) == 0.5
-    assert keys.even(np.stack([forward, forward])) == 1.0
-    assert STEERING.even(np.array([[-0.5, 1.0], [1.0, 1.0]], np.float32)) == 0.5
+    assert keys.balance(np.stack([left, left, forward])) == 0.0
+    assert keys.balance(np.stack([left, left, right])) == 0.5
+    assert keys.balance(np.stack([forward, forward])) == 1.0
+    assert STEERING.balance(np.array([[-0.5, 1.0], [1.0, 1.0]], np.float32)) == 0.5

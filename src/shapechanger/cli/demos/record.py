@@ -138,13 +138,13 @@ def _parts(
         DemosError: If the clone needs frames and the env has none.
         PolicyError: If its state or actions differ from the env's.
     """
-    from shapechanger.demos.recording import QUALITY, Sight
+    from shapechanger.demos.recording import QUALITY, ObservationEncoder
 
-    sight = Sight(env, QUALITY)
+    encoder = ObservationEncoder(env, QUALITY)
     needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
-    if needs["image"] and not sight.has_picture:
+    if needs["image"] and not encoder.has_picture:
         raise DemosError(f"{path} drives by pictures, and {_name(env)} shows none.")
-    clone.card.require_layouts(sight.action_layout, sight.state_layout)
+    clone.card.require_layouts(encoder.action_layout, encoder.state_layout)
     is_dict = isinstance(env.observation_space, gym.spaces.Dict)
 
     def part(seen: Any, name: str) -> NDArray[Any] | None:

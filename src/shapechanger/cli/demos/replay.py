@@ -22,7 +22,7 @@ from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Step
-    from shapechanger.demos.recording import Seen
+    from shapechanger.demos.recording import EncodedObservation
     from shapechanger.link.messages import Welcome
     from shapechanger.remote.client import RobotClient
     from shapechanger.teleop import Terminal
@@ -70,29 +70,29 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
         DemosError: If the env has other actions.
         UnknownName: If the env is unknown.
     """
-    from shapechanger.demos.recording import Sight
+    from shapechanger.demos.recording import ObservationEncoder
 
     header = episode.header
     kept = episode.kept
     apart = _Apart()
     with opened(_ref(episode, env_id), max_episode_steps=-1) as env:
-        sight = Sight(env, 95)
+        encoder = ObservationEncoder(env, 95)
         recorded = Layout.from_json(header.action_layout)
-        if [(f.name, f.unit, f.shape) for f in sight.action_layout] != [
+        if [(f.name, f.unit, f.shape) for f in encoder.action_layout] != [
             (f.name, f.unit, f.shape) for f in recorded
         ]:
             raise DemosError(
-                f"{env_id} moves {', '.join(sight.action_layout.names)}, and {episode.path.name} "
+                f"{env_id} moves {', '.join(encoder.action_layout.names)}, and {episode.path.name} "
                 f"was recorded with {', '.join(recorded.names)}."
             )
-        states = sight.state_layout
+        states = encoder.state_layout
         compares = states is not None and states.to_json() == header.state_layout
         observation, info = env.reset(
             seed=header.seed, options=cast("Any", header.notes.get("reset_options"))
         )
         played, ended = 0, ""
         for step in kept:
-            apart.look(episode, step, sight.seen(observation, info), states=compares)
+            apart.look(episode, step, encoder.encode(observation, info), states=compares)
             values = step.action if step.applied is None else step.applied
             observation, reward, terminated, truncated, info = env.step(
                 np.array(values, np.float32)
@@ -140,7 +140,7 @@ class _Apart:
         self._pictures: list[float] = []
         self._rewards: list[tuple[float, float]] = []
 
-    def look(self, episode: Episode, step: Step, seen: Seen, *, states: bool) -> None:
+    def look(self, episode: Episode, step: Step, seen: EncodedObservation, *, states: bool) -> None:
         """Compare the observation before a step with the recorded one."""
         if states:
             self._states.append(np.abs(np.array(seen.state) - np.array(step.state)))

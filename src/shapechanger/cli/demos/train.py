@@ -59,7 +59,8 @@ class TrainClone:
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
         from shapechanger.demos.dataset import count_steps, load_dataset
-        from shapechanger.reports.clone import write_clone_report, write_numbers
+        from shapechanger.reports.clone import clone_html, write_numbers
+        from shapechanger.transfer.files import write_atomic
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
         console = plain_console()
@@ -102,7 +103,8 @@ class TrainClone:
         for path in self._write_for_sb3(policy, shrinking.size):
             console.print(f"wrote {path}", soft_wrap=True)
         page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
-        write_clone_report(page, self.out.name, policy, data, judgement, training, note)
+        report = clone_html(self.out.name, policy, data, judgement, training, note)
+        write_atomic(page, report.encode())
         write_numbers(numbers, policy, judgement, training)
         console.print(f"wrote {self.out}, {page} and {numbers}", soft_wrap=True)
         console.print(note, soft_wrap=True)
@@ -249,12 +251,12 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             console.print(note, soft_wrap=True)
         if self.report is not None:
-            from shapechanger.reports.clone import write_clone_report, write_numbers
-            from shapechanger.transfer.files import make_folder
+            from shapechanger.reports.clone import clone_html, write_numbers
+            from shapechanger.transfer.files import make_folder, write_atomic
 
             make_folder(self.report.parent)
-            name = self.policy.name
-            write_clone_report(self.report, name, policy, data, judgement, None, note)
+            page = clone_html(self.policy.name, policy, data, judgement, None, note)
+            write_atomic(self.report, page.encode())
             numbers = self.report.with_suffix(".json")
             write_numbers(numbers, policy, judgement, None)
             console.print(f"wrote {self.report} and {numbers}", soft_wrap=True)

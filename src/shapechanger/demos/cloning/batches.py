@@ -19,7 +19,15 @@ _BRIGHTEST: Final = 255.0
 
 
 def plain(pictures: Tensor, index: Tensor) -> Tensor:
-    """Return pictures without augmentation; arguments and shape are those of `augmented`."""
+    """Return pictures without augmentation.
+
+    Args:
+        pictures: uint8, shape (n, height, width, 3).
+        index: Indices of the pictures, shape (batch,).
+
+    Returns:
+        Pictures in [0, 1], shape (batch, 3, height, width).
+    """
     return pictures[index].permute(0, 3, 1, 2).float() / _BRIGHTEST
 
 
@@ -40,9 +48,9 @@ def augmented(
     """
     mirrored = torch.rand(len(index), generator=generator) < augmentation.mirror
     seen = _moved(pictures, index, mirrored, augmentation.shift, generator)
-    _relight(seen, augmentation, generator)
+    _change_light(seen, augmentation, generator)
     _blur(seen, augmentation.blurred, generator)
-    _sprinkle(seen, augmentation, generator)
+    _add_noise(seen, augmentation, generator)
     return seen.clamp_(0.0, 1.0), mirrored
 
 
@@ -61,7 +69,7 @@ def _moved(
     return pixels.reshape(*places.shape, -1).permute(0, 3, 1, 2).float().div_(_BRIGHTEST)
 
 
-def _relight(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
+def _change_light(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
     """Change brightness and colour."""
     n, colours = seen.shape[0], seen.shape[1]
     gain = _factors((n, 1, 1, 1), augmentation.gain, generator)
@@ -78,19 +86,19 @@ def _factors(shape: tuple[int, ...], largest: float, generator: torch.Generator)
 
 def _blur(seen: Tensor, share: float, generator: torch.Generator) -> None:
     """Blur the first few pictures; a batch is in random order."""
-    if count := _few(len(seen), share, generator):
+    if count := _random_count(len(seen), share, generator):
         seen[:count] = functional.avg_pool2d(seen[:count], 3, 1, 1, count_include_pad=False)
 
 
-def _sprinkle(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
+def _add_noise(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
     """Add noise as of a camera in the dark to the last few pictures; some are blurred and noisy."""
-    if count := _few(len(seen), augmentation.noisy, generator):
+    if count := _random_count(len(seen), augmentation.noisy, generator):
         strength = augmentation.noise * torch.rand((count, 1, 1, 1), generator=generator)
         last = seen[-count:]
         last.add_(strength * torch.randn(last.shape, generator=generator))
 
 
-def _few(n: int, share: float, generator: torch.Generator) -> int:
+def _random_count(n: int, share: float, generator: torch.Generator) -> int:
     """Return a number of pictures that is right on average even for small batches."""
     return math.floor(n * share + float(torch.rand((), generator=generator)) * (share > 0.0))
 
@@ -152,9 +160,9 @@ class _Source:
 
     def __init__(self, shown: Examples, index: NDArray[np.intp], at_a_time: int) -> None:
         self._pictures, self._states = _tensor(shown.pictures), _tensor(shown.states)
-        self._turned_states = _tensor(shown.turned_states)
+        self._mirrored_states = _tensor(shown.mirrored_states)
         self._targets = torch.as_tensor(shown.targets)
-        self._turned_targets = torch.as_tensor(shown.turned_targets)
+        self._mirrored_targets = torch.as_tensor(shown.mirrored_targets)
         self.size = len(index)
         self._index = torch.as_tensor(index)
         self._at_a_time = at_a_time
@@ -169,9 +177,9 @@ class _Source:
         else:
             seen, turned = augmented(self._pictures, few, settings.augmentation, generator)
         states = None
-        if self._states is not None and self._turned_states is not None:
-            states = _either(turned, self._turned_states[few], self._states[few])
-        return Batch(seen, states, _either(turned, self._turned_targets[few], self._targets[few]))
+        if self._states is not None and self._mirrored_states is not None:
+            states = _select(turned, self._mirrored_states[few], self._states[few])
+        return Batch(seen, states, _select(turned, self._mirrored_targets[few], self._targets[few]))
 
     def _next(self, generator: torch.Generator) -> Tensor:
         """Return the next indices; with too few examples, some repeat within a batch."""
@@ -182,7 +190,7 @@ class _Source:
         return few
 
 
-def _either(turned: Tensor, mirrored: Tensor, plain: Tensor) -> Tensor:
+def _select(turned: Tensor, mirrored: Tensor, plain: Tensor) -> Tensor:
     """Select the mirrored or the plain value of each row."""
     return torch.where(turned if plain.ndim == 1 else turned[:, None], mirrored, plain)
 

@@ -6,6 +6,8 @@ from importlib.metadata import version
 from typing import Any, Final, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
 from shapechanger.demos.cloning.settings import CloneSettings
@@ -16,6 +18,7 @@ Head = Literal["regression", "class"]
 
 _MAX_MEMBERS: Final = 32  # Bounds the work that a forged card can cause.
 _STEERING: Final = ("steering", "throttle")
+_ROUNDING: Final = 1e-4  # Of actions in single precision.
 
 
 class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
@@ -104,6 +107,18 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         """Number of outputs of the network."""
         return len(self.classes) or self.action_size
 
+    def targets(self, actions: NDArray[np.float32]) -> NDArray[Any]:
+        """Return the target outputs of the network for actions of shape (n, m).
+
+        Returns:
+            Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
+            (n, m).
+        """
+        if self.classes:
+            return class_numbers(actions, self.classes)
+        low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
+        return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
+
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
         """Refuse a robot, an env or data whose layouts differ from the policy's.
 
@@ -136,3 +151,17 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
 def _words(layout: Layout) -> tuple[str, ...]:
     """Return the names with units, and the shapes of array features."""
     return tuple(f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout)
+
+
+def class_numbers(
+    actions: NDArray[np.floating], classes: tuple[tuple[float, ...], ...]
+) -> NDArray[np.int64]:
+    """Return the class index of each action, shape (n,); -1 for an unknown action.
+
+    Args:
+        actions: Shape (n, m).
+        classes: The actions of the classes.
+    """
+    known = np.asarray(classes, np.float32)
+    apart = np.abs(actions[:, None, :] - known).max(axis=2)
+    return np.where(apart.min(axis=1) < _ROUNDING, apart.argmin(axis=1), -1).astype(np.int64)

@@ -47,7 +47,7 @@ class Mirror:
         """Return the mirrored values, shape (n, size) in and out."""
         return values[:, list(self.order)] * np.asarray(self.signs, np.float32)
 
-    def even(self, actions: NDArray[np.float32]) -> float:
+    def balance(self, actions: NDArray[np.float32]) -> float:
         """Return how evenly actions steer to both sides: 0 for one side only, 1 for equal shares.
 
         In a drive that turns to one side only, the mirror image would teach the wrong turn.
@@ -94,15 +94,15 @@ class Examples:
         pictures: Prepared pictures, shape (n, height, width, 3); None for none.
         states: Shape (n, k); None for none.
         targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
-        turned_states: The mirrored states.
-        turned_targets: The mirrored targets.
+        mirrored_states: The mirrored states.
+        mirrored_targets: The mirrored targets.
     """
 
     pictures: NDArray[np.uint8] | None
     states: NDArray[np.float32] | None
     targets: NDArray[Any]
-    turned_states: NDArray[np.float32] | None
-    turned_targets: NDArray[Any]
+    mirrored_states: NDArray[np.float32] | None
+    mirrored_targets: NDArray[Any]
 
     def __len__(self) -> int:
         """Return the number of examples."""

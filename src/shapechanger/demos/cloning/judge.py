@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import Head
+from shapechanger.demos.cloning.card import Head, class_numbers
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.layout import Layout
@@ -22,7 +21,6 @@ AskedHead = Literal["auto", "class", "regression"]
 
 _MOST_CLASSES: Final = 16  # More different actions are continuous.
 _MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
-_ROUNDING: Final = 1e-4  # Of actions in single precision.
 # Maximum error of a value within the tolerance, as a share of half its range.
 _TOLERANCE: Final = 0.1
 _BINS: Final = 10
@@ -70,44 +68,13 @@ def _word(name: str, third: int) -> str:
     return words[third] if words else f"{name} {_PLACES[third]}"
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
-    """Output encoding of a policy.
-
-    Attributes:
-        head: Kind of output.
-        classes: The different actions, most frequent first; () for continuous actions.
-        names: Names of the classes.
-        low: Minimum of each value; () for classes.
-        high: Maximum of each value; () for classes.
-    """
-
-    head: Head
-    classes: tuple[tuple[float, ...], ...] = ()
-    names: tuple[str, ...] = ()
-    low: tuple[float, ...] = ()
-    high: tuple[float, ...] = ()
-
-    def targets(self, actions: NDArray[np.float32]) -> NDArray[Any]:
-        """Return the target outputs for actions of shape (n, m).
-
-        Returns:
-            Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
-            (n, m).
-        """
-        if self.head == "class":
-            return class_numbers(actions, self.classes)
-        low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
-        return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
-
-
-def goal_of(
+def output_fields(
     actions: NDArray[np.float32],
     layout: Layout,
     asked: AskedHead,
     mirrored: NDArray[np.float32] | None = None,
-) -> Goal:
-    """Choose the output encoding from the demonstrated actions.
+) -> dict[str, Any]:
+    """Choose the output encoding from the demonstrated actions, as fields of a `CloneCard`.
 
     Args:
         actions: Actions of the driver, shape (n, m).
@@ -134,24 +101,11 @@ def goal_of(
     if asked == "class" or (asked == "auto" and few):
         order = np.argsort(-counts, kind="stable")
         classes = tuple(tuple(map(float, different[i])) for i in order)
-        return Goal("class", classes, tuple(named(np.asarray(c), layout) for c in classes))
+        names = tuple(named(np.asarray(c), layout) for c in classes)
+        return {"head": "class", "classes": classes, "class_names": names}
     low, high = _ranges(both, layout)
     high = np.where(high > low, high, low + 1.0)  # For a constant value.
-    return Goal("regression", low=tuple(map(float, low)), high=tuple(map(float, high)))
-
-
-def class_numbers(
-    actions: NDArray[np.floating], classes: tuple[tuple[float, ...], ...]
-) -> NDArray[np.int64]:
-    """Return the class index of each action, shape (n,); -1 for an unknown action.
-
-    Args:
-        actions: Shape (n, m).
-        classes: The actions of the classes.
-    """
-    known = np.asarray(classes, np.float32)
-    apart = np.abs(actions[:, None, :] - known).max(axis=2)
-    return np.where(apart.min(axis=1) < _ROUNDING, apart.argmin(axis=1), -1).astype(np.int64)
+    return {"low": tuple(map(float, low)), "high": tuple(map(float, high))}
 
 
 def named(action: NDArray[np.floating], layout: Layout) -> str:

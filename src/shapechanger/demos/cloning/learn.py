@@ -23,7 +23,7 @@ from shapechanger.demos.cloning.demonstrations import (
     steering_examples,
     stretch,
 )
-from shapechanger.demos.cloning.judge import AskedHead, Goal, goal_of
+from shapechanger.demos.cloning.judge import AskedHead, output_fields
 from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
@@ -120,7 +120,7 @@ class Training:
 
     Attributes:
         checks: Validations of all members, in order; the first of each is from before training.
-        steps: Step of each member at which it was best, which was kept.
+        best_steps: Step of each member at which it was best, which was kept.
         learned: Number of demonstrated steps learned from.
         mirrored: Share of examples that were mirrored.
         mirror_note: Reason for that share, in a sentence; "" for a share that the settings state.
@@ -128,7 +128,7 @@ class Training:
     """
 
     checks: tuple[MemberCheck, ...]
-    steps: tuple[int, ...]
+    best_steps: tuple[int, ...]
     learned: int
     mirrored: float
     mirror_note: str
@@ -179,21 +179,21 @@ def clone(
     policy = CameraPolicy.fresh(settings, seed) if start is None else start.copy()
     if start is None:
         _begin_with_mean(policy.network, shown.targets[~kept_back])
-    exam = shown.part(kept_back)
+    validation = shown.part(kept_back)
     weights = torch.tensor([1.0, settings.throttle_weight])
 
     def loss(out: Tensor, wanted: Tensor) -> Tensor:
         return (_huber(out, wanted, reduction="none") * weights).mean()
 
     def error(network: CameraNetwork) -> float:
-        done = CameraPolicy(network, policy.card).predict_many(exam.pictures)
-        return sum(np.abs(done - exam.targets).mean(axis=0).tolist())
+        done = CameraPolicy(network, policy.card).predict_many(validation.pictures)
+        return sum(np.abs(done - validation.targets).mean(axis=0).tolist())
 
     checks, best = _fit(
         policy.network,
         Batches(shown, ~kept_back, again, settings, seed),
         loss,
-        error if len(exam) else None,
+        error if len(validation) else None,
         msgspec.structs.replace(settings, dropout=0.0),
         settings.learning_rate if start is None else settings.further_rate,
         0,
@@ -204,7 +204,7 @@ def clone(
     )
     training = Training(
         checks=tuple(checks),
-        steps=(best,),
+        best_steps=(best,),
         learned=int((~kept_back).sum()),
         mirrored=settings.augmentation.mirror,
         mirror_note="",
@@ -253,61 +253,56 @@ def learn(
     if not np.isfinite(actions).all():
         first = int(np.flatnonzero(~np.isfinite(data.actions).all(axis=1) & which)[0])
         raise CloningError(f"Action {first} must be finite, got {data.actions[first].tolist()}.")
-    sees, feels = _senses(data, inputs)
-    mirror, state_mirror, share, note = _mirrors(data, actions, feels)
+    with_pictures, with_states = _inputs_of(data, inputs)
+    mirror, state_mirror, share, note = _mirrors(data, actions, with_states)
     settings = msgspec.structs.replace(
         settings, augmentation=msgspec.structs.replace(settings.augmentation, mirror=share)
     )
-    turned = mirror(actions) if mirror and share else actions
-    goal = goal_of(actions, data.action_layout, head, turned if mirror and share else None)
-    unseen = _unseen(data) if feels else ()
+    mirrored = mirror(actions) if mirror and share else None
+    unseen = _unseen(data) if with_states else ()
     states = None
-    if feels and data.states is not None and data.state_layout is not None:
+    if with_states and data.states is not None and data.state_layout is not None:
         states = data.states[which].astype(np.float32)
         for name in unseen:
             states[:, data.state_layout.slices[name]] = np.nan
-    shown = Examples(
-        prepare(data.pictures[which], settings.framing)
-        if sees and data.pictures is not None
-        else None,
-        states,
-        goal.targets(actions),
-        states if states is None or state_mirror is None else state_mirror(states),
-        goal.targets(turned),
-    )
     card = CloneCard(
         framing=settings.framing,
         channels=settings.channels,
         features=settings.features,
-        eyes=settings.eyes if sees else "none",
-        nerves=settings.nerves if feels else (),
-        head=goal.head,
-        classes=goal.classes,
-        class_names=goal.names,
+        eyes=settings.eyes if with_pictures else "none",
+        nerves=settings.nerves if with_states else (),
         action_layout=data.action_layout,
-        state_layout=data.state_layout if feels else None,
+        state_layout=data.state_layout if with_states else None,
         unseen=unseen,
-        low=goal.low,
-        high=goal.high,
+        **output_fields(actions, data.action_layout, head, mirrored),
+    )
+    shown = Examples(
+        prepare(data.pictures[which], settings.framing)
+        if with_pictures and data.pictures is not None
+        else None,
+        states,
+        card.targets(actions),
+        states if states is None or state_mirror is None else state_mirror(states),
+        card.targets(actions if mirrored is None else mirrored),
     )
     members = [
-        _train_member(shown, card, goal, settings, seed, member, on_check)
+        _train_member(shown, card, settings, seed, member, on_check)
         for member in range(settings.members)
     ]
     networks, checks, steps, logits, wanted = (list(each) for each in zip(*members, strict=True))
-    whole = joined(msgspec.structs.replace(card, members=len(members)), networks)
-    if goal.head == "class":
+    card = msgspec.structs.replace(
+        card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
+    )
+    whole = joined(card, networks)
+    if card.classes:
         # Scale the logits so that confidence matches accuracy on held-out steps.
         temperature = best_temperature(torch.cat(logits), torch.cat(wanted))
         with torch.no_grad():
             whole.hands.weight.div_(temperature)
             whole.hands.bias.div_(temperature)
-    card = msgspec.structs.replace(
-        card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
-    )
     training = Training(
         checks=tuple(check for own in checks for check in own),
-        steps=tuple(steps),
+        best_steps=tuple(steps),
         learned=len(actions),
         mirrored=share,
         mirror_note=note,
@@ -316,33 +311,33 @@ def learn(
     return CameraPolicy(whole, card), training
 
 
-def _senses(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
+def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
     """Return whether the policy uses pictures, and whether it uses states."""
     if inputs == "auto":
         inputs = "picture" if data.pictures is not None else "state"
-    sees, feels = inputs in {"picture", "both"}, inputs in {"state", "both"}
-    if sees and data.pictures is None:
+    with_pictures, with_states = inputs in {"picture", "both"}, inputs in {"state", "both"}
+    if with_pictures and data.pictures is None:
         raise CloningError("These demonstrations have no pictures to learn from.")
-    if feels and (data.states is None or not data.states.shape[1]):
+    if with_states and (data.states is None or not data.states.shape[1]):
         raise CloningError("These demonstrations have no state to learn from.")
-    return sees, feels
+    return with_pictures, with_states
 
 
 def _mirrors(
-    data: Dataset, actions: NDArray[np.float32], feels: bool
+    data: Dataset, actions: NDArray[np.float32], with_states: bool
 ) -> tuple[Mirror | None, Mirror | None, float, str]:
     """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
     try:
         mirror = mirror_of(data.action_layout)
         layout = data.state_layout
-        of_states = mirror_of(layout) if feels and layout is not None else None
+        of_states = mirror_of(layout) if with_states and layout is not None else None
     except CloningError as reason:
         return None, None, 0.0, f"No picture is mirrored, because {reason}."
-    even = mirror.even(actions)
-    share = 0.5 * even
+    balance = mirror.balance(actions)
+    share = 0.5 * balance
     note = (
         f"{share:.1%} of the pictures are mirrored, because the driver steered to one side "
-        f"{even:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
+        f"{balance:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
         "the wrong side."
     )
     return mirror, of_states, share, note
@@ -362,7 +357,6 @@ def _unseen(data: Dataset) -> tuple[str, ...]:
 def _train_member(
     shown: Examples,
     card: CloneCard,
-    goal: Goal,
     settings: CloneSettings,
     seed: int,
     member: int,
@@ -378,8 +372,8 @@ def _train_member(
     kept_back = stretch(len(shown), member, settings.members, settings.held_out)
     policy = CameraPolicy.blank(card, seed)
     learned = shown.part(~kept_back)
-    if goal.head == "class":
-        counts = np.bincount(learned.targets, minlength=len(goal.classes)) + 1.0
+    if card.classes:
+        counts = np.bincount(learned.targets, minlength=len(card.classes)) + 1.0
         with torch.no_grad():
             policy.network.hands.weight.zero_()
             policy.network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
@@ -387,16 +381,16 @@ def _train_member(
         _begin_with_mean(policy.network, learned.targets)
     if learned.states is not None:
         _normalise(policy.network, learned.states)
-    exam = shown.part(kept_back)
-    wanted = torch.as_tensor(exam.targets)
+    validation = shown.part(kept_back)
+    wanted = torch.as_tensor(validation.targets)
 
     def loss(out: Tensor, wanted: Tensor, smoothing: float = settings.smoothing) -> Tensor:
-        if goal.head == "class":
+        if card.classes:
             return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
         return _huber(out, wanted)
 
     def logits(network: CameraNetwork) -> Tensor:
-        return CameraPolicy(network, card).logits(exam.pictures, exam.states)
+        return CameraPolicy(network, card).logits(validation.pictures, validation.states)
 
     def error(network: CameraNetwork) -> float:
         return float(loss(logits(network), wanted, smoothing=0.0))
@@ -412,7 +406,7 @@ def _train_member(
             policy.network,
             Batches(shown, ~kept_back, None, settings, seed),
             loss,
-            error if len(exam) else None,
+            error if len(validation) else None,
             settings,
             settings.learning_rate,
             member,

@@ -6,7 +6,6 @@ The file holds the weights as safetensors, with a card in JSON that describes th
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +17,8 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.demos.episodes.files import cannot_write, write_atomic
+from shapechanger.errors import MissingExtra
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 
 try:
@@ -80,11 +80,6 @@ class CameraPolicy:
             torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
             return cls(CameraNetwork(card), card)
 
-    @property
-    def n_features(self) -> int:
-        """Number of features in front of the last layer."""
-        return self.network.hands.in_features
-
     def predict(
         self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
@@ -131,7 +126,12 @@ class CameraPolicy:
     ) -> NDArray[np.float32]:
         """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
 
-        Arguments and errors are those of `predict_many`.
+        Args:
+            pictures: As in `predict_many`.
+            states: As in `predict_many`.
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
         """
         out = self.logits(pictures, states)
         return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
@@ -139,39 +139,36 @@ class CameraPolicy:
     def logits(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> Tensor:
-        """Return the outputs of the last layer, from which `outputs` are computed."""
-        with torch.inference_mode():
-            return self.network.hands(torch.as_tensor(self.features(pictures, states)))
+        """Return the outputs of the last layer, from which `outputs` are computed.
 
-    def features(
-        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the features in front of the last layer, each at least 0, shape (n, n_features).
+        Args:
+            pictures: As in `predict_many`.
+            states: As in `predict_many`.
 
-        Arguments and errors are those of `predict_many`.
+        Raises:
+            CloningError: If an input is missing or has another shape.
         """
-        small = self._seen(pictures)
-        felt = self._felt(states)
-        n = len(small) if small is not None else len(felt) if felt is not None else 0
-        found = torch.empty(n, self.n_features)
+        small, known = self._prepared(pictures), self._state_tensor(states)
+        n = len(small) if small is not None else len(known) if known is not None else 0
+        found = torch.empty(n, self.network.hands.in_features)
         with torch.inference_mode():
             for start in range(0, n, _CHUNK):
                 some = slice(start, start + _CHUNK)
                 part = None if small is None else torch.as_tensor(small[some].copy())
                 found[some] = self.network.perceive(
                     None if part is None else plain(part, torch.arange(len(part))),
-                    None if felt is None else felt[some],
+                    None if known is None else known[some],
                 )
-        return found.numpy()
+            return self.network.hands(found)
 
-    def _seen(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
+    def _prepared(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
         if self.card.eyes == "none":
             return None
         if pictures is None:
             raise CloningError("This policy needs a picture, but there is none.")
         return prepare(pictures, self.card.framing)
 
-    def _felt(self, states: NDArray[np.floating] | None) -> Tensor | None:
+    def _state_tensor(self, states: NDArray[np.floating] | None) -> Tensor | None:
         layout = self.card.state_layout
         if layout is None:
             return None
@@ -180,10 +177,10 @@ class CameraPolicy:
                 f"This policy needs the state {', '.join(layout.names)} with shape "
                 f"(n, {layout.size}), got {'none' if states is None else states.shape}."
             )
-        felt = np.array(states, np.float32)
+        known = np.array(states, np.float32)
         for name in self.card.unseen:
-            felt[:, layout.slices[name]] = np.nan
-        return torch.as_tensor(felt)
+            known[:, layout.slices[name]] = np.nan
+        return torch.as_tensor(known)
 
     def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
         """Return the same policy with more information on its card.
@@ -208,7 +205,11 @@ class CameraPolicy:
             OutputError: If the file cannot be written.
         """
         weights = {name: value.numpy() for name, value in self.network.state_dict().items()}
-        _write_whole(path, tensor_bytes(weights, msgspec.json.encode(self.card), KIND))
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        write_atomic(path, tensor_bytes(weights, msgspec.json.encode(self.card), KIND))
 
     @classmethod
     def load(cls, path: Path) -> CameraPolicy:
@@ -242,18 +243,3 @@ def _network(card: CloneCard, weights: Mapping[str, NDArray[Any]]) -> CameraNetw
         if value.dtype != np.float32 or not np.isfinite(value).all():
             raise ValueError(f"its weights {name} must be finite and in single precision")
     return network
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error

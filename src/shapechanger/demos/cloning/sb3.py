@@ -59,15 +59,6 @@ _SAC_NETWORKS: Final[dict[str, Any]] = {
 }
 
 
-def _begin_actor(model: SAC, policy: CameraPolicy) -> None:
-    """Give the actor of a learner the mean action of a policy, and little noise."""
-    actor = cast("Any", model.actor)
-    actor.mu.load_state_dict(policy.network.hands.state_dict())
-    with torch.no_grad():
-        actor.log_std.weight.zero_()
-        actor.log_std.bias.fill_(_LOG_STD)
-
-
 class ClonedPerception(BaseFeaturesExtractor):
     """Frozen encoders of a clone, from raw observations to features.
 
@@ -185,7 +176,11 @@ def as_sac(
     env = _Spaces(policy, size)
     kind = "MultiInputPolicy" if isinstance(env.observation_space, spaces.Dict) else "MlpPolicy"
     model = SAC(kind, env, seed=seed, policy_kwargs=kwargs, **settings)
-    _begin_actor(model, policy)
+    actor = cast("Any", model.actor)
+    actor.mu.load_state_dict(policy.network.hands.state_dict())
+    with torch.no_grad():
+        actor.log_std.weight.zero_()
+        actor.log_std.bias.fill_(_LOG_STD)
     for owner in (model.actor, model.critic, model.critic_target):
         _copy_encoders(cast("Any", owner).features_extractor, policy)
     return model

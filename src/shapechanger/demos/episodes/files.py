@@ -70,6 +70,28 @@ def write_all(fd: int, data: bytes) -> None:
         raise
 
 
+def write_atomic(path: Path, content: bytes) -> None:
+    """Write a file completely and flush it to disk, or leave the old one in place.
+
+    Args:
+        path: The file.
+        content: Its new content.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise cannot_write(path, error) from error
+
+
 def write_header(folder: Path, content: dict[str, Any]) -> None:
     """Write the header of an episode atomically.
 
@@ -80,17 +102,8 @@ def write_header(folder: Path, content: dict[str, Any]) -> None:
     Raises:
         OutputError: If it cannot be written.
     """
-    part = folder / f".{HEADER}.part"
-    try:
-        with part.open("w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1, ensure_ascii=False)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(folder / HEADER)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise cannot_write(folder / HEADER, error) from error
+    text = json.dumps(content, indent=1, ensure_ascii=False)
+    write_atomic(folder / HEADER, f"{text}\n".encode())
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:

@@ -20,6 +20,7 @@ from shapechanger.demos.episodes.files import (
     is_episode,
     lock,
     write_all,
+    write_atomic,
     write_header,
 )
 from shapechanger.demos.episodes.records import (
@@ -29,7 +30,7 @@ from shapechanger.demos.episodes.records import (
     encode_line,
     split_lines,
 )
-from shapechanger.errors import BrokenEpisode, DemosError
+from shapechanger.errors import BrokenEpisode, DemosError, OutputError
 
 # Such a name cannot lead out of the folder.
 _FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
@@ -59,9 +60,6 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
         path: Folder of the episode.
         header: Its header.
         thorough: Whether to verify the checksum of each picture, not only its size.
-
-    Raises:
-        DemosError: If the file cannot be read.
     """
     try:
         content = (path / STEPS).read_bytes()
@@ -335,14 +333,19 @@ def repair(path: Path) -> Repair:
         lines = _scan(path, header, thorough=True)
         good = [line for line in lines if not line.wrong]
         bad = [line for line in lines if line.wrong]
-        strays = _strays(path, good)
+        used = {line.step.frame for line in good if line.step is not None}
+        strays = sorted(p for p in (path / FRAMES).glob("*") if p.name not in used)
         try:
             if bad or strays:
                 (path / LOST).mkdir(exist_ok=True)
             if bad:
-                _move_lines(path, good, bad)
+                lost = _free_name(path / LOST, STEPS)
+                write_atomic(lost, b"".join(line.raw for line in bad))
+                write_atomic(path / STEPS, b"".join(line.raw for line in good))
             for stray in strays:
                 stray.rename(_free_name(path / LOST, stray.name))
+        except OutputError:  # Already worded, and a subclass of OSError.
+            raise
         except OSError as error:
             raise cannot_write(path, error) from error
         kept = sum(line.step is not None for line in good)
@@ -352,27 +355,6 @@ def repair(path: Path) -> Repair:
     finally:
         os.close(fd)
     return Repair(kept, tuple(line.wrong for line in bad), len(strays), closed is not None)
-
-
-def _strays(path: Path, good: list[StepLine]) -> list[Path]:
-    """Return the pictures that no valid step names."""
-    named = {line.step.frame for line in good if line.step is not None}
-    return sorted(p for p in (path / FRAMES).glob("*") if p.name not in named)
-
-
-def _move_lines(path: Path, good: list[StepLine], bad: list[StepLine]) -> None:
-    """Remove the bad lines, after copying them to `lost`."""
-    _write(_free_name(path / LOST, STEPS), b"".join(line.raw for line in bad))
-    part = path / f".{STEPS}.part"
-    _write(part, b"".join(line.raw for line in good))
-    part.replace(path / STEPS)
-
-
-def _write(path: Path, content: bytes) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def _free_name(folder: Path, name: str) -> Path:
@@ -403,7 +385,14 @@ def drop(path: Path, first: int, last: int, why: str) -> None:
 
 
 def keep(path: Path, first: int, last: int, why: str = "") -> None:
-    """Include steps of an episode again; arguments and errors are those of `drop`."""
+    """Include steps of an episode again; errors are those of `drop`.
+
+    Args:
+        path: Folder of the episode.
+        first: Index of the first step.
+        last: Index of the last step, inclusive.
+        why: Free text.
+    """
     _append(path, {"kind": "keep", "first": first, "last": last, "why": why}, first, last)
 
 
@@ -427,19 +416,13 @@ def _append(path: Path, fields: dict[str, Any], first: int, last: int) -> None:
     episode = read_episode(path)
     fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
     try:
-        _require_steps(episode, first, last)
+        if not episode.steps:
+            raise DemosError(f"{path} has no steps.")
+        least, most = episode.steps[0].index, episode.steps[-1].index
+        if not least <= first <= last <= most:
+            raise DemosError(f"{path} has the steps {least} to {most}, and not {first} to {last}.")
         write_all(fd, encode_line(fields))
     except OSError as error:
         raise cannot_write(path / STEPS, error) from error
     finally:
         os.close(fd)
-
-
-def _require_steps(episode: Episode, first: int, last: int) -> None:
-    if not episode.steps:
-        raise DemosError(f"{episode.path} has no steps.")
-    least, most = episode.steps[0].index, episode.steps[-1].index
-    if not least <= first <= last <= most:
-        raise DemosError(
-            f"{episode.path} has the steps {least} to {most}, and not {first} to {last}."
-        )

@@ -186,6 +186,11 @@ class Step:
     frame_bytes: int = 0
     frame_crc: int = 0
 
+    @property
+    def clock_ns(self) -> int | None:
+        """Time on the robot's clock: of the capture, or else of the decision; None if unknown."""
+        return self.decided_ns if self.captured_ns is None else self.captured_ns
+
     def refusal(self, action_size: int, state_size: int) -> str:
         """Return why the step is invalid, as part of a sentence; "" if it is valid.
 

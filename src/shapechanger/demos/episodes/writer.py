@@ -75,10 +75,12 @@ class Syncer:
             self.sync()
 
 
+SPARE_BYTES: Final = 64 << 20
+"""Disk space to leave free by default."""
+
 _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
 _MAX_PICTURE_BYTES: Final = 16 << 20
-_SPARE_BYTES: Final = 64 << 20
 _SPACE_CHECK_STEPS: Final = 20  # Free space changes slowly.
 _MAX_EPISODES_PER_SECOND: Final = 10_000
 _NS_PER_S: Final = 1e9
@@ -116,7 +118,7 @@ class EpisodeWriter:
         recording: Path,
         header: EpisodeHeader,
         *,
-        spare_bytes: int = _SPARE_BYTES,
+        spare_bytes: int = SPARE_BYTES,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> EpisodeWriter:
         """Begin an episode in a recording; create the recording if it is missing.
@@ -181,7 +183,13 @@ class EpisodeWriter:
             OutputError: If it cannot be written; earlier steps are intact.
         """
         self._require_open()
-        refusal = step.refusal(*self._sizes) or self._disorder(step) or _no_picture(jpeg)
+        refusal = step.refusal(*self._sizes) or self._disorder(step)
+        if jpeg is not None and len(jpeg) > _MAX_PICTURE_BYTES:
+            refusal = (
+                f"its picture has {len(jpeg)} bytes, more than the limit of {_MAX_PICTURE_BYTES}"
+            )
+        elif jpeg is not None and not jpeg.startswith(_JPEG):
+            refusal = "its picture is not a JPEG"
         if refusal:
             raise DemosError(f"Step {self.steps} of {self.path} cannot be recorded: {refusal}.")
         if self.steps % _SPACE_CHECK_STEPS == 0:
@@ -294,7 +302,7 @@ class EpisodeWriter:
         return ""
 
     def _time_s(self, step: Step) -> float:
-        at_ns = step.captured_ns if step.captured_ns is not None else step.decided_ns
+        at_ns = step.clock_ns
         return step.index / self._header.control_hz if at_ns is None else at_ns / _NS_PER_S
 
     def _require_open(self) -> None:
@@ -303,11 +311,7 @@ class EpisodeWriter:
 
 
 def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
-    """Create the folder of an episode with its empty files, atomically.
-
-    Raises:
-        OutputError: If it cannot be created.
-    """
+    """Create the folder of an episode with its empty files, atomically."""
     part = recording / f".{began}.{os.getpid()}"
     try:
         (part / FRAMES).mkdir(parents=True, exist_ok=True)
@@ -324,21 +328,8 @@ def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
     raise OutputError(f"{recording} has too many episodes that began at {began}.")
 
 
-def _no_picture(jpeg: bytes | None) -> str:
-    """Return why `jpeg` cannot be a picture, as part of a sentence; "" if it may be one."""
-    if jpeg is None:
-        return ""
-    if len(jpeg) > _MAX_PICTURE_BYTES:
-        return f"its picture has {len(jpeg)} bytes, more than the limit of {_MAX_PICTURE_BYTES}"
-    return "" if jpeg.startswith(_JPEG) else "its picture is not a JPEG"
-
-
 def _require_space(folder: Path, spare_bytes: int) -> None:
-    """Refuse to fill the disk.
-
-    Raises:
-        OutputError: If less than `spare_bytes` are free.
-    """
+    """Refuse to fill the disk."""
     try:
         found = os.statvfs(folder)
     except OSError as error:

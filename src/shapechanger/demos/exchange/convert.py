@@ -17,12 +17,16 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.episodes.files import cannot_write, is_episode
 from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
-from shapechanger.demos.exchange.minari_export import require_dataset_name, write_minari
-from shapechanger.demos.exchange.minari_format import METADATA, is_minari
+from shapechanger.demos.exchange.minari_export import (
+    METADATA,
+    is_minari,
+    require_dataset_name,
+    write_minari,
+)
 from shapechanger.demos.exchange.minari_import import read_minari
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
@@ -30,9 +34,6 @@ from shapechanger.errors import DemosError, OutputError, UnknownName
 
 Format = Literal["2017", "tub", "minari", "csv"]
 
-
-FORMATS: Final[tuple[Format, ...]] = ("2017", "tub", "minari", "csv")
-"""Names of the formats."""
 
 _DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
     "2017": is_2017,
@@ -47,6 +48,9 @@ _READ: Final[dict[Format, Callable[[Path], Iterator[ExchangeEpisode]]]] = {
     "csv": read_csv,
 }
 _MARKS_DROPPED: Final = ("minari", "csv")
+
+FORMATS: Final = tuple(_READ)
+"""Names of the formats."""
 
 _EXPECTED: Final = (
     f"{LABELS} beside JPEGs (2017), {MANIFEST} or record_0.json (tub), data/{METADATA} (minari), "
@@ -128,10 +132,10 @@ def export_recording(data: Path, out: Path, format: str, *, dropped: bool = Fals
                     steps = write_minari(episodes, folder, out.name)
                 case "csv":
                     steps = write_csv(episodes, folder)
-        except OutputError:
+        except OutputError:  # Already worded, and a subclass of OSError.
             raise
         except OSError as error:
-            raise OutputError(f"Cannot write {out}: {error.strerror or error}.") from error
+            raise cannot_write(out, error) from error
         except OverflowError as error:
             raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
     total = sum(len(episode.steps) for episode in read)
@@ -158,7 +162,8 @@ def import_episodes(
         MissingExtra: If a package that the format needs is not installed.
     """
     for episode in _READ[_require_format(format, path)](path):
-        yield episode.header, _numbered(episode)
+        kept = enumerate(kept_steps(episode.rows))
+        yield episode.header, ((replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
 
 
 def import_recording(path: Path, out: Path, format: str = "auto") -> Imported:
@@ -219,12 +224,7 @@ def find_format(path: Path) -> Format:
 
 
 def _require_format(name: str, path: Path) -> Format:
-    """Return the named format, or the detected one for "auto".
-
-    Raises:
-        UnknownName: If there is no such format.
-        DemosError: If the folder does not have this format.
-    """
+    """Return the named format, or the detected one for "auto"."""
     if name == "auto":
         return find_format(path)
     if name not in FORMATS:
@@ -244,11 +244,6 @@ def _require_folder(path: Path) -> None:
 
 def _formats_of(path: Path) -> list[Format]:
     return [name for name, detect in _DETECT.items() if detect(path)]
-
-
-def _numbered(episode: ExchangeEpisode) -> Iterator[tuple[Step, bytes | None]]:
-    for index, (step, picture) in enumerate(kept_steps(episode.rows)):
-        yield replace(step, index=index), picture
 
 
 def _write(episode: ExchangeEpisode, folder: Path, began: datetime) -> tuple[int, int]:

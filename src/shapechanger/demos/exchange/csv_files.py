@@ -12,9 +12,10 @@ import io
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, TypeVar, cast
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.exchange.files import (
@@ -29,23 +30,17 @@ from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Layout
 
+_N = TypeVar("_N", int, float)
+
 TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
 
-_BEFORE: Final = ("step", "frame", "driver")
 _VECTORS: Final = ("action", "applied", "wanted", "state")
 _TIMES: Final = ("captured_ns", "decided_ns", "wall_ns")
-_AFTER: Final = (
-    *_TIMES,
-    "reward",
-    "terms",
-    "terminated",
-    "truncated",
-    "stop_reason",
-    "marks",
-    "dropped",
-)
+_BEFORE_VECTORS: Final = ("step", "frame", "driver")
+_AFTER_VECTORS: Final = (*_TIMES, "reward", "terms", "terminated", "truncated", "stop_reason")
+_AFTER_STEP: Final = ("marks", "dropped")
 _JSON_NAMES: Final = {dict: "object", list: "array", str: "string"}
 _MAX_NAMED: Final = 5
 _MAX_QUOTED: Final = 60
@@ -61,12 +56,10 @@ def write_csv(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     Returns:
         Number of steps written.
     """
-    if len(episodes) == 1:
-        return _write(episodes[0], folder)
     steps = 0
     for number, episode in enumerate(episodes, 1):
-        place = folder / f"episode-{number:04d}"
-        place.mkdir()
+        place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
+        place.mkdir(exist_ok=True)
         steps += _write(episode, place)
     return steps
 
@@ -96,7 +89,7 @@ def read_csv(folder: Path) -> Iterator[ExchangeEpisode]:
         fields = parse_json_object(read_text(path), str(path))
         try:
             header = EpisodeHeader.from_json(fields)
-            columns = _Columns(header)
+            columns = _columns(header)
         except (DemosError, LayoutError) as error:
             raise DemosError(f"{path}: {error}") from error
         yield ExchangeEpisode(
@@ -107,30 +100,8 @@ def read_csv(folder: Path) -> Iterator[ExchangeEpisode]:
         )
 
 
-def _write(episode: ExchangeEpisode, folder: Path) -> int:
-    columns = _Columns(episode.header)
-    header = episode.header.to_json() | {"outcome": episode.outcome}
-    text = json.dumps(header, indent=1, ensure_ascii=False)
-    (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
-    (folder / _FRAMES).mkdir()
-    frame, number = "", 0
-    with (folder / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns.names)
-        for number, row in enumerate(episode.rows, 1):
-            if row.jpeg is not None:
-                frame = f"{number - 1:06d}.jpg"
-                (folder / _FRAMES / frame).write_bytes(row.jpeg)
-            writer.writerow(columns.cells(row, number - 1, frame))
-    return number
-
-
 def _tables_of(folder: Path) -> list[Path]:
-    """Return the folders with a `steps.csv`: the folder itself, or its subfolders.
-
-    Raises:
-        DemosError: If the folder cannot be read.
-    """
+    """Return the folders with a `steps.csv`: the folder itself, or its subfolders."""
     if (folder / TABLE).is_file():
         return [folder]
     try:
@@ -139,156 +110,16 @@ def _tables_of(folder: Path) -> list[Path]:
         raise cannot_read(folder, error) from error
 
 
-def _rows(folder: Path, header: EpisodeHeader, columns: _Columns) -> Iterator[ExchangeStep]:
-    path = folder / TABLE
-    pictures = Pictures(header.image_size)
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
-    shown, before = "", -1
-    try:
-        columns.require(next(reader, list[str]()), str(path))
-        for cells in reader:
-            where = f"{path}, line {reader.line_num}"
-            row, frame, number = columns.parse(cells, where)
-            if number <= before:
-                raise DemosError(f"{where}: step {number} comes after step {before}.")
-            before = number
-            jpeg = None
-            if frame != shown:
-                if header.image_size is None:
-                    raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
-                shown = frame
-                jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
-            yield replace(row, jpeg=jpeg)
-    except csv.Error as error:
-        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
-
-
-class _Columns:
-    """Columns of `steps.csv` for the layouts of an episode.
-
-    Attributes:
-        names: Their names in order.
-    """
-
-    def __init__(self, header: EpisodeHeader) -> None:
-        action = _places(header.action_layout)
-        places = {"state": _places(header.state_layout) if header.state_layout else []}
-        self._sizes = {name: len(places.get(name, action)) for name in _VECTORS}
-        self.names: tuple[str, ...] = (
-            *_BEFORE,
-            *(f"{name}/{place}" for name in _VECTORS for place in places.get(name, action)),
-            *_AFTER,
-        )
-
-    def cells(self, row: ExchangeStep, number: int, frame: str) -> list[str]:
-        """Return the cells of one line.
-
-        Args:
-            row: The step.
-            number: Number of the step in the file.
-            frame: File name of its picture; "" for none.
-        """
-        step = row.step
-        cells = [str(number), frame, step.driver]
-        for name in _VECTORS:
-            values = cast("tuple[float, ...] | None", getattr(step, name))
-            cells += (
-                [""] * self._sizes[name] if values is None else [repr(float(v)) for v in values]
-            )
-        for name in _TIMES:
-            value = getattr(step, name)
-            cells.append("" if value is None else str(value))
-        cells.append("" if step.reward is None else repr(float(step.reward)))
-        terms = {n: v if math.isfinite(v) else repr(v) for n, v in step.terms.items()}
-        cells.append(json.dumps(terms) if terms else "")
-        cells += [str(step.terminated).lower(), str(step.truncated).lower()]
-        cells.append(json.dumps(step.stop_reason) if step.stop_reason else "")
-        cells.append(json.dumps(list(row.marks)) if row.marks else "")
-        cells.append("" if row.dropped is None else json.dumps(row.dropped))
-        return cells
-
-    def require(self, found: Sequence[str], where: str) -> None:
-        """Refuse a table with other columns.
-
-        Args:
-            found: Names of the columns that were found.
-            where: How to name the table in errors.
-
-        Raises:
-            DemosError: If the columns differ.
-        """
-        if tuple(found) == self.names:
-            return
-        missing = [name for name in self.names if name not in found]
-        surplus = [repr(name) for name in found if name not in self.names]
-        problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
-        problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
-        what = " and ".join(problems) or "has its columns in another order"
-        raise DemosError(f"{where} {what}: the columns must be those of {_HEADER}.")
-
-    def parse(self, cells: Sequence[str], where: str) -> tuple[ExchangeStep, str, int]:
-        """Parse the cells of one line.
-
-        Args:
-            cells: One cell per column.
-            where: How to name the line in errors.
-
-        Returns:
-            The step without its picture, the file name of the picture ("" for none), and the
-            number of the step in the file.
-
-        Raises:
-            DemosError: If a cell is invalid.
-        """
-        if len(cells) != len(self.names):
-            raise DemosError(f"{where} has {len(cells)} cells instead of {len(self.names)}.")
-        left = list(zip(self.names, cells, strict=True))
-
-        def number(kind: type[float] | type[int]) -> Any:
-            name, cell = left.pop(0)
-            return _number(cell, kind, f"{where}: {name}") if cell else None
-
-        def vector(name: str) -> tuple[float, ...] | None:
-            values = [number(float) for _ in range(self._sizes[name])]
-            if values and all(value is None for value in values):
-                return None
-            if None in values:
-                raise DemosError(f"{where}: some values of {name} are empty, but not all.")
-            return tuple(values)
-
-        def text(kind: type) -> Any:
-            name, cell = left.pop(0)
-            return _text(cell, kind, f"{where}: {name}") if cell else None
-
-        index = number(int)
-        frame, driver = left.pop(0)[1], left.pop(0)[1]
-        if driver not in DRIVERS:
-            raise DemosError(f"{where}: {UnknownName('driver', driver, DRIVERS)}")
-        action = vector("action")
-        if index is None or action is None:
-            raise DemosError(f"{where}: {'step' if index is None else 'the action'} is empty.")
-        applied, wanted, state = vector("applied"), vector("wanted"), vector("state")
-        times = {name: number(int) for name in _TIMES}
-        reward = number(float)
-        terms = cast("dict[str, Any]", text(dict) or {})
-        step = Step(
-            action=action,
-            driver=driver,
-            applied=applied,
-            wanted=wanted,
-            state=state if state is not None else (math.nan,) * self._sizes["state"],
-            **times,
-            reward=reward,
-            terms={
-                name: _number(str(value), float, f"{where}: {name}")
-                for name, value in terms.items()
-            },
-            terminated=_flag(left.pop(0)[1], where),
-            truncated=_flag(left.pop(0)[1], where),
-            stop_reason=text(str) or "",
-        )
-        marks = tuple(str(mark) for mark in text(list) or ())
-        return ExchangeStep(step=step, jpeg=None, marks=marks, dropped=text(str)), frame, index
+def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
+    """Return the names of the columns of each field of a step, in order."""
+    of_action = _places(header.action_layout)
+    of_state = _places(header.state_layout) if header.state_layout else []
+    vectors = {
+        name: [f"{name}/{place}" for place in (of_state if name == "state" else of_action)]
+        for name in _VECTORS
+    }
+    before = {name: [name] for name in _BEFORE_VECTORS}
+    return before | vectors | {name: [name] for name in (*_AFTER_VECTORS, *_AFTER_STEP)}
 
 
 def _places(layout: str) -> list[str]:
@@ -300,23 +131,159 @@ def _places(layout: str) -> list[str]:
     ]
 
 
-def _number(cell: str, kind: type[float] | type[int], where: str) -> float | int:
+def _write(episode: ExchangeEpisode, folder: Path) -> int:
+    columns = _columns(episode.header)
+    header = episode.header.to_json() | {"outcome": episode.outcome}
+    text = json.dumps(header, indent=1, ensure_ascii=False)
+    (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
+    (folder / _FRAMES).mkdir()
+    frame, number = "", 0
+    with (folder / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(chain.from_iterable(columns.values()))
+        for number, row in enumerate(episode.rows, 1):
+            if row.jpeg is not None:
+                frame = f"{number - 1:06d}.jpg"
+                (folder / _FRAMES / frame).write_bytes(row.jpeg)
+            step = row.step
+            cells = [str(number - 1), frame, step.driver]
+            for name in _VECTORS:
+                values = getattr(step, name)
+                cells += [""] * len(columns[name]) if values is None else map(_cell, values)
+            cells += [_cell(getattr(step, name)) for name in _AFTER_VECTORS]
+            dropped = "" if row.dropped is None else json.dumps(row.dropped)
+            writer.writerow([*cells, _cell(list(row.marks)), dropped])
+    return number
+
+
+def _cell(value: Any) -> str:
+    """Return a cell; an empty one for None, and for an empty text, list or dictionary."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return repr(value)
+        case dict():  # JSON has neither NaN nor infinity.
+            numbers = cast("dict[str, float]", value)
+            value = {n: v if math.isfinite(v) else repr(v) for n, v in numbers.items()}
+        case _:
+            pass
+    return json.dumps(value) if value else ""
+
+
+def _rows(
+    folder: Path, header: EpisodeHeader, columns: dict[str, list[str]]
+) -> Iterator[ExchangeStep]:
+    path = folder / TABLE
+    pictures = Pictures(header.image_size)
+    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
+    names = list(chain.from_iterable(columns.values()))
+    shown, before = "", -1
     try:
-        return kind(cell)
-    except ValueError as error:
-        what = "an integer" if kind is int else "a number"
-        raise DemosError(f"{where} must be {what}, got {cell!r}.") from error
+        _require_columns(next(reader, list[str]()), names, str(path))
+        for cells in reader:
+            where = f"{path}, line {reader.line_num}"
+            if len(cells) != len(names):
+                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}.")
+            row = _Row(dict(zip(names, cells, strict=True)), where)
+            number = row.number("step", int)
+            if number is None:
+                raise DemosError(f"{where}: step is empty.")
+            if number <= before:
+                raise DemosError(f"{where}: step {number} comes after step {before}.")
+            before = number
+            step, frame, jpeg = row.step(columns), row.cells["frame"], None
+            if frame != shown:
+                if header.image_size is None:
+                    raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
+                shown = frame
+                jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
+            marks = tuple(map(str, row.json("marks", list) or ()))
+            yield ExchangeStep(step=step, jpeg=jpeg, marks=marks, dropped=row.json("dropped", str))
+    except csv.Error as error:
+        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
 
 
-def _flag(cell: str, where: str) -> bool:
-    word = cell.strip().lower()  # Spreadsheets write TRUE.
-    if word not in {"true", "false", "1", "0"}:
-        raise DemosError(f"{where}: expected true or false, got {cell!r}.")
-    return word in {"true", "1"}
+def _require_columns(found: Sequence[str], names: Sequence[str], where: str) -> None:
+    """Refuse a table with other columns."""
+    if list(found) == list(names):
+        return
+    missing = [name for name in names if name not in found]
+    surplus = [repr(name) for name in found if name not in names]
+    problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
+    problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
+    what = " and ".join(problems) or "has its columns in another order"
+    raise DemosError(f"{where} {what}: the columns must be those of {_HEADER}.")
 
 
-def _text(cell: str, kind: type, where: str) -> Any:
-    value = parse_json(cell, f"{where}: {cell[:_MAX_QUOTED]!r}")
-    if not isinstance(value, kind):
-        raise DemosError(f"{where} must be a JSON {_JSON_NAMES[kind]}, got {cell[:_MAX_QUOTED]!r}.")
-    return value
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One line of `steps.csv`.
+
+    Attributes:
+        cells: The cells by the name of their column.
+        where: How to name the line in errors.
+    """
+
+    cells: dict[str, str]
+    where: str
+
+    def step(self, columns: dict[str, list[str]]) -> Step:
+        """Return the step; `columns` are those of each of its fields."""
+        driver = self.cells["driver"]
+        if driver not in DRIVERS:
+            raise DemosError(f"{self.where}: {UnknownName('driver', driver, DRIVERS)}")
+        vectors = {name: self._vector(name, columns[name]) for name in _VECTORS}
+        if vectors["action"] is None:
+            raise DemosError(f"{self.where}: the action is empty.")
+        if vectors["state"] is None:
+            vectors["state"] = (math.nan,) * len(columns["state"])
+        terms = cast("dict[str, Any]", self.json("terms", dict) or {})
+        fields: dict[str, Any] = {
+            **vectors,
+            **{name: self.number(name, int) for name in _TIMES},
+            "reward": self.number("reward", float),
+            "terms": {name: self._parsed(str(v), float, name) for name, v in terms.items()},
+            "terminated": self._flag("terminated"),
+            "truncated": self._flag("truncated"),
+            "stop_reason": self.json("stop_reason", str) or "",
+        }
+        return Step(driver=driver, **fields)
+
+    def number(self, name: str, kind: type[_N]) -> _N | None:
+        """Return the number in a column; None for an empty cell."""
+        cell = self.cells[name]
+        return self._parsed(cell, kind, name) if cell else None
+
+    def json(self, name: str, kind: type) -> Any:
+        """Return the JSON of a type in a column; None for an empty cell."""
+        cell = self.cells[name]
+        if not cell:
+            return None
+        value = parse_json(cell, f"{self.where}: {name}: {cell[:_MAX_QUOTED]!r}")
+        if not isinstance(value, kind):
+            raise DemosError(
+                f"{self.where}: {name} must be a JSON {_JSON_NAMES[kind]}, got "
+                f"{cell[:_MAX_QUOTED]!r}."
+            )
+        return value
+
+    def _vector(self, name: str, columns: Sequence[str]) -> tuple[float, ...] | None:
+        values = [self.number(column, float) for column in columns]
+        known = tuple(value for value in values if value is not None)
+        if known and len(known) < len(values):
+            raise DemosError(f"{self.where}: some values of {name} are empty, but not all.")
+        return known if known or not columns else None
+
+    def _parsed(self, text: str, kind: type[_N], name: str) -> _N:
+        try:
+            return kind(text)
+        except ValueError as error:
+            what = "an integer" if kind is int else "a number"
+            raise DemosError(f"{self.where}: {name} must be {what}, got {text!r}.") from error
+
+    def _flag(self, name: str) -> bool:
+        word = self.cells[name].strip().lower()  # Spreadsheets write TRUE.
+        if word not in {"true", "false", "1", "0"}:
+            raise DemosError(f"{self.where}: expected true or false, got {self.cells[name]!r}.")
+        return word in {"true", "1"}

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, cast
 
+from shapechanger.demos.episodes.files import cannot_write
 from shapechanger.demos.jpeg import decode_picture, picture_size
 from shapechanger.errors import DemosError, OutputError
 
@@ -43,13 +44,13 @@ def new_folder(out: Path, source: Path) -> Generator[Path]:
         out.parent.mkdir(parents=True, exist_ok=True)
         part.mkdir()
     except OSError as error:
-        raise OutputError(f"Cannot write {out}: {error.strerror or error}.") from error
+        raise cannot_write(out, error) from error
     try:
         yield part
         try:
             part.rename(out)
         except OSError as error:
-            raise OutputError(f"Cannot write {out}: {error.strerror or error}.") from error
+            raise cannot_write(out, error) from error
     except BaseException as error:
         shutil.rmtree(part, ignore_errors=True)
         for parent in made:
@@ -81,8 +82,8 @@ def resolve_file(folder: Path, name: str, named_by: str) -> Path:
     Raises:
         DemosError: If there is no such file, or the name leads out of the folder.
     """
+    path = folder / name
     problem = name_problem(name)
-    path = folder / name if not problem else folder
     if not problem and not path.resolve().is_relative_to(folder.resolve()):
         problem = "is a link that leaves the folder"
     if problem:
@@ -131,7 +132,15 @@ def parse_json(text: str, where: str) -> Any:
 
 
 def parse_json_object(text: str, where: str) -> dict[str, Any]:
-    """Parse a JSON object; arguments and errors are those of `parse_json`."""
+    """Parse a JSON object.
+
+    Args:
+        text: The JSON.
+        where: How to name it in errors.
+
+    Raises:
+        DemosError: If it is not valid, or not an object.
+    """
     value = parse_json(text, where)
     if not isinstance(value, dict):
         raise DemosError(f"{where} is not a JSON object.")
@@ -161,18 +170,6 @@ class Pictures:
     def __init__(self, size: tuple[int, int] | None = None) -> None:
         self.size = size
         self._first = ""
-
-    @classmethod
-    def like(cls, path: Path) -> Pictures:
-        """Return a reader of pictures of the size of this one.
-
-        Raises:
-            DemosError: If the picture cannot be read.
-        """
-        try:
-            return cls(picture_size(path.read_bytes(), str(path)))
-        except OSError as error:
-            raise cannot_read(path, error) from error
 
     def read(self, path: Path) -> bytes:
         """Return the bytes of a picture.

@@ -87,22 +87,20 @@ def read_2017(folder: Path) -> Iterator[ExchangeEpisode]:
         [f"line {label.line}" for label in labels],
         f"sort the lines of {folder / LABELS} by their first column",
     )
-    size = Pictures.like(_picture(folder, labels[0])).size
+    first = Pictures()
+    first.read(_picture(folder, labels[0]))
     hz = rate_hz(times_ns)
     for number, part in enumerate(split_at_gaps(times_ns), 1):
         header = EpisodeHeader(
             action_layout=_LAYOUT.to_json(),
-            image_size=size,
+            image_size=first.size,
             control_hz=hz,
             clock="none",
             source="2017",
             notes={"files": [label.file for label in labels[part]], "labels": style},
         )
-        yield ExchangeEpisode(
-            header=header,
-            rows=_rows(folder, labels[part], Pictures(size)),
-            name=f"{folder}, part {number}",
-        )
+        rows = _rows(folder, labels[part], Pictures(first.size))
+        yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, part {number}")
 
 
 def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
@@ -129,7 +127,7 @@ def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
                 f"2017 {', '.join(_KEYS)}: export it to minari or csv."
             )
         style |= _known_style(episode.header.notes.get("labels"))
-        file_names = _FileNames(episode.header.notes.get("files"))
+        former = _former_names(episode.header.notes.get("files"))
         for number, (step, jpeg) in enumerate(kept_steps(episode.rows)):
             where = f"step {number} of {episode.name}"
             if jpeg is None:
@@ -141,7 +139,11 @@ def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
                     f"The action at {where} is {list(step.action)}, but in the format of 2017 at "
                     "most one value is 1 and the others are 0: export it to minari or csv."
                 )
-            name = file_names.take(step.wall_ns, len(lines))
+            if known := former.get(step.wall_ns):
+                name = known.popleft()
+            else:
+                seconds = (Decimal(step.wall_ns) / _NS_PER_S).normalize()
+                name = f"{seconds:f}_{len(lines):06d}.jpg"
             path = folder / name
             if path.exists():
                 raise DemosError(f"Two steps would share the file {name}: export them to csv.")
@@ -259,26 +261,15 @@ def _require_all_labelled(folder: Path, labels: Sequence[_Label]) -> None:
         )
 
 
-class _FileNames:
-    """Former file names of pictures, by their times.
-
-    Args:
-        files: File names according to the notes of an episode; anything invalid is ignored.
-    """
-
-    def __init__(self, files: object) -> None:
-        self._by_time: defaultdict[int, deque[str]] = defaultdict(deque)
-        for name in cast("list[object]", files) if isinstance(files, list) else []:
-            if isinstance(name, str) and not name_problem(name):
-                at_ns = _time_ns(name)
-                if at_ns is not None:
-                    self._by_time[at_ns].append(name)
-
-    def take(self, wall_ns: int, number: int) -> str:
-        """Return the former name of the picture of this time, or a new one with this number."""
-        if known := self._by_time.get(wall_ns):
-            return known.popleft()
-        return f"{(Decimal(wall_ns) / _NS_PER_S).normalize():f}_{number:06d}.jpg"
+def _former_names(files: object) -> dict[int, deque[str]]:
+    """Return the valid file names in the notes of an episode, by their times, ns."""
+    found: defaultdict[int, deque[str]] = defaultdict(deque)
+    for name in cast("list[object]", files) if isinstance(files, list) else []:
+        if isinstance(name, str) and not name_problem(name):
+            at_ns = _time_ns(name)
+            if at_ns is not None:
+                found[at_ns].append(name)
+    return found
 
 
 def _known_style(style: object) -> dict[str, object]:

@@ -1,4 +1,24 @@
-"""Export of recordings as Minari datasets; `minari_format` documents the layout of the file."""
+"""Export of recordings as Minari datasets.
+
+An observation is the picture, the state, or a dictionary of both. A picture is stored as the JPEG
+that was recorded, which Minari decodes on reading; it is not encoded again. Pictures below 32
+pixels, which Minari does not store as JPEG, are stored as pixels, with the JPEG beside them. Minari
+needs one observation more than there are steps, so the last one is repeated.
+
+The infos of a step, by name:
+
+- `applied`, `wanted`: as the action; `has_applied`, `has_wanted`: whether they are known.
+- `driver`, `stop_reason`: text.
+- `captured_ns`, `decided_ns`, `wall_ns`: times; `UNKNOWN_NS` if unknown.
+- `frame`: index of the picture in the episode, from 0; the same for steps that share one.
+- `rewarded`: whether the reward is known; it is NaN if not.
+- `more`: JSON of everything else: `terms`, `marks`, `dropped`.
+
+The headers of the episodes, the layouts and the rate are in `metadata.json`.
+
+Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
+encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +28,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
 from itertools import chain, islice
 from pathlib import Path
@@ -19,17 +40,75 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.exchange import minari_format as names
 from shapechanger.demos.exchange.files import Pictures
-from shapechanger.demos.exchange.minari_format import library, stored_as_jpeg
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Layout
 
+DATA: Final = "data"
+METADATA: Final = "metadata.json"
+MAIN: Final = "main_data.hdf5"
+
+IMAGE: Final = "image"
+STATE: Final = "state"
+JPEG: Final = "jpeg"
+
+HEADERS: Final = "shapechanger"
+"""Key of Shapechanger's own section in `metadata.json`."""
+
+HEADERS_FORMAT: Final = 1
+"""Version of that section."""
+
+TIMES: Final = ("captured_ns", "decided_ns", "wall_ns")
+
+UNKNOWN_NS: Final = -(2**63)
+"""Placeholder for an unknown time, ns."""
+
+_MIN_JPEG_PIXELS: Final = 32
+_BRIGHTEST: Final = 255
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 256  # Steps in memory at once.
 _OBSERVATIONS: Final = "observations"
+
+
+def library(name: str) -> Any:
+    """Import a module of h5py or Minari.
+
+    Raises:
+        MissingExtra: If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtra(name.split(".")[0], "data") from error
+
+
+def data_folder(folder: Path) -> Path | None:
+    """Return the folder with the files of a dataset: `data`, or `folder` itself; None for none."""
+    for place in (folder / DATA, folder):
+        if (place / METADATA).is_file():
+            return place
+    return None
+
+
+def is_minari(folder: Path) -> bool:
+    """Return whether a folder is a Minari dataset."""
+    return data_folder(folder) is not None
+
+
+def stored_as_jpeg(space: spaces.Space[Any]) -> bool:
+    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
+    if not isinstance(space, spaces.Box):
+        return False
+    box = cast("Any", space)
+    return (
+        len(box.shape) in {2, 3}
+        and min(box.shape[:2]) >= _MIN_JPEG_PIXELS
+        and box.dtype == np.uint8
+        and bool(np.all(box.low == 0))
+        and bool(np.all(box.high == _BRIGHTEST))
+    )
 
 
 def require_dataset_name(folder: Path) -> None:
@@ -76,13 +155,13 @@ def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, name: str) -
     actions = Layout.from_json(first.header.action_layout)
     storage = storages.MinariStorage.new(
         # Minari cannot measure the size of a relative folder.
-        (folder / names.DATA).absolute(),
+        (folder / DATA).absolute(),
         observation_space=observed.space,
         action_space=_box(actions),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
-    with h5py.File(folder / names.DATA / names.MAIN, "a", track_order=True) as file:
+    with h5py.File(folder / DATA / MAIN, "a", track_order=True) as file:
         for number, (episode, (row, rest)) in enumerate(begun):
             group = file.create_group(f"episode_{number}")
             columns = _EpisodeColumns(group, episode.name, observed, actions.size)
@@ -150,8 +229,8 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
-        names.HEADERS: {
-            "format": names.HEADERS_FORMAT,
+        HEADERS: {
+            "format": HEADERS_FORMAT,
             "episodes": [e.header.to_json() | {"outcome": e.outcome} for e in episodes],
         },
     }
@@ -211,7 +290,7 @@ class _Observed:
         picture = self.picture
         state = None if self.state is None else _box(self.state)
         if picture is not None and state is not None:
-            return spaces.Dict({names.IMAGE: picture, names.STATE: state})
+            return spaces.Dict({IMAGE: picture, STATE: state})
         return cast("spaces.Space[Any]", picture if state is None else state)
 
     def column(self, part: str) -> str:
@@ -262,14 +341,15 @@ class _EpisodeColumns:
         self._group = group
         self._name = name
         self._observed = observed
-        picture = observed.picture
-        self._as_jpeg = picture is not None and stored_as_jpeg(picture)
-        self._actions = actions
+        self._as_jpeg = observed.picture is not None and stored_as_jpeg(observed.picture)
+        self._unknown = (math.nan,) * actions
         self._pictures = Pictures(observed.size)
         self._picture: bytes | None = None
         self._pixels: NDArray[np.uint8] | None = None
         self._frame = -1
         self._ends = True
+        self._text = library("h5py").string_dtype("utf-8")
+        self._blob = library("h5py").vlen_dtype(np.uint8)
 
     def add(self, rows: Sequence[ExchangeStep]) -> None:
         """Append steps.
@@ -277,32 +357,31 @@ class _EpisodeColumns:
         Raises:
             DemosError: If one has no picture, or one that does not fit.
         """
+        steps = [row.step for row in rows]
         if self._observed.size is not None:
             self._add_pictures(rows)
         if self._observed.state is not None:
-            states = np.array([row.step.state for row in rows], np.float64)
-            self._numbers(self._observed.column(names.STATE), states)
-        steps = [row.step for row in rows]
-        numbers, texts = self._numbers, self._texts
-        numbers("actions", np.array([step.action for step in steps], np.float64))
+            self._append(self._observed.column(STATE), [step.state for step in steps], np.float64)
         rewards = [math.nan if step.reward is None else step.reward for step in steps]
-        numbers("rewards", np.array(rewards, np.float64))
-        numbers("terminations", np.array([step.terminated for step in steps]))
-        numbers("truncations", np.array([step.truncated for step in steps]))
-        numbers("infos/rewarded", np.array([step.reward is not None for step in steps]))
-        missing = (math.nan,) * self._actions
+        self._append("actions", [step.action for step in steps], np.float64)
+        self._append("rewards", rewards, np.float64)
+        self._append("terminations", [step.terminated for step in steps], np.bool_)
+        self._append("truncations", [step.truncated for step in steps], np.bool_)
+        self._append("infos/rewarded", [step.reward is not None for step in steps], np.bool_)
         for name in ("applied", "wanted"):
             values = [getattr(step, name) for step in steps]
-            known = [missing if value is None else value for value in values]
-            numbers(f"infos/{name}", np.array(known, np.float64))
-            numbers(f"infos/has_{name}", np.array([value is not None for value in values]))
-        for name in names.TIMES:
+            known = [self._unknown if value is None else value for value in values]
+            self._append(f"infos/{name}", known, np.float64)
+            self._append(f"infos/has_{name}", [value is not None for value in values], np.bool_)
+        for name in TIMES:
             times = [getattr(step, name) for step in steps]
-            known = [names.UNKNOWN_NS if time is None else time for time in times]
-            numbers(f"infos/{name}", np.array(known, np.int64))
-        texts("infos/driver", [step.driver for step in steps])
-        texts("infos/stop_reason", [step.stop_reason for step in steps])
-        texts("infos/more", [_more(row) for row in rows])
+            known = [UNKNOWN_NS if time is None else time for time in times]
+            self._append(f"infos/{name}", known, np.int64)
+        text = self._text
+        self._append("infos/driver", [step.driver for step in steps], text)
+        # HDF5 cannot store NUL in a text.
+        self._append("infos/stop_reason", [s.stop_reason.replace("\0", "") for s in steps], text)
+        self._append("infos/more", [_more(row) for row in rows], text)
         self._ends = steps[-1].terminated or steps[-1].truncated
         self.steps += len(rows)
 
@@ -312,17 +391,19 @@ class _EpisodeColumns:
         An episode without an end is truncated at its last step: a learner must not take the next
         episode for its continuation.
         """
-        if self._observed.size is not None:
-            self._repeat_last(self._observed.column(names.IMAGE))
-        if self._observed.state is not None:
-            self._repeat_last(self._observed.column(names.STATE))
-        self._numbers("infos/cut_off", np.array([not self._ends]))
+        for part, there in ((IMAGE, self._observed.size), (STATE, self._observed.state)):
+            if there is not None:
+                column = self._group[self._observed.column(part)]
+                last = column[-1]
+                column.resize(len(column) + 1, axis=0)
+                column[-1] = last
+        self._append("infos/cut_off", [not self._ends], np.bool_)
         if not self._ends:
             self._group["truncations"][-1] = True
         return self.steps
 
     def _add_pictures(self, rows: Sequence[ExchangeStep]) -> None:
-        jpegs: list[bytes] = []
+        jpegs: list[NDArray[np.uint8]] = []
         pixels: list[NDArray[np.uint8]] = []
         frames: list[int] = []
         for number, row in enumerate(rows, self.steps):
@@ -341,56 +422,31 @@ class _EpisodeColumns:
                 raise DemosError(
                     f"There is no picture {where}, but Minari needs one: drop the step."
                 )
-            jpegs.append(self._picture)
+            jpegs.append(np.frombuffer(self._picture, np.uint8))
             frames.append(self._frame)
             if self._pixels is not None:
                 pixels.append(self._pixels)
-        self._numbers("infos/frame", np.array(frames, np.int64))
-        column = self._observed.column(names.IMAGE)
-        if self._as_jpeg:
-            self._blobs(column, jpegs)
-        else:
-            self._numbers(column, np.array(pixels, np.uint8))
-            self._blobs(f"infos/{names.JPEG}", jpegs)
+        self._append("infos/frame", frames, np.int64)
+        column = self._observed.column(IMAGE)
+        if not self._as_jpeg:
+            self._append(column, pixels, np.uint8)
+        self._append(column if self._as_jpeg else f"infos/{JPEG}", jpegs, self._blob)
 
-    def _numbers(self, name: str, values: NDArray[Any]) -> None:
-        """Append numbers, shape (n, ...)."""
-        self._append(name, values, values.dtype)
-
-    def _texts(self, name: str, values: Sequence[str]) -> None:
-        """Append texts, without NUL, which HDF5 cannot store."""
-        column = np.empty(len(values), object)
-        column[:] = [value.replace("\0", "") for value in values]
-        self._append(name, column, library("h5py").string_dtype("utf-8"))
-
-    def _blobs(self, name: str, values: Sequence[bytes]) -> None:
-        """Append bytes, each as its own array of uint8."""
-        column = self._grown(name, len(values), (), library("h5py").vlen_dtype(np.dtype(np.uint8)))
-        start = column.shape[0] - len(values)
-        # One by one: h5py takes several arrays of equal length for one two-dimensional array.
-        for number, value in enumerate(values, start):
-            column[number] = np.frombuffer(value, np.uint8)
-
-    def _repeat_last(self, name: str) -> None:
-        """Append the last entry of a column once more."""
-        column = self._group[name]
-        last = column[-1]
-        column.resize(column.shape[0] + 1, axis=0)
-        column[-1] = last
-
-    def _append(self, name: str, values: NDArray[Any], dtype: Any) -> None:
-        column = self._grown(name, len(values), values.shape[1:], dtype)
-        column[column.shape[0] - len(values) :] = values
-
-    def _grown(self, name: str, more: int, shape: tuple[int, ...], dtype: Any) -> Any:
-        """Return a column with room for more entries at its end; create it if missing."""
+    def _append(self, name: str, values: Sequence[Any], dtype: Any) -> None:
+        """Append values to a column, which is created if it is missing."""
         if name not in self._group:
+            shape = () if dtype is self._blob else np.shape(values)[1:]
             self._group.create_dataset(
                 name, shape=(0, *shape), maxshape=(None, *shape), dtype=dtype, chunks=True
             )
         column = self._group[name]
-        column.resize(column.shape[0] + more, axis=0)
-        return column
+        start = len(column)
+        column.resize(start + len(values), axis=0)
+        if dtype is not self._blob:
+            column[start:] = np.array(values, dtype)
+        else:  # h5py takes several arrays of equal length for one two-dimensional array.
+            for number, value in enumerate(values, start):
+                column[number] = value
 
 
 def _more(row: ExchangeStep) -> str:

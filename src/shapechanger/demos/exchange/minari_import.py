@@ -24,14 +24,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
-from shapechanger.demos.exchange import minari_format as names
+from shapechanger.demos.exchange import minari_export as names
 from shapechanger.demos.exchange.files import (
     Pictures,
     parse_json_object,
     read_text,
     resolve_file,
 )
-from shapechanger.demos.exchange.minari_format import library, stored_as_jpeg
+from shapechanger.demos.exchange.minari_export import library, stored_as_jpeg
 from shapechanger.demos.exchange.recorded import DEFAULT_HZ, ExchangeEpisode, ExchangeStep
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
 from shapechanger.errors import DemosError, MissingExtra, UnknownName
@@ -167,16 +167,15 @@ def _own_step(at: dict[str, Any], where: str) -> ExchangeStep:
     try:
         more = json.loads(at["infos/more"])
         driver = at["infos/driver"].decode()
-        times = [_known_ns(at[f"infos/{name}"]) for name in names.TIMES]
+        known = {name: int(at[f"infos/{name}"]) for name in names.TIMES}
+        times_ns: dict[str, Any] = {n: ns for n, ns in known.items() if ns != names.UNKNOWN_NS}
         step = Step(
             action=_vector(at["actions"]),
             driver=driver,
             applied=_vector(at["infos/applied"]) if at["infos/has_applied"] else None,
             wanted=_vector(at["infos/wanted"]) if at["infos/has_wanted"] else None,
             state=_vector(at[names.STATE]) if names.STATE in at else (),
-            captured_ns=times[0],
-            decided_ns=times[1],
-            wall_ns=times[2],
+            **times_ns,
             reward=float(at["rewards"]) if at["infos/rewarded"] else None,
             terms={name: float(value) for name, value in more.get("terms", {}).items()},
             terminated=bool(at["terminations"]),
@@ -198,10 +197,6 @@ def _vector(values: Any) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def _known_ns(time_ns: Any) -> int | None:
-    return None if int(time_ns) == names.UNKNOWN_NS else int(time_ns)
-
-
 @dataclass(frozen=True, slots=True)
 class _Leaf:
     """A space without subspaces, in a tree of spaces.
@@ -219,20 +214,6 @@ class _Leaf:
         """The path as one word; "" for the tree itself."""
         return "/".join(self.path)
 
-    @property
-    def is_picture(self) -> bool:
-        """Return whether the space is one of pictures, with the colours last or first."""
-        space = cast("Any", self.space)
-        if not isinstance(space, spaces.Box) or cast("Any", space).dtype != np.uint8:
-            return False
-        shape = cast("tuple[int, ...]", self.space.shape)
-        if len(shape) == 3:
-            if _colours_first(shape):
-                return min(shape[1:]) >= _MIN_PICTURE
-            if shape[2] not in _CHANNELS:
-                return False
-        return len(shape) in {2, 3} and min(shape[:2]) >= _MIN_PICTURE
-
 
 def _read_foreign(
     main: Path, path: Path, metadata: dict[str, Any], count: int
@@ -247,7 +228,7 @@ def _read_foreign(
     """
     observed = list(_leaves_of(_space(metadata, "observation_space", path)))
     acted = list(_leaves_of(_space(metadata, "action_space", path)))
-    pictured = [leaf for leaf in observed if leaf.is_picture]
+    pictured = [leaf for leaf in observed if _picture_size(leaf.space)]
     if len(pictured) > 1:
         raise DemosError(
             f"An observation in {main} has {len(pictured)} pictures "
@@ -260,7 +241,7 @@ def _read_foreign(
     header = EpisodeHeader(
         action_layout=_layout_of(acted, "action").to_json(),
         state_layout=_layout_of(sensed, "observation").to_json() if sensed else "",
-        image_size=_size(pictured[0]) if pictured else None,
+        image_size=_picture_size(pictured[0].space) if pictured else None,
         control_hz=float(hz) if isinstance(hz, int | float) and known else DEFAULT_HZ,
         clock="none",
         source="minari",
@@ -315,9 +296,6 @@ def _layout_of(leaves: list[_Leaf], what: str) -> Layout:
     Args:
         leaves: The leaves.
         what: What they belong to, "action" or "observation".
-
-    Raises:
-        DemosError: If a leaf has no numbers.
     """
     features: list[Feature] = []
     for leaf in leaves:
@@ -361,21 +339,22 @@ def _bounds(leaf: _Leaf, what: str) -> tuple[NDArray[np.float64], NDArray[np.flo
     return low.astype(np.float64), high.astype(np.float64)
 
 
-def _size(leaf: _Leaf) -> tuple[int, int]:
-    """Return the width and height of the pictures of a space, in pixels.
-
-    Raises:
-        DemosError: If they are too large.
-    """
-    shape = leaf.space.shape or (0, 0)
-    first = 1 if len(shape) == 3 and _colours_first(shape) else 0
-    height, width = shape[first], shape[first + 1]
+def _picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
+    """Return the width and height of the pictures of a space; None if it has no pictures."""
+    shape = space.shape or ()
+    if not isinstance(space, spaces.Box) or cast("Any", space).dtype != np.uint8:
+        return None
+    if len(shape) == 3 and _colours_first(shape):
+        shape = shape[1:]
+    elif len(shape) != 2 and (len(shape) != 3 or shape[2] not in _CHANNELS):
+        return None
+    height, width = shape[:2]
     if height * width > MAX_PIXELS:
         raise DemosError(
-            f"The pictures of {leaf.name or 'the observation'} have {width} x {height} pixels, "
-            f"more than the limit of {MAX_PIXELS}: make them smaller."
+            f"The pictures of the dataset have {width} x {height} pixels, more than the limit of "
+            f"{MAX_PIXELS}: make them smaller."
         )
-    return width, height
+    return (width, height) if min(height, width) >= _MIN_PICTURE else None
 
 
 def _colours_first(shape: tuple[int, ...]) -> bool:
@@ -466,12 +445,7 @@ def _encoded(pixels: NDArray[Any], size: tuple[int, int] | None, where: str) -> 
 
 @contextmanager
 def _open_hdf5(path: Path) -> Generator[Any]:
-    """Open an HDF5 file for reading, as an `h5py.File`.
-
-    Raises:
-        DemosError: If it is damaged, possibly not before it is read.
-        MissingExtra: If h5py is not installed.
-    """
+    """Open an HDF5 file for reading, as an `h5py.File`."""
     h5py = library("h5py")
     try:
         file = h5py.File(path, "r")
@@ -493,9 +467,6 @@ def _column(file: Any, name: str, where: Path, length: int | None = None) -> Any
         name: Path of the dataset in the file.
         where: Path of the file, for errors.
         length: Minimum number of entries; None for any number.
-
-    Raises:
-        DemosError: If it is missing or too short, or its content is in another file.
     """
     h5py = library("h5py")
     found: Any = file

@@ -16,8 +16,6 @@ DEFAULT_HZ: Final = 20.0
 
 _GAP_PERIODS: Final = 30.0  # A longer pause ends an episode.
 _NS_PER_S: Final = 1e9
-# Measured rates of one setting differ slightly, those of two settings by at least a third.
-_RATE_RATIO: Final = 1.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,24 +140,3 @@ def split_at_gaps(times_ns: Sequence[int]) -> list[slice]:
         if later - earlier > longest
     ]
     return [slice(first, last) for first, last in pairwise([*starts, len(times_ns)])]
-
-
-def require_one_rate(rates_hz: Sequence[float], names: Sequence[str], remedy: str) -> None:
-    """Refuse episodes whose rates differ by more than measurement explains.
-
-    Args:
-        rates_hz: Rate of each episode, Hz.
-        names: How to name each episode in errors.
-        remedy: What the user can do, as the end of a sentence.
-
-    Raises:
-        DemosError: If one rate is more than 1.3 times another.
-    """
-    if not rates_hz:
-        return
-    slow, fast = min(rates_hz), max(rates_hz)
-    if fast > _RATE_RATIO * slow:
-        raise DemosError(
-            f"{names[rates_hz.index(slow)]} has {slow:.3g} steps a second, but "
-            f"{names[rates_hz.index(fast)]} {fast:.3g}, and a data set has one rate: {remedy}."
-        )

@@ -23,7 +23,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby, pairwise
@@ -44,7 +44,6 @@ from shapechanger.demos.exchange.recorded import (
     ExchangeStep,
     kept_steps,
     rate_hz,
-    require_one_rate,
     require_order,
     split_at_gaps,
 )
@@ -70,6 +69,8 @@ _ACTIONS: Final = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle
 
 _CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
 _MIN_RATE_RECORDS: Final = 10  # A shorter drive is not evidence of its rate.
+# Measured rates of one setting differ slightly, those of two settings by at least a third.
+_RATE_RATIO: Final = 1.3
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
@@ -124,15 +125,16 @@ def read_tub(folder: Path) -> Iterator[ExchangeEpisode]:
     state = _state_layout(inputs)
     pictures = Pictures()
     if _IMAGE in records[0].fields:
-        pictures = Pictures.like(_picture(images, records[0]))
+        pictures.read(_picture(images, records[0]))
     size = pictures.size
     drives = list(_drives(records, in_order=newer))
     rates = [rate_hz(_times_ns(drive)) for drive in drives]
-    long = [n for n, drive in enumerate(drives) if len(_times_ns(drive)) >= _MIN_RATE_RECORDS]
-    require_one_rate(
-        [rates[n] for n in long],
-        [f"The drive from {drives[n][0].where}" for n in long],
-        "put the records of each rate into a tub of their own",
+    _require_one_rate(
+        {
+            hz: drive[0].where
+            for hz, drive in zip(rates, drives, strict=True)
+            if len(_times_ns(drive)) >= _MIN_RATE_RECORDS
+        }
     )
     for drive, hz in zip(drives, rates, strict=True):
         session = drive[0].session
@@ -175,18 +177,15 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     sessions: list[str] = []
     for number, episode in enumerate(episodes):
         sessions.append(f"{_created(episode.header):%y-%m-%d}_{number}")
-        times = _Times(episode.header)
+        timestamp_ms = _timestamps_ms(episode.header)
         for step, jpeg in kept_steps(episode.rows):
             if jpeg is None:
                 raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
             name = f"{len(records)}_cam_image_array_.jpg"
             (folder / _IMAGES / name).write_bytes(jpeg)
             fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
-            records.append(
-                fields
-                | {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
-                | {"_timestamp_ms": times.of(step)}
-            )
+            fields |= {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
+            records.append(fields | {"_timestamp_ms": timestamp_ms(step)})
     created_s = _created(episodes[0].header).timestamp()
     paths = _write_catalogs(folder, records, created_s)
     inputs = {_IMAGE: "image_array", "user/angle": "float", "user/throttle": "float", _MODE: "str"}
@@ -207,6 +206,17 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     )
     _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
     return len(records)
+
+
+def _require_one_rate(drives: Mapping[float, str]) -> None:
+    """Refuse drives whose rates differ by more than measurement explains, by rate, Hz."""
+    if drives and max(drives) > _RATE_RATIO * min(drives):
+        slow, fast = min(drives), max(drives)
+        raise DemosError(
+            f"The drive from {drives[slow]} has {slow:.3g} steps a second, but the drive from "
+            f"{drives[fast]} {fast:.3g}, and a data set has one rate: put the records of each "
+            "rate into a tub of their own."
+        )
 
 
 def _read_v2(folder: Path) -> tuple[dict[str, str], list[_Record]]:
@@ -230,17 +240,17 @@ def _read_v2(folder: Path) -> tuple[dict[str, str], list[_Record]]:
             if not line.strip():
                 continue
             where = f"{catalog}, line {number}"
-            if index not in deleted:
-                records.append(_record_v2(parse_json_object(line, where), where))
             index += 1
+            if index - 1 in deleted:
+                continue
+            fields = parse_json_object(line, where)
+            time_ms = _time(fields.get("_timestamp_ms"))
+            time_ns = None if time_ms is None else round(time_ms) * _NS_PER_MS
+            session = fields.get("_session_id")
+            records.append(
+                _Record(fields, where, time_ns, session="" if session is None else str(session))
+            )
     return _typed(inputs, types, path), records
-
-
-def _record_v2(fields: dict[str, Any], where: str) -> _Record:
-    time_ms = _time(fields.get("_timestamp_ms"))
-    time_ns = None if time_ms is None else round(time_ms) * _NS_PER_MS
-    session = fields.get("_session_id")
-    return _Record(fields, where, time_ns, session="" if session is None else str(session))
 
 
 def _read_v1(folder: Path) -> tuple[dict[str, str], list[_Record]]:
@@ -314,11 +324,7 @@ def _picture(images: Path, record: _Record) -> Path:
 
 
 def _step(record: _Record, state: Layout | None) -> Step:
-    """Return a record as a step.
-
-    Raises:
-        DemosError: If it lacks the user's action, or a value is out of range.
-    """
+    """Return a record as a step."""
     user = _pair(record, "user")
     if user is None:
         raise DemosError(f"{record.where} has no user/angle and user/throttle.")
@@ -398,11 +404,7 @@ def _times_ns(drive: Sequence[_Record]) -> list[int]:
 
 
 def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    """Return the names of the values of the state.
-
-    Raises:
-        DemosError: If a tub cannot hold the actions or the state of the episode.
-    """
+    """Return the names of the values of the state."""
     names = Layout.from_json(episode.header.action_layout).names
     if names != _ACTIONS.names:
         raise DemosError(
@@ -432,39 +434,30 @@ def _fields(step: Step, state: Sequence[str], where: str) -> dict[str, Any]:
     return fields | {name: value for name, value in known if math.isfinite(value)}
 
 
-class _Times:
-    """Unix times of the steps of an episode, which always increase.
+def _timestamps_ms(header: EpisodeHeader) -> Callable[[Step], int]:
+    """Return a function that maps each step of an episode, in order, to its Unix time, ms.
 
-    Args:
-        header: Header of the episode.
+    The times always increase.
     """
+    simulated = header.clock == "twin"
+    created_ns = round(_created(header).timestamp() * _NS_PER_S)
+    began_ns: int | None = None
+    last_ns: int | None = None
 
-    def __init__(self, header: EpisodeHeader) -> None:
-        self._simulated = header.clock == "twin"
-        self._period_ns = round(_NS_PER_S / header.control_hz)
-        self._created_ns = round(_created(header).timestamp() * _NS_PER_S)
-        self._began_ns: int | None = None
-        self._last_ns: int | None = None
-
-    def of(self, step: Step) -> int:
-        """Return the time of the next step, ms."""
-        last_ns = self._last_ns
-        at_ns = self._measured_ns(step)
+    def timestamp_ms(step: Step) -> int:
+        nonlocal began_ns, last_ns
+        at_ns = step.wall_ns
+        if simulated:
+            clock_ns = step.clock_ns
+            began_ns = clock_ns if began_ns is None else began_ns
+            at_ns = None if clock_ns is None else created_ns + clock_ns - cast("int", began_ns)
         if at_ns is None or (last_ns is not None and at_ns <= last_ns):
-            at_ns = self._created_ns if last_ns is None else last_ns + self._period_ns
-        self._last_ns = at_ns
+            period_ns = round(_NS_PER_S / header.control_hz)
+            at_ns = created_ns if last_ns is None else last_ns + period_ns
+        last_ns = at_ns
         return round(at_ns / _NS_PER_MS)
 
-    def _measured_ns(self, step: Step) -> int | None:
-        """Return the time of a step by its own clock; None if it has none."""
-        if not self._simulated:
-            return step.wall_ns
-        clock_ns = step.captured_ns if step.captured_ns is not None else step.decided_ns
-        if clock_ns is None:
-            return None
-        if self._began_ns is None:
-            self._began_ns = clock_ns
-        return self._created_ns + clock_ns - self._began_ns
+    return timestamp_ms
 
 
 def _created(header: EpisodeHeader) -> datetime:
