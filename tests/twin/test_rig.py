@@ -1,4 +1,4 @@
-"""A finger's rig in this process: guard, driver and bytes as on the bench, bones in MuJoCo."""
+"""A finger's rig in this process: guard and driver as on the bench, bones in MuJoCo."""
 
 from __future__ import annotations
 

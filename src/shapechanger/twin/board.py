@@ -23,29 +23,15 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
 from shapechanger.twin.messages import (
-    BreakCamera,
-    BreakChip,
-    BreakMagnet,
-    BreakServo,
-    ExchangeServoBytes,
     GrantTime,
-    LayOutCourse,
-    PlaceVehicle,
-    PressButton,
-    PutVehicleBack,
-    ReadLevels,
-    ReadTensions,
-    ReadWhereabouts,
+    OperatorRequest,
     Request,
-    SetBattery,
-    SetDistance,
     SleepOnBoard,
     SleepResult,
     WaitForGrant,
     Whereabouts,
 )
 from shapechanger.twin.pin_board import PinBoard
-from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.server import (
     LATER,
     START_NS,
@@ -53,7 +39,6 @@ from shapechanger.twin.server import (
     BoardServer,
     OwnerGone,
 )
-from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter
 from shapechanger.twin.start import BoardSettings
 from shapechanger.twin.wiring import TwinWiring
@@ -63,7 +48,6 @@ from shapechanger.worlds.world import RESTING_V, World
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of looking for a reader of the pictures while time stands still."""
-_BUTTONS: Final = ("bumper", "stop")
 
 _log = logging.getLogger(__name__)
 
@@ -102,9 +86,7 @@ class Board:
         self.camera = camera
         self._time = clock
         self._ledger = ledger
-        self._surroundings = Surroundings(wiring, world, clock.now_ns())
-        self._sensors = self._surroundings.sensors
-        self._pins = PinBoard(wiring, world, self._sensors, ledger, seed)
+        self._pins = PinBoard(wiring, world, ledger, seed, clock.now_ns())
         self.server = BoardServer(
             listening, owner_fd, self._pins, clock.kind, clock.now_ns, self._operate
         )
@@ -123,13 +105,13 @@ class Board:
 
     def advance(self, now_ns: int) -> None:
         """Advance the world to a time, and send the edges of inputs on the way."""
-        edges = self._surroundings.advance(now_ns, self._pins.levels)
+        edges = self._pins.advance(now_ns)
         for edge in edges:
             self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
         self.server.send_edges(edges)
 
     def _operate(self, connection: BoardConnection, request: Request) -> object:
-        """Execute a request about time, servos or the world."""
+        """Execute a request of time or of an operator."""
         match request:
             case WaitForGrant():
                 self._time.wait(connection, request.until_ns)
@@ -137,66 +119,71 @@ class Board:
             case SleepOnBoard():
                 self._time.sleep(connection, request.id or 0, request.ns)
                 return LATER
-            case ExchangeServoBytes():
-                rig = self._rig()
-                rig.require(request.device)
-                if request.data:
-                    rig.bus.receive(request.data)
-                return rig.bus.send()
-            case ReadTensions():
-                return self._rig().tensions()
-            case ReadLevels():
+            case OperatorRequest():
+                return self._act(request)
+            case _:
+                raise RobotError(f"The board does not execute {type(request).__name__}.")
+
+    def _act(self, request: OperatorRequest) -> object:
+        """Execute a request of an operator."""
+        match request.action, *request.values:
+            case ("tensions",):
+                return self._pins.require_rig().tensions()
+            case ("levels",):
                 return self._pins.levels
-            case ReadWhereabouts():
+            case ("whereabouts",):
                 return self._whereabouts()
-            case PlaceVehicle():
-                self.world.place(request.seed)
-                self._ledger.write(self._time.now_ns(), "place", seed=request.seed)
-            case PutVehicleBack():
+            case "place", int(seed):
+                self.world.place(seed)
+                self._record("place", seed=seed)
+            case ("put_back",):
                 try:
                     self.world.put_back()
                 except WorldError as error:
                     raise RobotError(f"The vehicle cannot be put back: {error}") from error
-                self._ledger.write(self._time.now_ns(), "put_back")
-            case LayOutCourse():
-                self.world.lay_out(request.seed)
-                self._ledger.write(self._time.now_ns(), "course", seed=request.seed)
+                self._record("put_back")
+            case "lay_out", int(seed):
+                self.world.lay_out(seed)
+                self._record("course", seed=seed)
             case _:
-                self._ledger.write(self._time.now_ns(), "fault", what=self._fail(request))
+                self._record("fault", what=self._fail(request))
         return None
 
-    def _fail(self, request: Request) -> str:
+    def _fail(self, request: OperatorRequest) -> str:
         """Break, repair or press something, and describe it for the ledger."""
-        match request:
-            case BreakCamera():
-                self._break_camera(request.fault)
-                return f"camera {request.fault or 'well'}"
-            case PressButton():
-                self._press(request.button, request.down)
-                return f"{request.button} {'down' if request.down else 'up'}"
-            case SetBattery():
-                self.world.resting_v = RESTING_V if request.volts is None else request.volts
-                return f"battery {request.volts}"
-            case SetDistance():
-                self._sensors.override_distance(request.metres, dead=request.dead)
-                return f"distance {'dead' if request.dead else request.metres}"
-            case BreakChip():
-                at = request.bus, request.address
-                (self._pins.dead_chips.add if request.dead else self._pins.dead_chips.discard)(at)
-                return f"chip {at[0]} {at[1]} {'dead' if request.dead else 'well'}"
-            case BreakServo():
-                self._rig().break_servo(request.tendon, request.fault)
-                return f"servo {request.tendon} {request.fault or 'well'}"
-            case BreakMagnet():
-                self._pins.encoder(request.joint).set_magnet(request.fault)
-                return f"magnet {request.joint} {request.fault or 'well'}"
+        match request.action, *request.values:
+            case "camera", str(fault):
+                self._break_camera(fault)
+                return f"camera {fault or 'well'}"
+            case "bumper", bool(down):
+                self._pins.sensors.hold_bumpers(down)
+                return f"bumper {'down' if down else 'up'}"
+            case "stop", bool(down):
+                self._pins.sensors.press_stop(down, self._time.now_ns())
+                return f"stop {'down' if down else 'up'}"
+            case "battery", (float() | None) as volts:
+                self.world.resting_v = RESTING_V if volts is None else volts
+                return f"battery {volts}"
+            case "distance", (float() | None) as metres, bool(dead):
+                self._pins.sensors.override_distance(metres, dead=dead)
+                return f"distance {'dead' if dead else metres}"
+            case "chip", int(bus), int(address), bool(dead):
+                dead_chips = self._pins.dead_chips
+                (dead_chips.add if dead else dead_chips.discard)((bus, address))
+                return f"chip {bus} {address} {'dead' if dead else 'well'}"
+            case "servo", str(tendon), str(fault):
+                self._pins.require_rig().break_servo(tendon, fault)
+                return f"servo {tendon} {fault or 'well'}"
+            case "magnet", str(joint), str(fault):
+                self._pins.encoder(joint).set_magnet(fault)
+                return f"magnet {joint} {fault or 'well'}"
             case _:
-                raise RobotError(f"The board does not execute {type(request).__name__}.")
+                raise RobotError(
+                    f"The board has no action {request.action!r} for {request.values}."
+                )
 
-    def _rig(self) -> Rig:
-        if self._surroundings.rig is None:
-            raise RobotError("This twin has no servo bus.")
-        return self._surroundings.rig
+    def _record(self, kind: str, **fields: object) -> None:
+        self._ledger.write(self._time.now_ns(), kind, **fields)
 
     def _whereabouts(self) -> Whereabouts:
         seen = self.world.inputs()
@@ -219,14 +206,6 @@ class Board:
         if fault not in faults:
             raise UnknownName("fault of a camera", fault, CAMERA_FAULTS)
         self.camera.fault = faults[fault]
-
-    def _press(self, button: str, down: bool) -> None:
-        if button not in _BUTTONS:
-            raise UnknownName("button", button, _BUTTONS)
-        if button == "stop":
-            self._sensors.press_stop(down, self._time.now_ns())
-        else:
-            self._sensors.hold_bumpers(down)
 
 
 class RealTime:

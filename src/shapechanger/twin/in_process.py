@@ -19,18 +19,15 @@ from shapechanger.errors import RobotError
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.drivers.settings import number
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.hardware import TwinHardware
-from shapechanger.twin.messages import PinRequest
+from shapechanger.twin.messages import HardwareRequest
 from shapechanger.twin.pin_board import Owner, PinBoard
-from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.server import START_NS
-from shapechanger.twin.servos.port import ServoPort
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import NoLedger
 from shapechanger.twin.wiring import TwinWiring
@@ -47,7 +44,7 @@ class LocalPins:
     """The pins of a board in this process, which is the only one to use them; see `BoardPins`.
 
     Args:
-        pins: Pins and chips of the board.
+        pins: Pins, chips and servos of the board.
     """
 
     def __init__(self, pins: PinBoard) -> None:
@@ -57,11 +54,11 @@ class LocalPins:
         self.on_edge: Callable[[int, int, int], None] | None = None
         self.closed = False
 
-    def post(self, request: PinRequest) -> None:
+    def post(self, request: HardwareRequest) -> None:
         """Execute a request."""
         self._pins.execute(self._owner, request)
 
-    def ask(self, request: PinRequest, kind: Any = None) -> Any:
+    def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
         """Execute a request and return its result."""
         return self._pins.execute(self._owner, request)
 
@@ -108,18 +105,15 @@ class LocalBoard:
         seed: Seed of the phase of software PWM.
 
     Attributes:
-        pins: Pins and chips.
+        pins: Pins, chips and servos.
         hardware: Hardware for a guard in this process.
-        rig: Servos on a bus; None without any.
     """
 
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
         self._clock = LocalClock()
-        self._surroundings = Surroundings(wiring, world, self._clock.time_ns)
-        self.pins = PinBoard(wiring, world, self._surroundings.sensors, NoLedger(), seed)
+        self.pins = PinBoard(wiring, world, NoLedger(), seed, self._clock.time_ns)
         self._local_pins = LocalPins(self.pins)
-        self.rig = self._surroundings.rig
-        self.hardware = TwinHardware(self._local_pins, self._clock, self._open_servo_port)
+        self.hardware = TwinHardware(self._local_pins, self._clock)
 
     @property
     def now_ns(self) -> int:
@@ -129,21 +123,8 @@ class LocalBoard:
     def advance(self, now_ns: int) -> None:
         """Advance time, the world and the sensors."""
         self._clock.time_ns = now_ns
-        for t, pin, level in self._surroundings.advance(now_ns, self.pins.levels):
+        for t, pin, level in self.pins.advance(now_ns):
             self._local_pins.report_edge(pin, level, t)
-
-    def _open_servo_port(self, settings: BusSettings) -> ServoPort:
-        if self.rig is None:
-            raise RobotError(f"There is no {settings.device} at this twin.")
-        self.rig.require(settings.device)
-        bus = self.rig.bus
-
-        def exchange(data: bytes) -> bytes:
-            if data:
-                bus.receive(data)
-            return bus.send()
-
-        return ServoPort(exchange, settings.baud)
 
 
 class _Orders:
@@ -300,11 +281,11 @@ class InProcessRobot:
     @property
     def rig(self) -> Rig | None:
         """Servos on a bus, since the last start; None without any."""
-        return self._board.rig
+        return self._board.pins.rig
 
     @property
     def pins(self) -> PinBoard:
-        """Pins and chips, since the last start."""
+        """Pins, chips and servos, since the last start."""
         return self._board.pins
 
     @property

@@ -1,4 +1,4 @@
-"""The board's pins and chips: their owners, and the levels that stay when a process dies."""
+"""Pins, chips and servos of the board: their owners, and the levels that outlive a process."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca
 from shapechanger.twin.messages import (
     ClaimPin,
     DrivePin,
-    PinRequest,
+    Edge,
+    HardwareRequest,
+    InstructServos,
     PulsePin,
     ReadChip,
     WriteChip,
 )
-from shapechanger.twin.sensors import PinSensors
+from shapechanger.twin.sensors import Surroundings
+from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
@@ -48,28 +51,27 @@ class _Claim:
 
 
 class PinBoard:
-    """Pins, pulses and chips, with a record of their changes in the ledger.
+    """Pins, pulses, chips and servos, with the world that moves their sensors.
 
     Args:
         wiring: What is attached; it gives undriven pins their level.
-        world: What the chips measure.
-        sensors: Sensors on input pins; they see each change of an output.
-        ledger: Record of changes.
+        world: World of the robot.
+        ledger: Record of the changes of outputs.
         seed: Seed of the phase of software PWM.
+        now_ns: Time, ns.
 
     Attributes:
         levels: State of all outputs.
         sensors: Sensors on input pins.
+        rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
+
+    Raises:
+        RobotError: If the world does not fit the robot.
     """
 
     def __init__(
-        self,
-        wiring: TwinWiring,
-        world: World,
-        sensors: PinSensors,
-        ledger: Ledger,
-        seed: int,
+        self, wiring: TwinWiring, world: World, ledger: Ledger, seed: int, now_ns: int
     ) -> None:
         self._wiring = wiring
         self._chips = chips_of(wiring.plan, world)
@@ -77,18 +79,30 @@ class PinBoard:
         self._random = random.Random(f"phase {seed}")
         self._claims: dict[int, _Claim] = {}
         self.levels = Levels()
-        self.sensors = sensors
+        self._surroundings = Surroundings(wiring, world, now_ns)
+        self.sensors = self._surroundings.sensors
+        self.rig = self._surroundings.rig
         self.dead_chips: set[tuple[int, int]] = set()
         for address, chip in self._chips.items():
             if isinstance(chip, SimulatedPca9685):
                 self._update_channels(address, chip)
+
+    def advance(self, now_ns: int) -> list[Edge]:
+        """Advance the world to a time and return the edges of inputs on the way."""
+        return self._surroundings.advance(now_ns, self.levels)
+
+    def require_rig(self) -> Rig:
+        """Return the servos; raise RobotError if there are none."""
+        if self.rig is None:
+            raise RobotError("This twin has no servo bus.")
+        return self.rig
 
     def owner(self, pin: int) -> Owner | None:
         """Return the owner of a pin; None for a free one."""
         claim = self._claims.get(pin)
         return None if claim is None else claim.owner
 
-    def execute(self, owner: Owner, request: PinRequest) -> object:
+    def execute(self, owner: Owner, request: HardwareRequest) -> object:
         """Execute a request and return its result.
 
         Args:
@@ -111,6 +125,10 @@ class PinBoard:
                 )
             case WriteChip():
                 self._write_chip(owner.pid, request)
+            case InstructServos():
+                rig = self.require_rig()
+                rig.require(request.device)
+                return rig.bus.execute(request.servo_id, request.instruction, request.parameters)
             case ClaimPin():
                 return self._claim(owner, request)
         return None

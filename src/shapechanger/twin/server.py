@@ -1,4 +1,4 @@
-"""The board's server: its clients, and what they may do with pins and chips."""
+"""Server of the board: connections to its clients, and their requests."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from shapechanger.twin.messages import (
     ConnectClient,
     DrivePin,
     Edge,
+    HardwareRequest,
     InputEdges,
+    InstructServos,
     LeaveBoard,
-    PinRequest,
     PulsePin,
     ReadChip,
     Request,
@@ -147,7 +148,7 @@ class BoardConnection:
 
 
 Operate = Callable[[BoardConnection, Request], Any]
-"""Executes a request about neither pins nor chips; returns its result, or `LATER`."""
+"""Executes a request of time or of an operator; returns its result, or `LATER`."""
 
 LATER: Final = object()
 """Result of a request that is answered later, or never."""
@@ -159,10 +160,10 @@ class BoardServer:
     Args:
         listening: Listening socket.
         owner_fd: Descriptor whose end ends the board.
-        pins: Pins and chips.
+        pins: Pins, chips and servos.
         clock: Kind of clock.
         now_ns: Time of that clock.
-        operate: Executes the requests that are not about pins and chips.
+        operate: Executes the requests of time and of operators.
     """
 
     def __init__(
@@ -280,8 +281,8 @@ class BoardServer:
         match request:
             case ClaimPin():
                 return self._claim(connection, request)
-            case DrivePin() | PulsePin() | ReadChip() | WriteChip():
-                return self._execute_on_pins(connection, request)
+            case DrivePin() | PulsePin() | ReadChip() | WriteChip() | InstructServos():
+                return self._execute_on_hardware(connection, request)
             case ConnectClient():
                 connection.role = request.role
                 connection.owner = Owner(connection, request.pid)
@@ -294,7 +295,7 @@ class BoardServer:
                 return self._operate(connection, request)
         return None
 
-    def _execute_on_pins(self, connection: BoardConnection, request: PinRequest) -> object:
+    def _execute_on_hardware(self, connection: BoardConnection, request: HardwareRequest) -> object:
         if self._clock == "twin":
             request.t = self._now_ns()
         return self._pins.execute(connection.owner, request)
@@ -304,7 +305,7 @@ class BoardServer:
         other = None if holder is None else holder.connection
         if isinstance(other, BoardConnection) and other is not connection:
             self._execute_all(other)  # It may have ended meanwhile.
-        level = self._execute_on_pins(connection, request)
+        level = self._execute_on_hardware(connection, request)
         if request.mode == "input":
             connection.inputs.add(request.pin)
         else:

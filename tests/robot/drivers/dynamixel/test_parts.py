@@ -34,7 +34,7 @@ def test_a_stop_never_pulls_harder_than_its_end() -> None:
 
 def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
     """A quick flick of the finger is no snapped tendon; a pause restarts the time."""
-    slack = SlackDetector(-0.06, 0.1, 100)
+    slack = SlackDetector(0.1 / 0.7)
     assert slack.see(None, -0.2, 0) == ""
     assert slack.see(None, -0.2, 99 * MS) == ""
     assert slack.see(None, -0.05, 100 * MS) == ""
@@ -44,13 +44,13 @@ def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
 
 def test_a_tendon_that_is_let_out_fast_is_not_slack() -> None:
     """Only winding in without a load counts."""
-    slack = SlackDetector(-0.06, 0.1, 100)
+    slack = SlackDetector(0.1 / 0.7)
     assert [slack.see(0.01, 0.5, t * MS) for t in (0, 500)] == ["", ""]
 
 
 def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once() -> None:
     """Nothing else can have happened."""
-    assert "wound in by 61 mm" in SlackDetector(-0.06, 0.1, 100).see(-0.061, 0.0, 0)
+    assert "wound in by 61 mm" in SlackDetector(0.1 / 0.7).see(-0.061, 0.0, 0)
 
 
 def test_present_values_are_read_with_their_signs() -> None:

@@ -29,14 +29,13 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
     RETURN_DELAY,
     TORQUE_ENABLE,
     WATCHDOG_STEP_NS,
-    OpenPort,
     Register,
     RegisterBus,
     ServoPoller,
+    ServoPort,
     ServoReply,
     decode_present,
     hardware_errors,
-    open_serial_port,
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
@@ -80,81 +79,6 @@ class Ramp:
         return min(1.0, 1.0 - gone_ns / self._ramp_ns)
 
 
-def _watchdog_steps(bus: BusSettings) -> int:
-    """Return the time of the watchdog in steps of 20 ms."""
-    return bus.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
-
-
-def _check_servos(registers: RegisterBus, bus: BusSettings) -> None:
-    """Check that every servo answers and has the right model.
-
-    Raises:
-        RobotError: If one is missing, is of another model, or its firmware is too old.
-    """
-    models = {servo.id: registers.ping(servo.id) for servo in bus.servos}
-    if missing := [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is None]:
-        there = [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is not None]
-        raise RobotError(
-            f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
-            f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and baud, "
-            "and at the latency timer of the adapter."
-        )
-    for servo in bus.servos:
-        known, number = servo.known, models[servo.id]
-        if number != known.number:
-            raise RobotError(
-                f"{servo.words} is not an {known.name}: its model number is {number}, "
-                f"not {known.number}."
-            )
-        firmware = registers.read(servo.id, FIRMWARE)
-        if firmware < known.least_firmware:
-            raise RobotError(
-                f"{servo.words} has firmware {firmware}; its own watchdog needs "
-                f"{known.least_firmware} or newer."
-            )
-
-
-def _prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
-    """Prepare a servo: current mode, its current limit, no goal, and no torque.
-
-    Raises:
-        RobotError: If it does not answer, refuses, or has switched itself off.
-    """
-    registers.write(servo.id, TORQUE_ENABLE, 0)
-    registers.write(servo.id, BUS_WATCHDOG, 0)  # A tripped watchdog blocks all goals.
-    if error := registers.read(servo.id, HARDWARE_ERROR):
-        words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
-        raise RobotError(
-            f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque again, "
-            "after which its zero must be found again."
-        )
-    # These are in the EEPROM, which wears out: write them only if they differ.
-    _ensure(registers, servo, RETURN_DELAY, 0)
-    _ensure(registers, servo, DRIVE_MODE, 0)
-    _ensure(registers, servo, OPERATING_MODE, CURRENT_MODE)
-    _ensure(registers, servo, CURRENT_LIMIT, servo.most_counts)
-    # A change of mode sets the goal to the limit.
-    registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
-
-
-def _enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
-    """Enable the torque of a servo, with a goal of 0 and a running watchdog.
-
-    Raises:
-        RobotError: If it does not answer or refuses.
-    """
-    registers.write(servo.id, BUS_WATCHDOG, 0)
-    registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
-    registers.write(servo.id, TORQUE_ENABLE, 1)
-
-
-def _ensure(registers: RegisterBus, servo: ServoSettings, register: Register, value: int) -> None:
-    if registers.read(servo.id, register) != value:
-        registers.write(servo.id, register, value)
-
-
 # One of them is read in each cycle, so a trip is detected within four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
 
@@ -167,16 +91,13 @@ class ServoBus:
 
     Args:
         settings: The bus and its servos.
-        open_port: Opens the port; a twin has its own.
-
-    Raises:
-        RobotError: If the port cannot be opened.
+        port: Port of the bus, which `close` closes.
     """
 
-    def __init__(self, settings: BusSettings, open_port: OpenPort = open_serial_port) -> None:
+    def __init__(self, settings: BusSettings, port: ServoPort) -> None:
         self._settings = settings
         self._servos = {servo.name: servo for servo in settings.servos}
-        self._registers = RegisterBus(open_port(settings), settings.device)
+        self._registers = RegisterBus(port, settings.device)
         self._ids = {servo.id: servo for servo in settings.servos}
         self._poller = ServoPoller(self._registers, tuple(self._ids))
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
@@ -202,7 +123,11 @@ class ServoBus:
     @property
     def faults(self) -> dict[str, str]:
         """Faults, as in `BusState.faults`."""
-        return self._faults()
+        faults = {"": self._gone} if self._gone else {}
+        for servo_id, servo in self._ids.items():
+            if fault := self._health[servo_id].fault:
+                faults[servo.name] = fault
+        return faults
 
     @property
     def is_ready(self) -> bool:
@@ -218,9 +143,9 @@ class ServoBus:
         self._mode, self._ramp, self._gone, self._is_ready = "off", None, "", False
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
-        _check_servos(self._registers, self._settings)
+        self._check_servos()
         for servo in self._settings.servos:
-            _prepare_servo(self._registers, self._settings, servo)
+            self._prepare(servo)
         self._poller.suspects.clear()
         for health in self._health.values():
             health.clear()
@@ -232,14 +157,16 @@ class ServoBus:
         Raises:
             RobotError: If there is a fault, or a servo refuses; then all have let go.
         """
-        if self._mode != "off" or self._faults() or not self._is_ready:
-            why = " ".join(self._faults().values())
+        if self._mode != "off" or self.faults or not self._is_ready:
+            why = " ".join(self.faults.values())
             why = why or ("they are not set up." if not self._is_ready else "they are already.")
             raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
         self._goals = dict.fromkeys(self._ids, 0)
         try:
             for servo in self._settings.servos:
-                _enable_torque(self._registers, self._settings, servo)
+                self._registers.write(servo.id, BUS_WATCHDOG, 0)
+                self._start_watchdog(servo)
+                self._registers.write(servo.id, TORQUE_ENABLE, 1)
         except RobotError:
             self.release()
             raise
@@ -274,22 +201,22 @@ class ServoBus:
         if tensions is not None:
             self._request(tensions)
         if self._mode == "silent":
-            return BusState(now_ns, "silent", {}, self._missed(), self._faults())
+            return BusState(now_ns, "silent", {}, self.faults)
         heard: dict[int, ServoReply] = {}
-        self._registers.has_stray = False
+        self._registers.port.has_stray = False
         try:
             self._send_goals(now_ns)
             heard = self._poller.read(PRESENT)
             self._audit(heard)
         except RobotError as error:
             self._gone = self._gone or str(error)
-        servos = self._evaluate(heard, now_ns, late=self._registers.has_stray)
-        if self._faults() and self._mode == "held":
+        servos = self._evaluate(heard, now_ns, late=self._registers.port.has_stray)
+        if self.faults and self._mode == "held":
             self.stop(now_ns)
         if self._ramp is not None and self._ramp.is_over(now_ns):
             self.release()
         self._cycles += 1
-        return BusState(now_ns, self._mode, servos, self._missed(), self._faults())
+        return BusState(now_ns, self._mode, servos, self.faults)
 
     def send(self, tensions: Mapping[str, float]) -> None:
         """Send tensions at once, without reading anything.
@@ -362,7 +289,66 @@ class ServoBus:
         """Let go of all tendons and close the port."""
         if self._mode != "silent":
             self.release()
-        self._registers.close()
+        self._registers.port.close()
+
+    def _check_servos(self) -> None:
+        """Check that every servo answers, has the right model and firmware that is new enough."""
+        bus, registers = self._settings, self._registers
+        models = {servo.id: registers.ping(servo.id) for servo in bus.servos}
+        names = {servo.id: f"{servo.name} (id {servo.id})" for servo in bus.servos}
+        if missing := [names[one] for one, number in models.items() if number is None]:
+            there = [names[one] for one, number in models.items() if number is not None]
+            raise RobotError(
+                f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
+                f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and "
+                "baud, and at the latency timer of the adapter."
+            )
+        for servo in bus.servos:
+            known, number = servo.known, models[servo.id]
+            if number != known.number:
+                raise RobotError(
+                    f"{servo.words} is not an {known.name}: its model number is {number}, "
+                    f"not {known.number}."
+                )
+            firmware = registers.read(servo.id, FIRMWARE)
+            if firmware < known.least_firmware:
+                raise RobotError(
+                    f"{servo.words} has firmware {firmware}; its own watchdog needs "
+                    f"{known.least_firmware} or newer."
+                )
+
+    def _prepare(self, servo: ServoSettings) -> None:
+        """Set up current mode, the current limit, no goal and no torque.
+
+        Raises:
+            RobotError: If the servo does not answer, refuses, or has switched itself off.
+        """
+        registers = self._registers
+        registers.write(servo.id, TORQUE_ENABLE, 0)
+        registers.write(servo.id, BUS_WATCHDOG, 0)  # A tripped watchdog blocks all goals.
+        if error := registers.read(servo.id, HARDWARE_ERROR):
+            words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
+            raise RobotError(
+                f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque "
+                "again, after which its zero must be found again."
+            )
+        for register, value in (
+            (RETURN_DELAY, 0),
+            (DRIVE_MODE, 0),
+            (OPERATING_MODE, CURRENT_MODE),
+            (CURRENT_LIMIT, servo.most_counts),
+        ):
+            # These are in the EEPROM, which wears out: write them only if they differ.
+            if registers.read(servo.id, register) != value:
+                registers.write(servo.id, register, value)
+        self._start_watchdog(servo)
+
+    def _start_watchdog(self, servo: ServoSettings) -> None:
+        """Set the goal to 0 and start the watchdog."""
+        # A change of mode sets the goal to the limit.
+        self._registers.write(servo.id, GOAL_CURRENT, 0)
+        steps = self._settings.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
+        self._registers.write(servo.id, BUS_WATCHDOG, steps)
 
     def _let_go(self) -> set[int]:
         """Return the servos that confirm that they have no torque."""
@@ -436,8 +422,6 @@ class ServoBus:
                 lengthening_m_per_s=servo.lengthening(present.speed),
                 tension_n=servo.tension_n(present.current),
                 goal_n=self._goal_n(servo),
-                is_capped=self._mode == "held"
-                and self._requested[servo.name] > servo.most_tension_n,
                 voltage_v=present.voltage,
                 temperature_c=present.temperature,
             )
@@ -445,16 +429,6 @@ class ServoBus:
 
     def _goal_n(self, servo: ServoSettings) -> float:
         return servo.tension_n(self._goals[servo.id])
-
-    def _missed(self) -> dict[str, int]:
-        return {servo.name: self._health[one].missed for one, servo in self._ids.items()}
-
-    def _faults(self) -> dict[str, str]:
-        faults = {"": self._gone} if self._gone else {}
-        for servo_id, servo in self._ids.items():
-            if fault := self._health[servo_id].fault:
-                faults[servo.name] = fault
-        return faults
 
     def _servo(self, name: str) -> ServoSettings:
         if name not in self._servos:
