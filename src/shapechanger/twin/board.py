@@ -13,8 +13,9 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import FrameType
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -40,10 +41,10 @@ from shapechanger.twin.server import (
     OwnerGone,
 )
 from shapechanger.twin.signals import LedgerWriter
-from shapechanger.twin.start import BoardSettings
+from shapechanger.twin.start import BoardAt, BoardSettings
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.place import open_world
-from shapechanger.worlds.world import RESTING_V, World
+from shapechanger.worlds.world import RESTING_V
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
@@ -56,40 +57,54 @@ class Board:
     """Pins, chips, sensors and world, with a server for clients.
 
     Args:
-        wiring: What is attached to the pins.
-        world: World of the vehicle.
-        clock: Time of the board.
-        ledger: Record of all changes.
-        camera: Front camera; None without one.
-        listening: Listening socket for clients.
+        settings: Its settings.
         owner_fd: Descriptor whose end ends the board.
-        seed: Seed of everything random.
 
     Attributes:
-        world: World of the vehicle.
+        world: World of the robot.
         camera: Front camera; None without one.
         server: Server of the clients.
+
+    Raises:
+        ShapechangerError: If the world cannot be opened or does not fit the robot.
     """
 
-    def __init__(
-        self,
-        wiring: TwinWiring,
-        world: World,
-        clock: RealTime | TwinTime,
-        ledger: LedgerWriter,
-        camera: FrontCameraPipe | None,
-        listening: socket.socket,
-        owner_fd: int,
-        seed: int,
-    ) -> None:
-        self.world = world
-        self.camera = camera
+    def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
+        plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
+        is_real = settings.clock == "real"
+        parts = {output.part for output in plan.outputs if output.part}
+        size = None if camera is None else camera.size
+        self.world = open_world(settings.place, parts, size, seed)
+        # Let the world prepare what takes a while, before a guard in real time waits for it.
+        self.world.put_back()
+        self.world.place(seed)
+        if size is not None:
+            self.world.picture()
+        if is_real:
+            run_early()  # Hardware is never late because the machine is busy.
+        clock = RealTime() if is_real else TwinTime(plan.tick_hz)
         self._time = clock
-        self._ledger = ledger
-        self._pins = PinBoard(wiring, world, ledger, seed, clock.now_ns())
+        files = BoardAt(Path(settings.folder))
+        self.camera: FrontCameraPipe | None = None
+        if camera is not None:
+            self.camera = FrontCameraPipe(
+                str(files.fifo_path),
+                camera.fps,
+                camera.jpeg_quality,
+                latest_only=is_real,
+                start_ns=clock.now_ns(),
+                seed=seed,
+                barcode=not settings.place.world,
+            )
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        listening.bind(files.socket_path)
+        self._ledger = LedgerWriter(files.ledger_path)
+        wiring = TwinWiring(plan, settings.one_shot_ms)
+        self._pins = PinBoard(wiring, self.world, self._ledger, seed, clock.now_ns())
         self.server = BoardServer(
-            listening, owner_fd, self._pins, clock.kind, clock.now_ns, self._operate
+            listening, owner_fd, self._pins, settings.clock, clock.now_ns, self._operate
         )
+        listening.listen()
 
     def run(self) -> None:
         """Run until the owner is gone."""
@@ -211,8 +226,6 @@ class Board:
 class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
 
-    kind: Literal["real", "twin"] = "real"
-
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return time.monotonic_ns()
@@ -255,8 +268,6 @@ class TwinTime:
     Args:
         tick_hz: Rate of the grants of time, Hz; a client may ask for further ones in between.
     """
-
-    kind: Literal["real", "twin"] = "twin"
 
     def __init__(self, tick_hz: float) -> None:
         self._tick_hz = tick_hz
@@ -327,14 +338,6 @@ class TwinTime:
         return tick_ns
 
 
-def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
-    """Let the world prepare what takes a while, before a guard in real time waits for it."""
-    world.put_back()
-    world.place(seed)
-    if pictures:
-        world.picture()
-
-
 def _end(number: int, frame: FrameType | None) -> None:
     sys.exit(0)
 
@@ -347,40 +350,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
     with os.fdopen(settings_fd, "rb") as file:
         settings = msgspec.json.decode(file.read(), type=BoardSettings)
-    plan = GuardPlan.from_json(settings.plan)
-
-    parts = {output.part for output in plan.outputs if output.part}
-    plan_of_camera = settings.camera
-    size = None if plan_of_camera is None else plan_of_camera.size
-    world = open_world(settings.place, parts, size, settings.seed)
-    _warm_up(world, settings.seed, pictures=size is not None)
-    if settings.clock == "real":
-        run_early()  # Hardware is never late because the machine is busy.
-    clock = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
-    camera = None
-    if plan_of_camera is not None:
-        camera = FrontCameraPipe(
-            settings.fifo,
-            plan_of_camera.fps,
-            plan_of_camera.jpeg_quality,
-            latest_only=settings.clock == "real",
-            start_ns=clock.now_ns(),
-            seed=settings.seed,
-            barcode=not settings.place.world,
-        )
-    listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listening.bind(settings.socket)
-    board = Board(
-        TwinWiring(plan, settings.one_shot_ms),
-        world,
-        clock,
-        LedgerWriter(settings.ledger),
-        camera,
-        listening,
-        owner_fd,
-        settings.seed,
-    )
-    listening.listen()
+    board = Board(settings, owner_fd)
     os.write(owner_fd, b"r")  # Ready.
     board.run()
 

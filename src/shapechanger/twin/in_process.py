@@ -29,7 +29,6 @@ from shapechanger.twin.messages import HardwareRequest
 from shapechanger.twin.pin_board import Owner, PinBoard
 from shapechanger.twin.server import START_NS
 from shapechanger.twin.servos.rig import Rig
-from shapechanger.twin.signals import NoLedger
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
@@ -40,52 +39,61 @@ _SESSION: Final = 1
 _MAX_ARM_TICKS: Final = 10
 
 
-class LocalPins:
-    """The pins of a board in this process, which is the only one to use them; see `BoardPins`.
+class LocalBoard:
+    """A board with its world in this process, whose time only `advance` moves.
+
+    It is the board of the only process that uses it, and that process's clock; see `BoardPins` and
+    `Clock`.
 
     Args:
-        pins: Pins, chips and servos of the board.
+        wiring: What is attached to the pins.
+        world: World of the robot.
+        seed: Seed of the phase of software PWM.
+
+    Attributes:
+        pins: Pins, chips and servos.
+        hardware: Hardware for a guard in this process.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called with pin, level and time of each edge.
+        closed: Whether `close` was called.
     """
 
-    def __init__(self, pins: PinBoard) -> None:
-        self._pins = pins
+    def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
+        self._now_ns = START_NS
         self._owner = Owner(self, os.getpid())
+        self.pins = PinBoard(wiring, world, None, seed, START_NS)
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self.closed = False
+        self.hardware = TwinHardware(self, self)
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds."""
+        return self._now_ns
+
+    def advance(self, now_ns: int) -> None:
+        """Advance time, the world and the sensors."""
+        self._now_ns = now_ns
+        for t, pin, level in self.pins.advance(now_ns):
+            if pin in self.levels:
+                self.levels[pin] = level
+                if self.on_edge is not None:
+                    self.on_edge(pin, level, t)
 
     def post(self, request: HardwareRequest) -> None:
         """Execute a request."""
-        self._pins.execute(self._owner, request)
+        self.pins.execute(self._owner, request)
 
     def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
-        """Execute a request and return its result."""
-        return self._pins.execute(self._owner, request)
+        """Execute a request and return its result; see `BoardPins.ask`."""
+        return self.pins.execute(self._owner, request)
 
     def drain(self) -> None:
-        """Do nothing: edges arrive by `report_edge`."""
-
-    def report_edge(self, pin: int, level: int, at_ns: int) -> None:
-        """Take the change of an input, if it is claimed."""
-        if pin in self.levels:
-            self.levels[pin] = level
-            if self.on_edge is not None:
-                self.on_edge(pin, level, at_ns)
+        """Do nothing: edges arrive with `advance`."""
 
     def close(self) -> None:
         """Use the pins no more."""
         self.closed = True
-
-
-class LocalClock:
-    """The time of a board in this process, which only `LocalBoard.advance` moves."""
-
-    def __init__(self) -> None:
-        self.time_ns = START_NS
-
-    def now_ns(self) -> int:
-        """Return the time in nanoseconds."""
-        return self.time_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
         """Refuse: the caller is the one who would have to advance the board."""
@@ -94,37 +102,6 @@ class LocalClock:
     async def sleep(self, seconds: float) -> int | None:
         """Refuse; see `wait`."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
-
-
-class LocalBoard:
-    """A board with its world in this process.
-
-    Args:
-        wiring: What is attached to the pins.
-        world: World of the vehicle.
-        seed: Seed of the phase of software PWM.
-
-    Attributes:
-        pins: Pins, chips and servos.
-        hardware: Hardware for a guard in this process.
-    """
-
-    def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
-        self._clock = LocalClock()
-        self.pins = PinBoard(wiring, world, NoLedger(), seed, self._clock.time_ns)
-        self._local_pins = LocalPins(self.pins)
-        self.hardware = TwinHardware(self._local_pins, self._clock)
-
-    @property
-    def now_ns(self) -> int:
-        """Time in nanoseconds."""
-        return self._clock.time_ns
-
-    def advance(self, now_ns: int) -> None:
-        """Advance time, the world and the sensors."""
-        self._clock.time_ns = now_ns
-        for t, pin, level in self.pins.advance(now_ns):
-            self._local_pins.report_edge(pin, level, t)
 
 
 class _Orders:
@@ -211,7 +188,7 @@ class InProcessRobot:
     @property
     def now_ns(self) -> int:
         """Time of the robot in nanoseconds."""
-        return self._board.now_ns
+        return self._board.now_ns()
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
         """Restart the robot, arm it, and place it at a start.
@@ -245,7 +222,7 @@ class InProcessRobot:
             The observation at the end of the period, and whether the robot bumped into something.
         """
         bumps = self._state.bumps
-        self._command_ns = self._board.now_ns
+        self._command_ns = self._board.now_ns()
         self._seq += 1
         self._orders.waiting.append(
             Order(
@@ -254,7 +231,7 @@ class InProcessRobot:
                 seq=self._seq,
                 issued_ns=self._command_ns,
                 ttl_ms=self._profile.limits.deadline_ms,
-                frame_ns=self._board.now_ns,
+                frame_ns=self._board.now_ns(),
                 values=tuple(values),
             )
         )
@@ -270,7 +247,7 @@ class InProcessRobot:
         self._orders.refused = refused = ""  # An earlier refusal is about something else.
         seen = self._state.emergencies
         for _ in range(_MAX_ARM_TICKS):
-            now_ns = self._board.now_ns
+            now_ns = self._board.now_ns()
             self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
             self._advance(self._tick_ns)
             refused = self.refused
@@ -322,9 +299,9 @@ class InProcessRobot:
         guard, board = self._guard, self._board
         if guard is None:
             raise RobotError("This robot is closed.")
-        end_ns = board.now_ns + ns
-        while board.now_ns < end_ns:
-            now_ns = min(board.now_ns + self._tick_ns, end_ns)
+        end_ns = board.now_ns() + ns
+        while board.now_ns() < end_ns:
+            now_ns = min(board.now_ns() + self._tick_ns, end_ns)
             board.advance(now_ns)
             guard.round(now_ns)
 
@@ -344,10 +321,10 @@ class InProcessRobot:
             jpeg = simplejpeg.encode_jpeg(
                 np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
             )
-            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns))
+            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns()))
         return build_observation(
             seq=self._observed,
-            now_ns=self._board.now_ns,
+            now_ns=self._board.now_ns(),
             reader=self._reader,
             state=self._state,
             newest=newest,

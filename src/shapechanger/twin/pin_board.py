@@ -6,7 +6,7 @@ import errno
 import random
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a, chips_of
@@ -22,7 +22,7 @@ from shapechanger.twin.messages import (
 )
 from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.servos.rig import Rig
-from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
+from shapechanger.twin.signals import LedgerWriter, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
@@ -56,7 +56,7 @@ class PinBoard:
     Args:
         wiring: What is attached; it gives undriven pins their level.
         world: World of the robot.
-        ledger: Record of the changes of outputs.
+        ledger: Record of the changes of outputs; None to keep none.
         seed: Seed of the phase of software PWM.
         now_ns: Time, ns.
 
@@ -71,7 +71,7 @@ class PinBoard:
     """
 
     def __init__(
-        self, wiring: TwinWiring, world: World, ledger: Ledger, seed: int, now_ns: int
+        self, wiring: TwinWiring, world: World, ledger: LedgerWriter | None, seed: int, now_ns: int
     ) -> None:
         self._wiring = wiring
         self._chips = chips_of(wiring.plan, world)
@@ -142,7 +142,7 @@ class PinBoard:
             died: Whether it ended without closing its pins.
         """
         if died:
-            self._ledger.write(t, "gone", pid=owner.pid)
+            self._record(t, "gone", pid=owner.pid)
         for pin, claim in sorted(self._claims.items()):
             if claim.owner != owner:
                 continue
@@ -154,9 +154,7 @@ class PinBoard:
                 period_ns = 1e9 / claim.hz
                 duty = float((t - claim.phase_ns) % period_ns < duty * period_ns)
             claim.hz = 0
-            self.levels.drive(pin, duty, t)
-            self._ledger.write(t, "pin", pin=pin, duty=duty, hz=0, pid=owner.pid)
-            self.sensors.output_changed(t, pin, duty)
+            self._drive(owner.pid, pin, duty, 0, t)
 
     def encoder(self, joint: str) -> SimulatedAs5600:
         """Return the encoder of a joint.
@@ -171,6 +169,10 @@ class PinBoard:
             raise UnknownName("joint with an encoder", joint, encoders)
         return encoders[joint]
 
+    def _record(self, t: int, kind: str, **fields: Any) -> None:
+        if self._ledger is not None:
+            self._ledger.write(t, kind, **fields)
+
     def _claim(self, owner: Owner, request: ClaimPin) -> int:
         """Return the level of the pin; for an input that of its sensor, pull or resistors."""
         pin, t = request.pin, request.t
@@ -184,9 +186,7 @@ class PinBoard:
         idle = self._wiring.idle_level(pin)
         if pin in self.levels.duties:
             self.levels.release(pin)
-            self._ledger.write(
-                t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True
-            )
+            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
             self.sensors.output_changed(t, pin, float(idle))
         if request.pull != "floating":
             idle = int(request.pull == "up")
@@ -198,7 +198,7 @@ class PinBoard:
         pulse = Pulse(us, hz)
         if self.levels.pulses.get(pin) != pulse:
             self.levels.pulse(pin, pulse)
-            self._ledger.write(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+            self._record(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
 
     def _write_chip(self, pid: int, request: WriteChip) -> None:
         t, bus, address = request.t, request.bus, request.address
@@ -207,11 +207,11 @@ class PinBoard:
         if isinstance(chip, Tca9548a):
             return  # It moves nothing, and hundreds of writes a second would fill the ledger.
         at = {"bus": bus, "address": address}
-        self._ledger.write(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
+        self._record(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
         if isinstance(chip, SimulatedPca9685):
             for channel, pulse in self._update_channels((bus, address), chip):
                 us, hz = round(pulse.us, 3), round(pulse.hz, 3)
-                self._ledger.write(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
+                self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
 
     def _update_channels(
         self, at: tuple[int, int], chip: SimulatedPca9685
@@ -239,7 +239,7 @@ class PinBoard:
 
     def _drive(self, pid: int, pin: int, duty: float, hz: float, t: int) -> None:
         self.levels.drive(pin, duty, t)
-        self._ledger.write(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
+        self._record(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
         self.sensors.output_changed(t, pin, duty)
 
     def _chip(self, bus: int, address: int) -> Chip:

@@ -27,6 +27,7 @@ from shapechanger.twin.chips import Magnet
 from shapechanger.twin.messages import OperatorRequest, SleepOnBoard, SleepResult, Whereabouts
 from shapechanger.twin.servos.rig import ServoFault
 from shapechanger.twin.signals import Levels
+from shapechanger.twin.start import BoardAt
 
 
 class Operator:
@@ -198,7 +199,7 @@ class RunningRobot:
     @property
     def ledger_path(self) -> Path:
         """Ledger of the twin."""
-        return self.folder / "ledger.jsonl"
+        return BoardAt(self.folder).ledger_path
 
     @property
     def known(self) -> KnownRobot:
@@ -216,7 +217,7 @@ class RunningRobot:
 
     def operator(self) -> Operator:
         """Connect an operator to its twin."""
-        return Operator(str(self.folder / "board.socket"))
+        return Operator(BoardAt(self.folder).socket_path)
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
         """Return the process id of a program of the robot.

@@ -27,7 +27,7 @@ import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -73,21 +73,6 @@ class Transition:
     released: bool = False
     seed: int | None = None
     what: str | None = None
-
-
-class Ledger(Protocol):
-    """Record of changes."""
-
-    def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Record a change."""
-        ...
-
-
-class NoLedger:
-    """A ledger that keeps nothing."""
-
-    def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Do nothing."""
 
 
 class LedgerWriter:
