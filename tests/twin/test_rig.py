@@ -38,8 +38,8 @@ class _Bench:
 
     @property
     def rig(self) -> Rig:
-        assert self.robot.rig is not None
-        return self.robot.rig
+        assert self.robot.pins.rig is not None
+        return self.robot.pins.rig
 
     def drive(self, values: tuple[float, ...], steps: int) -> Observation:
         for _ in range(steps):

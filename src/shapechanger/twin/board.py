@@ -19,10 +19,10 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from shapechanger.errors import RobotError, UnknownName, WorldError
+from shapechanger.errors import RobotError, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
-from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
+from shapechanger.twin.camera import FrontCameraPipe
 from shapechanger.twin.messages import (
     GrantTime,
     OperatorRequest,
@@ -168,7 +168,9 @@ class Board:
         """Break, repair or press something, and describe it for the ledger."""
         match request.action, *request.values:
             case "camera", str(fault):
-                self._break_camera(fault)
+                if self.camera is None:
+                    raise RobotError("This twin has no camera.")
+                self.camera.break_down(fault)
                 return f"camera {fault or 'well'}"
             case "bumper", bool(down):
                 self._pins.sensors.hold_bumpers(down)
@@ -213,14 +215,6 @@ class Board:
             truth=self.world.truth(),
             t=self._time.now_ns(),
         )
-
-    def _break_camera(self, fault: str) -> None:
-        if self.camera is None:
-            raise RobotError("This twin has no camera.")
-        faults: dict[str, CameraFault] = {known: known for known in CAMERA_FAULTS}
-        if fault not in faults:
-            raise UnknownName("fault of a camera", fault, CAMERA_FAULTS)
-        self.camera.fault = faults[fault]
 
 
 class RealTime:

@@ -26,9 +26,8 @@ from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.hardware import TwinHardware
 from shapechanger.twin.messages import HardwareRequest
-from shapechanger.twin.pin_board import Owner, PinBoard
+from shapechanger.twin.pin_board import PinBoard
 from shapechanger.twin.server import START_NS
-from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
@@ -51,6 +50,7 @@ class LocalBoard:
         seed: Seed of the phase of software PWM.
 
     Attributes:
+        pid: This process, which owns the pins.
         pins: Pins, chips and servos.
         hardware: Hardware for a guard in this process.
         levels: Level of each pin that is claimed as an input.
@@ -60,7 +60,7 @@ class LocalBoard:
 
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
         self._now_ns = START_NS
-        self._owner = Owner(self, os.getpid())
+        self.pid = os.getpid()
         self.pins = PinBoard(wiring, world, None, seed, START_NS)
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
@@ -82,11 +82,11 @@ class LocalBoard:
 
     def post(self, request: HardwareRequest) -> None:
         """Execute a request."""
-        self.pins.execute(self._owner, request)
+        self.pins.execute(self, request)
 
     def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
         """Execute a request and return its result; see `BoardPins.ask`."""
-        return self.pins.execute(self._owner, request)
+        return self.pins.execute(self, request)
 
     def drain(self) -> None:
         """Do nothing: edges arrive with `advance`."""
@@ -254,11 +254,6 @@ class InProcessRobot:
             if self._state.armed and not refused:
                 return
         raise RobotError(f"The robot does not arm: {refused or self._state.stop_reason}")
-
-    @property
-    def rig(self) -> Rig | None:
-        """Servos on a bus, since the last start; None without any."""
-        return self._board.pins.rig
 
     @property
     def pins(self) -> PinBoard:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import errno
 import random
-from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a, chips_of
@@ -27,16 +26,13 @@ from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
 
-@dataclass(frozen=True, slots=True)
-class Owner:
-    """A process that holds pins.
+class Owner(Protocol):
+    """Connection of a process that holds pins; two connections of one process are two owners.
 
     Attributes:
-        connection: Identity of the process; two connections of one process are two owners.
         pid: Process id.
     """
 
-    connection: Hashable
     pid: int
 
 
@@ -144,7 +140,7 @@ class PinBoard:
         if died:
             self._record(t, "gone", pid=owner.pid)
         for pin, claim in sorted(self._claims.items()):
-            if claim.owner != owner:
+            if claim.owner is not owner:
                 continue
             claim.owner = None
             if claim.mode != "output" or not (died or claim.hz):
@@ -177,7 +173,7 @@ class PinBoard:
         """Return the level of the pin; for an input that of its sensor, pull or resistors."""
         pin, t = request.pin, request.t
         claim = self._claims.setdefault(pin, _Claim())
-        if claim.owner is not None and claim.owner != owner:
+        if claim.owner is not None and claim.owner is not owner:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
         claim.owner, claim.mode, claim.hz = owner, request.mode, 0
         if request.mode == "output":
@@ -228,7 +224,7 @@ class PinBoard:
 
     def _output(self, owner: Owner, pin: int) -> _Claim:
         claim = self._claims.get(pin)
-        if claim is None or claim.owner != owner or claim.mode != "output":
+        if claim is None or claim.owner is not owner or claim.mode != "output":
             raise RobotError(f"Process {owner.pid} does not hold GPIO{pin} as an output.")
         return claim
 

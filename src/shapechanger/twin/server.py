@@ -34,7 +34,7 @@ from shapechanger.twin.messages import (
     decode_request,
     encode,
 )
-from shapechanger.twin.pin_board import Owner, PinBoard
+from shapechanger.twin.pin_board import PinBoard
 
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
@@ -58,7 +58,7 @@ class BoardConnection:
 
     Attributes:
         role: Role of the client.
-        owner: Owner of the pins that it claims.
+        pid: Process id of the client.
         inputs: Pins whose edges it receives.
         takes_part: Whether time waits for it.
         works: Whether it has a grant that it has not finished.
@@ -71,7 +71,7 @@ class BoardConnection:
         self._socket = connected
         self._outbox: deque[bytes] = deque()
         self.role: Role = "clock"
-        self.owner = Owner(self, 0)
+        self.pid = 0
         self.inputs: set[int] = set()
         self.takes_part = False
         self.works = False
@@ -104,7 +104,7 @@ class BoardConnection:
         try:
             return decode_request(data)
         except msgspec.MsgspecError as error:
-            _log.warning("process %d sends a malformed request: %s", self.owner.pid, error)
+            _log.warning("process %d sends a malformed request: %s", self.pid, error)
             raise EOFError from error
 
     def send(self, event: BoardEvent) -> None:
@@ -271,7 +271,7 @@ class BoardServer:
             number = refusal.errno or 0
         if request.id is None:
             if error or number:
-                _log.warning("process %d: %s", connection.owner.pid, error or f"errno {number}")
+                _log.warning("process %d: %s", connection.pid, error or f"errno {number}")
         elif error or number:
             self.send(connection, BoardReply(request.id, error=error, errno=number))
         elif result is not LATER:
@@ -285,7 +285,7 @@ class BoardServer:
                 return self._execute_on_hardware(connection, request)
             case ConnectClient():
                 connection.role = request.role
-                connection.owner = Owner(connection, request.pid)
+                connection.pid = request.pid
                 return BoardGreeting(self._clock, self._now_ns())
             case LeaveBoard():
                 connection.has_left = True
@@ -298,13 +298,12 @@ class BoardServer:
     def _execute_on_hardware(self, connection: BoardConnection, request: HardwareRequest) -> object:
         if self._clock == "twin":
             request.t = self._now_ns()
-        return self._pins.execute(connection.owner, request)
+        return self._pins.execute(connection, request)
 
     def _claim(self, connection: BoardConnection, request: ClaimPin) -> object:
         holder = self._pins.owner(request.pin)
-        other = None if holder is None else holder.connection
-        if isinstance(other, BoardConnection) and other is not connection:
-            self._execute_all(other)  # It may have ended meanwhile.
+        if isinstance(holder, BoardConnection) and holder is not connection:
+            self._execute_all(holder)  # It may have ended meanwhile.
         level = self._execute_on_hardware(connection, request)
         if request.mode == "input":
             connection.inputs.add(request.pin)
@@ -323,5 +322,5 @@ class BoardServer:
             return
         self._epoll.unregister(connection.fileno())
         if connection.role == "hardware":
-            self._pins.leave(connection.owner, self._now_ns(), died=not connection.has_left)
+            self._pins.leave(connection, self._now_ns(), died=not connection.has_left)
         connection.close()

@@ -422,8 +422,6 @@ class ServoBus:
                 lengthening_m_per_s=servo.lengthening(present.speed),
                 tension_n=servo.tension_n(present.current),
                 goal_n=self._goal_n(servo),
-                voltage_v=present.voltage,
-                temperature_c=present.temperature,
             )
         return states
 

@@ -37,8 +37,6 @@ class ServoState:
         lengthening_m_per_s: Rate of change of that length, m/s.
         tension_n: Tension of its present current, N, without the gears' friction.
         goal_n: Tension of its goal current, N: limited and in whole counts.
-        voltage_v: Voltage, V.
-        temperature_c: Temperature, degrees Celsius.
     """
 
     position: int
@@ -46,8 +44,6 @@ class ServoState:
     lengthening_m_per_s: float
     tension_n: float
     goal_n: float
-    voltage_v: float
-    temperature_c: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.settings import number, text, whole
@@ -20,7 +20,7 @@ _ROUNDING: Final = 1e-9
 """Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ServoModel:
     """Model of a servo.
 
@@ -65,50 +65,15 @@ class ServoModel:
         return self.no_load_rpm * 2.0 * math.pi / 60.0
 
 
-def _x330(name: str, number: int, most_counts: int, **others: Any) -> ServoModel:
-    return ServoModel(
-        name=name,
-        number=number,
-        ampere_per_count=1e-3,
-        most_counts=most_counts,
-        volts=5.0,
-        least_v=3.5,
-        most_v=7.0,
-        most_c=70,
-        **others,
-    )
-
-
-def _xm430(name: str, number: int, stall_nm: float, no_load_rpm: float) -> ServoModel:
-    return ServoModel(
-        name=name,
-        number=number,
-        ampere_per_count=2.69e-3,
-        most_counts=1193,
-        stall_nm=stall_nm,
-        stall_a=2.3,
-        no_load_rpm=no_load_rpm,
-        volts=12.0,
-        least_v=9.5,
-        most_v=16.0,
-        most_c=80,
-        least_firmware=38,
-    )
-
-
 # Source: ROBOTIS e-manual. Friction: XL330-M288 identified by Rhoban's `bam` (xl330/m1),
 # XC330-M288 fitted on joints of a LEAP hand. The bus watchdog of the X430 needs firmware 38
-# (e-manual, Bus Watchdog).
+# (e-manual, Bus Watchdog). The numbers are in the order of the attributes.
 _MODELS: Final = (
-    _x330(
-        "XL330-M288", 1200, 1750, stall_nm=0.52, stall_a=1.47, no_load_rpm=103.0, friction_nm=0.018
-    ),
-    _x330("XL330-M077", 1190, 1750, stall_nm=0.215, stall_a=1.47, no_load_rpm=383.0),
-    _x330(
-        "XC330-M288", 1240, 2352, stall_nm=0.93, stall_a=1.80, no_load_rpm=81.0, friction_nm=0.029
-    ),
-    _xm430("XM430-W210", 1030, stall_nm=3.0, no_load_rpm=77.0),
-    _xm430("XM430-W350", 1020, stall_nm=4.1, no_load_rpm=46.0),
+    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52, 1.47, 103.0, 5.0, 3.5, 7.0, 70, 0, 0.018),
+    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215, 1.47, 383.0, 5.0, 3.5, 7.0, 70),
+    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93, 1.80, 81.0, 5.0, 3.5, 7.0, 70, 0, 0.029),
+    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0, 2.3, 77.0, 12.0, 9.5, 16.0, 80, 38),
+    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1, 2.3, 46.0, 12.0, 9.5, 16.0, 80, 38),
 )
 
 MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for one in _MODELS})
