@@ -128,11 +128,13 @@ class Board:
     def _operate(self, connection: BoardConnection, request: Request) -> object:
         """Execute a request of time or of an operator."""
         match request:
-            case WaitForGrant():
-                self._time.wait(connection, request.until_ns)
-                return LATER
-            case SleepOnBoard():
-                self._time.sleep(connection, request.id or 0, request.ns)
+            case WaitForGrant() | SleepOnBoard():
+                if isinstance(self._time, RealTime):
+                    raise RobotError("This board runs in real time, which cannot be advanced.")
+                if isinstance(request, WaitForGrant):
+                    self._time.wait(connection, request.until_ns)
+                else:
+                    self._time.sleep(connection, request.id or 0, request.ns)
                 return LATER
             case OperatorRequest():
                 return self._act(request)
@@ -224,14 +226,6 @@ class RealTime:
         """Return the time in nanoseconds."""
         return time.monotonic_ns()
 
-    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Refuse: real time advances by itself."""
-        raise RobotError("This board runs in real time, which cannot be advanced.")
-
-    def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Refuse: real time is not granted."""
-        raise RobotError("This board runs in real time, which is not granted.")
-
     def run(self, board: Board) -> None:
         """Run a board until its owner is gone."""
         camera = board.camera
@@ -275,12 +269,23 @@ class TwinTime:
         return self._now_ns
 
     def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Let a client sleep."""
+        """Let a client sleep.
+
+        Args:
+            connection: The client.
+            request_id: Id of its request, to which `SleepResult` is the reply.
+            ns: How long, ns.
+        """
         self._sleeps += 1
         self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, request_id))
 
     def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Finish the grant of a client, which takes part from now on."""
+        """Finish the grant of a client, which takes part from now on.
+
+        Args:
+            connection: The client.
+            until_ns: When its next grant is due at the latest, ns.
+        """
         connection.takes_part = True
         connection.works = False
         connection.until_ns = until_ns

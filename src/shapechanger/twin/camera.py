@@ -25,7 +25,12 @@ _FIONREAD: Final = 0x541B
 
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
-    """Add the capture time to a JPEG, as a comment segment."""
+    """Add the capture time to a JPEG, as a comment segment.
+
+    Args:
+        jpeg: The picture.
+        captured_ns: The time, ns.
+    """
     words = b"captured_ns=%d" % captured_ns
     segment = _COMMENT + (len(words) + 2).to_bytes(2, "big") + words
     return _START_OF_IMAGE + segment + jpeg[len(_START_OF_IMAGE) :]
@@ -78,7 +83,12 @@ class FrontCameraPipe:
         self.newest_ns: int | None = None
 
     def take(self, world: World, now_ns: int) -> None:
-        """Take the picture that is due, and skip those whose time has passed."""
+        """Take the picture that is due, and skip those whose time has passed.
+
+        Args:
+            world: World to take it of.
+            now_ns: Time, ns.
+        """
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self._start_ns + round(self._taken * self._period_ns)
@@ -107,7 +117,12 @@ class FrontCameraPipe:
         self._fault = fault
 
     def draw(self, world: World, now_ns: int) -> bytes:
-        """Return the current picture as JPEG, with its time in a comment and maybe a barcode."""
+        """Return the current picture as JPEG, with its time in a comment and maybe a barcode.
+
+        Args:
+            world: World to draw.
+            now_ns: Time, ns.
+        """
         picture = np.ascontiguousarray(world.picture())
         if self._barcode:
             draw_barcode(picture, now_ns)

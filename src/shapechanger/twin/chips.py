@@ -23,11 +23,21 @@ class Chip(Protocol):
     """A chip at one address of an I2C bus."""
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register."""
+        """Read bytes.
+
+        Args:
+            register: Register of the first byte.
+            length: Number of bytes.
+        """
         ...
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, starting at a register."""
+        """Write bytes.
+
+        Args:
+            register: Register of the first byte.
+            data: The bytes.
+        """
         ...
 
 
@@ -403,6 +413,10 @@ def _at_zero(joint: str) -> float:
 
 def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
     """Return the chips of a robot, by bus and address.
+
+    Args:
+        plan: The robot as it is wired.
+        world: What the chips measure.
 
     Raises:
         RobotError: If the world has other joints than the robot.

@@ -115,11 +115,21 @@ class Operator:
         self._act("chip", bus, address, dead)
 
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
-        """Make the servo of a tendon fail; "" repairs what can be repaired."""
+        """Make the servo of a tendon fail.
+
+        Args:
+            tendon: Name of the tendon.
+            fault: The fault; "" repairs what can be repaired.
+        """
         self._act("servo", tendon, fault)
 
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
-        """Change the magnet of a joint's encoder; "" repairs it."""
+        """Change the magnet of a joint's encoder.
+
+        Args:
+            joint: Name of the joint.
+            state: State of the magnet; "" repairs it.
+        """
         self._act("magnet", joint, state)
 
     def tensions(self) -> dict[str, float]:

@@ -151,14 +151,25 @@ class PinSensors:
         return found
 
     def output_changed(self, t: int, pin: int, level: float) -> None:
-        """Let a distance sensor ping when its trigger, an output, falls."""
+        """Let a distance sensor ping when its trigger, an output, falls.
+
+        Args:
+            t: Time, ns.
+            pin: BCM number of the output.
+            level: Its level or duty, 0 to 1.
+        """
         for sensor in self._distances:
             if sensor.trigger == pin and level == 0.0:
                 for edge in sensor.ping(t):
                     heapq.heappush(self._due, edge)
 
     def press_stop(self, down: bool, t: int) -> None:
-        """Press or release the stop button."""
+        """Press or release the stop button.
+
+        Args:
+            down: Whether to press it.
+            t: Time, ns.
+        """
         if self._stop_pin is not None:
             heapq.heappush(self._due, Edge(t, self._stop_pin, int(not down)))
 
@@ -262,7 +273,12 @@ class Surroundings:
         }
 
     def advance(self, now_ns: int, levels: Levels) -> list[Edge]:
-        """Advance the world to a time and return the edges of inputs on the way."""
+        """Advance the world to a time and return the edges of inputs on the way.
+
+        Args:
+            now_ns: The time, ns.
+            levels: State of all outputs.
+        """
         start_ns = self.now_ns
         if now_ns > start_ns:
             if self.rig is not None:

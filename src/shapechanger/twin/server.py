@@ -221,13 +221,24 @@ class BoardServer:
                 self._watch(connection)
 
     def send(self, connection: BoardConnection, event: BoardEvent) -> None:
-        """Send a message to a client."""
+        """Send a message to a client, now or when it reads.
+
+        Args:
+            connection: The client.
+            event: The message.
+        """
         connection.send(event)
         if connection.wants_to_write:
             self._watch(connection)
 
     def reply(self, connection: BoardConnection, request_id: int, result: object) -> None:
-        """Send the result of a request."""
+        """Send the result of a request.
+
+        Args:
+            connection: The client.
+            request_id: Id of its request.
+            result: The result, which msgspec can encode.
+        """
         self.send(connection, BoardReply(request_id, msgspec.Raw(encode(result))))
 
     def close(self) -> None:

@@ -88,7 +88,12 @@ class TwinWiring:
         return 0 if edge_ns is None else edge_ns + self._one_shot_ns
 
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
-        """Return the state of each output at a time."""
+        """Return the state of each output, by name.
+
+        Args:
+            levels: Levels of all pins.
+            now_ns: Time, ns, by which the one-shot may have cut the power.
+        """
         ends_ns = self.power_ends_ns(levels)
         powered = ends_ns is None or now_ns < ends_ns
         return {

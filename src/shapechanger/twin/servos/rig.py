@@ -98,6 +98,10 @@ class Rig:
     def of(cls, plan: GuardPlan, world: World) -> Rig | None:
         """Return the rig of a robot; None for one without a servo bus.
 
+        Args:
+            plan: The robot as it is wired.
+            world: World of the robot.
+
         Raises:
             RobotError: If the world has other tendons.
         """

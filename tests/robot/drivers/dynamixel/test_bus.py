@@ -148,6 +148,15 @@ def test_a_stop_goes_down_to_the_pretension_and_lets_go() -> None:
     assert not any(one.has_torque for one in rig.line.servos.values())
 
 
+def test_a_stop_without_a_ramp_lets_go_at_once() -> None:
+    """A ramp of 0 ms is over in the first cycle."""
+    rig = Rig(settings(ramp_ms=0)).start()
+    rig.run(12.0, 5)
+    rig.bus.stop(rig.line.now_ns)
+    assert rig.run(None).mode == "off"
+    assert rig.pulls() == [0.0] * 7
+
+
 def test_a_command_does_not_end_a_stop() -> None:
     """Tensions that are requested after a stop have no effect."""
     rig = Rig().start()

@@ -1,35 +1,11 @@
-"""The parts that know no bus: the ramp of a stop, and the eye for slack."""
+"""Parts that need no bus: detection of slack, and decoding."""
 
 import pytest
 
-from shapechanger.robot.drivers.dynamixel.bus import Ramp
 from shapechanger.robot.drivers.dynamixel.health import SlackDetector
 from shapechanger.robot.drivers.dynamixel.protocol import decode_present, hardware_errors
 
 MS = 1_000_000
-
-
-def test_a_ramp_goes_down_in_a_straight_line_in_its_time() -> None:
-    """Half of the way after half of the time, and all of it at the end."""
-    ramp = Ramp({"FDP": 10.0}, {"FDP": 2.0}, 5 * MS, 100)
-    assert [ramp.tensions(t * MS)["FDP"] for t in (0, 5, 55, 105, 900)] == pytest.approx(
-        [10.0, 10.0, 6.0, 2.0, 2.0]
-    )
-    assert not ramp.is_over(104 * MS)
-    assert ramp.is_over(105 * MS)
-
-
-def test_a_ramp_of_no_time_is_over_at_once() -> None:
-    """Nothing divides by zero."""
-    ramp = Ramp({"FDP": 10.0}, {"FDP": 2.0}, 5 * MS, 0)
-    assert ramp.tensions(5 * MS) == {"FDP": 2.0}
-    assert ramp.is_over(5 * MS)
-
-
-def test_a_stop_never_pulls_harder_than_its_end() -> None:
-    """A tendon below the pretension is taken to it, not beyond."""
-    ramp = Ramp({"FDP": 0.0}, {"FDP": 2.0}, 0, 100)
-    assert ramp.tensions(50 * MS) == {"FDP": 2.0}
 
 
 def test_a_fast_tendon_is_slack_only_after_a_while() -> None:

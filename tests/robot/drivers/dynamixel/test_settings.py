@@ -19,7 +19,7 @@ _NAN = float("nan")
         ({"spool_radius_m": 0.0}, "its spool radius must be above 0, not 0"),
         ({"spool_radius_m": _NAN}, "its spool radius must be above 0, not nan"),
         ({"most_tension_n": 60.0}, "its most tension must be 0.029 to 51 N with this spool"),
-        ({"most_tension_n": _NAN}, "its most tension must be above 0, not nan"),
+        ({"most_tension_n": _NAN}, "its most tension must be 0.029 to 51 N .* not nan N"),
         ({"pretension_n": 21.0}, "its pretension must be 0.029 to 20 N, not 21 N"),
         ({"pretension_n": 0.01}, "its pretension must be 0.029 to 20 N, not 0.01 N"),
         ({"homing_n": 30.0}, "its tension for homing must be 0.029 to 20 N, not 30 N"),

@@ -39,46 +39,6 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 
-
-class Ramp:
-    """Linear ramp of tensions.
-
-    Args:
-        start: First tension of each tendon, N, by name.
-        end: Last tension of each tendon, N; no tendon starts below it.
-        since_ns: Time of the start.
-        ramp_ms: Duration, ms.
-    """
-
-    def __init__(
-        self, start: Mapping[str, float], end: Mapping[str, float], since_ns: int, ramp_ms: int
-    ) -> None:
-        # A stop never pulls harder.
-        self._start = {name: max(value, end[name]) for name, value in start.items()}
-        self._end = dict(end)
-        self._since_ns = since_ns
-        self._ramp_ns = ramp_ms * 1_000_000
-
-    def tensions(self, now_ns: int) -> dict[str, float]:
-        """Return the tension of each tendon, N."""
-        left = self._left(now_ns)
-        return {
-            name: self._end[name] + left * (value - self._end[name])
-            for name, value in self._start.items()
-        }
-
-    def is_over(self, now_ns: int) -> bool:
-        """Return whether the ramp has ended."""
-        return self._left(now_ns) == 0.0
-
-    def _left(self, now_ns: int) -> float:
-        """Return the share of the ramp that is left, 1 to 0."""
-        gone_ns = now_ns - self._since_ns
-        if gone_ns >= self._ramp_ns:
-            return 0.0
-        return min(1.0, 1.0 - gone_ns / self._ramp_ns)
-
-
 # One of them is read in each cycle, so a trip is detected within four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
 
@@ -103,7 +63,8 @@ class ServoBus:
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
         self._zeros: dict[str, int] = {}
         self._mode: Mode = "off"
-        self._ramp: Ramp | None = None
+        self._stopped_at: dict[str, float] = {}  # N, when the stop began.
+        self._stopped_ns = 0
         self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
         self._requested = dict.fromkeys(self._servos, 0.0)  # N, as last requested.
         self._cycles = 0
@@ -140,7 +101,7 @@ class ServoBus:
         Raises:
             RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
         """
-        self._mode, self._ramp, self._gone, self._is_ready = "off", None, "", False
+        self._mode, self._gone, self._is_ready = "off", "", False
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
         self._check_servos()
@@ -213,7 +174,7 @@ class ServoBus:
         servos = self._evaluate(heard, now_ns, late=self._registers.port.has_stray)
         if self.faults and self._mode == "held":
             self.stop(now_ns)
-        if self._ramp is not None and self._ramp.is_over(now_ns):
+        if self._mode == "stopping" and self._ramp_left(now_ns) == 0.0:
             self.release()
         self._cycles += 1
         return BusState(now_ns, self._mode, servos, self.faults)
@@ -242,10 +203,8 @@ class ServoBus:
     def stop(self, now_ns: int) -> None:
         """Start to ramp the tensions down in the coming cycles, and then to let go."""
         if self._mode == "held":
-            # A tendon that was not pulled yet stays so.
-            start = {one.name: self._goal_n(one) for one in self._settings.servos}
-            end = {name: min(self._servos[name].pretension_n, n) for name, n in start.items()}
-            self._ramp = Ramp(start, end, now_ns, self._settings.ramp_ms)
+            self._stopped_at = {one.name: self._goal_n(one) for one in self._settings.servos}
+            self._stopped_ns = now_ns
             self._mode = "stopping"
 
     def release(self) -> None:
@@ -254,7 +213,6 @@ class ServoBus:
         If a servo does not confirm it, even when asked twice, the bus falls silent, so that the
         watchdog of that servo stops it. `set_up` ends the silence.
         """
-        self._ramp = None
         self._goals = dict.fromkeys(self._ids, 0)
         holding = set(self._ids)
         try:
@@ -372,13 +330,22 @@ class ServoBus:
     def _send_goals(self, now_ns: int) -> None:
         if self._mode == "off":
             return
-        wanted = self._requested if self._ramp is None else self._ramp.tensions(now_ns)
         for name, servo in self._servos.items():
-            # A servo with a fault lets go at once, while the others ramp down.
-            failed = self._mode == "stopping" and self._health[servo.id].fault
-            pull = wanted[name] if self._ramp is not None else servo.clip(wanted[name])
-            self._goals[servo.id] = 0 if failed else servo.goal_count(pull)
+            if self._mode == "held":
+                pull = servo.clip(self._requested[name])
+            elif self._health[servo.id].fault:
+                pull = 0.0  # A servo with a fault lets go at once, while the others ramp down.
+            else:
+                start = self._stopped_at[name]
+                end = min(servo.pretension_n, start)  # A tendon that was not pulled yet stays so.
+                pull = end + self._ramp_left(now_ns) * (start - end)
+            self._goals[servo.id] = servo.goal_count(pull)
         self._registers.sync_write(GOAL_CURRENT, self._goals)
+
+    def _ramp_left(self, now_ns: int) -> float:
+        """Return the share of the ramp of a stop that is left, 1 to 0."""
+        gone_ns, ramp_ns = now_ns - self._stopped_ns, self._settings.ramp_ms * 1_000_000
+        return 0.0 if gone_ns >= ramp_ns else min(1.0, 1.0 - gone_ns / ramp_ns)
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
         """Read a register that shows obedience, and drop servos that may have restarted."""

@@ -152,6 +152,10 @@ def _join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSet
 def bus_at(device: str, hardware: Hardware) -> SharedBus:
     """Return the bus at a device.
 
+    Args:
+        device: Serial device.
+        hardware: Hardware of the bus.
+
     Raises:
         RobotError: If no output is on it.
     """

@@ -129,14 +129,8 @@ class ServoSettings:
             self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
         if self.direction not in (1, -1):
             self._refuse(f"its direction must be 1 or -1, not {self.direction}")
-        for label, value in (
-            ("spool radius", self.spool_radius_m),
-            ("most tension", self.most_tension_n),
-            ("pretension", self.pretension_n),
-            ("tension for homing", self.homing_n),
-        ):
-            if not 0.0 < value < math.inf:  # Also refuses NaN.
-                self._refuse(f"its {label} must be above 0, not {value:g}")
+        if not 0.0 < self.spool_radius_m < math.inf:  # Also refuses NaN.
+            self._refuse(f"its spool radius must be above 0, not {self.spool_radius_m:g}")
         least, most = self.newton_per_count, known.most_counts * self.newton_per_count
         if not least <= self.most_tension_n <= most:
             words = f"{least:.2g} to {most:.0f} N with this spool, not {self.most_tension_n:g} N"
