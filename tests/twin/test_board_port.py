@@ -1,4 +1,4 @@
-"""The driver's bytes over a board's socket, to servos in another process."""
+"""Servo instructions over a board's socket, to servos in another process."""
 
 from __future__ import annotations
 

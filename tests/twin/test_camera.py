@@ -28,7 +28,6 @@ _CAMERA = CameraPlan("pipe", fps=20.0)
 
 
 def _open(board: RunningBoard) -> BinaryIO:
-    assert board.fifo_path is not None
     return os.fdopen(os.open(board.fifo_path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0)
 
 

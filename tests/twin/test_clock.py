@@ -100,7 +100,7 @@ def test_sleeping_lets_time_go_by(tmp_path: Path) -> None:
                 await sleeping
 
         asyncio.run(sleep())
-        with board.fifo_path.open("rb"):  # type: ignore[union-attr]
+        with board.fifo_path.open("rb"):
             captured_ns = asyncio.run(clock.sleep(0.2))
         assert captured_ns is not None
         assert clock.now_ns() - 50_000_000 < captured_ns <= clock.now_ns()

@@ -79,14 +79,6 @@ def test_only_open_channels_are_heard() -> None:
         behind.read(0x0C, 2)
 
 
-def test_the_two_bytes_of_an_angle_come_again_and_again() -> None:
-    """Reading on from an angle repeats newer values; from the status on, the address advances."""
-    chip = SimulatedAs5600("knee", lambda: 0.0, 0x0ABC, 1)
-    assert chip.read(0x0C, 4) == chip.read(0x0E, 4) == [0x0A, 0xBC, 0x0A, 0xBC]
-    assert chip.read(0x0B, 5) == [0x20, 0x0A, 0xBC, 0x0A, 0xBC]
-    assert chip.read(0x50, 2) == [0, 0]
-
-
 @pytest.mark.parametrize(
     ("how", "seen"),
     [

@@ -27,7 +27,7 @@ def _board() -> tuple[LocalBoard, DrivingWorld]:
 def test_time_moves_only_by_advance() -> None:
     """It starts at the start of the twin's clock and advances only with the board."""
     board, _ = _board()
-    assert board.now_ns == board.hardware.clock.now_ns() == START_NS
+    assert board.now_ns() == board.hardware.clock.now_ns() == START_NS
     board.advance(START_NS + 10 * _MS)
     assert board.hardware.clock.now_ns() == START_NS + 10 * _MS
 

@@ -1,4 +1,4 @@
-"""A finger's rig in this process: guard, driver and bytes as on the bench, bones in MuJoCo."""
+"""A finger's rig in this process: guard and driver as on the bench, bones in MuJoCo."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class _Bench:
 
     @property
     def rig(self) -> Rig:
-        assert self.robot.rig is not None
-        return self.robot.rig
+        assert self.robot.pins.rig is not None
+        return self.robot.pins.rig
 
     def drive(self, values: tuple[float, ...], steps: int) -> Observation:
         for _ in range(steps):

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from shapechanger.errors import RobotError
 
-if TYPE_CHECKING:  # They need the SDK, which only a rig has.
-    from shapechanger.robot.drivers.dynamixel.protocol import Port
+if TYPE_CHECKING:  # Only a rig needs them.
+    from shapechanger.robot.drivers.dynamixel.protocol import ServoPort
     from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 
 REAL: Final = "shapechanger.robot.hardware:real"
@@ -149,7 +149,7 @@ class Hardware(Protocol):
         """Open the pins that send servo pulses."""
         ...
 
-    def servo_port(self, settings: BusSettings) -> Port:
+    def servo_port(self, settings: BusSettings) -> ServoPort:
         """Open the port of a servo bus."""
         ...
 
@@ -225,9 +225,9 @@ class RealHardware:
 
         return LgpioServoPins()
 
-    def servo_port(self, settings: BusSettings) -> Port:
+    def servo_port(self, settings: BusSettings) -> ServoPort:
         """Open a serial port with `dynamixel_sdk`."""
-        from shapechanger.robot.drivers.dynamixel.protocol import open_serial_port
+        from shapechanger.robot.drivers.dynamixel.serial_port import open_serial_port
 
         return open_serial_port(settings)
 

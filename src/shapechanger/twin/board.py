@@ -13,39 +13,26 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import FrameType
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
-from shapechanger.errors import RobotError, UnknownName, WorldError
+from shapechanger.errors import RobotError, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
-from shapechanger.twin.camera import CAMERA_FAULTS, CameraFault, FrontCameraPipe
+from shapechanger.twin.camera import FrontCameraPipe
 from shapechanger.twin.messages import (
-    BreakCamera,
-    BreakChip,
-    BreakMagnet,
-    BreakServo,
-    ExchangeServoBytes,
     GrantTime,
-    LayOutCourse,
-    PlaceVehicle,
-    PressButton,
-    PutVehicleBack,
-    ReadLevels,
-    ReadTensions,
-    ReadWhereabouts,
+    OperatorRequest,
     Request,
-    SetBattery,
-    SetDistance,
     SleepOnBoard,
     SleepResult,
     WaitForGrant,
     Whereabouts,
 )
 from shapechanger.twin.pin_board import PinBoard
-from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.server import (
     LATER,
     START_NS,
@@ -53,17 +40,15 @@ from shapechanger.twin.server import (
     BoardServer,
     OwnerGone,
 )
-from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter
-from shapechanger.twin.start import BoardSettings
+from shapechanger.twin.start import BoardAt, BoardSettings
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.place import open_world
-from shapechanger.worlds.world import RESTING_V, World
+from shapechanger.worlds.world import RESTING_V
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of looking for a reader of the pictures while time stands still."""
-_BUTTONS: Final = ("bumper", "stop")
 
 _log = logging.getLogger(__name__)
 
@@ -72,42 +57,54 @@ class Board:
     """Pins, chips, sensors and world, with a server for clients.
 
     Args:
-        wiring: What is attached to the pins.
-        world: World of the vehicle.
-        clock: Time of the board.
-        ledger: Record of all changes.
-        camera: Front camera; None without one.
-        listening: Listening socket for clients.
+        settings: Its settings.
         owner_fd: Descriptor whose end ends the board.
-        seed: Seed of everything random.
 
     Attributes:
-        world: World of the vehicle.
+        world: World of the robot.
         camera: Front camera; None without one.
         server: Server of the clients.
+
+    Raises:
+        ShapechangerError: If the world cannot be opened or does not fit the robot.
     """
 
-    def __init__(
-        self,
-        wiring: TwinWiring,
-        world: World,
-        clock: RealTime | TwinTime,
-        ledger: LedgerWriter,
-        camera: FrontCameraPipe | None,
-        listening: socket.socket,
-        owner_fd: int,
-        seed: int,
-    ) -> None:
-        self.world = world
-        self.camera = camera
+    def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
+        plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
+        is_real = settings.clock == "real"
+        parts = {output.part for output in plan.outputs if output.part}
+        size = None if camera is None else camera.size
+        self.world = open_world(settings.place, parts, size, seed)
+        # Let the world prepare what takes a while, before a guard in real time waits for it.
+        self.world.put_back()
+        self.world.place(seed)
+        if size is not None:
+            self.world.picture()
+        if is_real:
+            run_early()  # Hardware is never late because the machine is busy.
+        clock = RealTime() if is_real else TwinTime(plan.tick_hz)
         self._time = clock
-        self._ledger = ledger
-        self._surroundings = Surroundings(wiring, world, clock.now_ns())
-        self._sensors = self._surroundings.sensors
-        self._pins = PinBoard(wiring, world, self._sensors, ledger, seed)
+        files = BoardAt(Path(settings.folder))
+        self.camera: FrontCameraPipe | None = None
+        if camera is not None:
+            self.camera = FrontCameraPipe(
+                str(files.fifo_path),
+                camera.fps,
+                camera.jpeg_quality,
+                latest_only=is_real,
+                start_ns=clock.now_ns(),
+                seed=seed,
+                barcode=not settings.place.world,
+            )
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        listening.bind(files.socket_path)
+        self._ledger = LedgerWriter(files.ledger_path)
+        wiring = TwinWiring(plan, settings.one_shot_ms)
+        self._pins = PinBoard(wiring, self.world, self._ledger, seed, clock.now_ns())
         self.server = BoardServer(
-            listening, owner_fd, self._pins, clock.kind, clock.now_ns, self._operate
+            listening, owner_fd, self._pins, settings.clock, clock.now_ns, self._operate
         )
+        listening.listen()
 
     def run(self) -> None:
         """Run until the owner is gone."""
@@ -123,80 +120,89 @@ class Board:
 
     def advance(self, now_ns: int) -> None:
         """Advance the world to a time, and send the edges of inputs on the way."""
-        edges = self._surroundings.advance(now_ns, self._pins.levels)
+        edges = self._pins.advance(now_ns)
         for edge in edges:
             self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
         self.server.send_edges(edges)
 
     def _operate(self, connection: BoardConnection, request: Request) -> object:
-        """Execute a request about time, servos or the world."""
+        """Execute a request of time or of an operator."""
         match request:
-            case WaitForGrant():
-                self._time.wait(connection, request.until_ns)
+            case WaitForGrant() | SleepOnBoard():
+                if isinstance(self._time, RealTime):
+                    raise RobotError("This board runs in real time, which cannot be advanced.")
+                if isinstance(request, WaitForGrant):
+                    self._time.wait(connection, request.until_ns)
+                else:
+                    self._time.sleep(connection, request.id or 0, request.ns)
                 return LATER
-            case SleepOnBoard():
-                self._time.sleep(connection, request.id or 0, request.ns)
-                return LATER
-            case ExchangeServoBytes():
-                rig = self._rig()
-                rig.require(request.device)
-                if request.data:
-                    rig.bus.receive(request.data)
-                return rig.bus.send()
-            case ReadTensions():
-                return self._rig().tensions()
-            case ReadLevels():
+            case OperatorRequest():
+                return self._act(request)
+            case _:
+                raise RobotError(f"The board does not execute {type(request).__name__}.")
+
+    def _act(self, request: OperatorRequest) -> object:
+        """Execute a request of an operator."""
+        match request.action, *request.values:
+            case ("tensions",):
+                return self._pins.require_rig().tensions()
+            case ("levels",):
                 return self._pins.levels
-            case ReadWhereabouts():
+            case ("whereabouts",):
                 return self._whereabouts()
-            case PlaceVehicle():
-                self.world.place(request.seed)
-                self._ledger.write(self._time.now_ns(), "place", seed=request.seed)
-            case PutVehicleBack():
+            case "place", int(seed):
+                self.world.place(seed)
+                self._record("place", seed=seed)
+            case ("put_back",):
                 try:
                     self.world.put_back()
                 except WorldError as error:
                     raise RobotError(f"The vehicle cannot be put back: {error}") from error
-                self._ledger.write(self._time.now_ns(), "put_back")
-            case LayOutCourse():
-                self.world.lay_out(request.seed)
-                self._ledger.write(self._time.now_ns(), "course", seed=request.seed)
+                self._record("put_back")
+            case "lay_out", int(seed):
+                self.world.lay_out(seed)
+                self._record("course", seed=seed)
             case _:
-                self._ledger.write(self._time.now_ns(), "fault", what=self._fail(request))
+                self._record("fault", what=self._fail(request))
         return None
 
-    def _fail(self, request: Request) -> str:
+    def _fail(self, request: OperatorRequest) -> str:
         """Break, repair or press something, and describe it for the ledger."""
-        match request:
-            case BreakCamera():
-                self._break_camera(request.fault)
-                return f"camera {request.fault or 'well'}"
-            case PressButton():
-                self._press(request.button, request.down)
-                return f"{request.button} {'down' if request.down else 'up'}"
-            case SetBattery():
-                self.world.resting_v = RESTING_V if request.volts is None else request.volts
-                return f"battery {request.volts}"
-            case SetDistance():
-                self._sensors.override_distance(request.metres, dead=request.dead)
-                return f"distance {'dead' if request.dead else request.metres}"
-            case BreakChip():
-                at = request.bus, request.address
-                (self._pins.dead_chips.add if request.dead else self._pins.dead_chips.discard)(at)
-                return f"chip {at[0]} {at[1]} {'dead' if request.dead else 'well'}"
-            case BreakServo():
-                self._rig().break_servo(request.tendon, request.fault)
-                return f"servo {request.tendon} {request.fault or 'well'}"
-            case BreakMagnet():
-                self._pins.encoder(request.joint).set_magnet(request.fault)
-                return f"magnet {request.joint} {request.fault or 'well'}"
+        match request.action, *request.values:
+            case "camera", str(fault):
+                if self.camera is None:
+                    raise RobotError("This twin has no camera.")
+                self.camera.break_down(fault)
+                return f"camera {fault or 'well'}"
+            case "bumper", bool(down):
+                self._pins.sensors.hold_bumpers(down)
+                return f"bumper {'down' if down else 'up'}"
+            case "stop", bool(down):
+                self._pins.sensors.press_stop(down, self._time.now_ns())
+                return f"stop {'down' if down else 'up'}"
+            case "battery", (float() | None) as volts:
+                self.world.resting_v = RESTING_V if volts is None else volts
+                return f"battery {volts}"
+            case "distance", (float() | None) as metres, bool(dead):
+                self._pins.sensors.override_distance(metres, dead=dead)
+                return f"distance {'dead' if dead else metres}"
+            case "chip", int(bus), int(address), bool(dead):
+                dead_chips = self._pins.dead_chips
+                (dead_chips.add if dead else dead_chips.discard)((bus, address))
+                return f"chip {bus} {address} {'dead' if dead else 'well'}"
+            case "servo", str(tendon), str(fault):
+                self._pins.require_rig().break_servo(tendon, fault)
+                return f"servo {tendon} {fault or 'well'}"
+            case "magnet", str(joint), str(fault):
+                self._pins.encoder(joint).set_magnet(fault)
+                return f"magnet {joint} {fault or 'well'}"
             case _:
-                raise RobotError(f"The board does not execute {type(request).__name__}.")
+                raise RobotError(
+                    f"The board has no action {request.action!r} for {request.values}."
+                )
 
-    def _rig(self) -> Rig:
-        if self._surroundings.rig is None:
-            raise RobotError("This twin has no servo bus.")
-        return self._surroundings.rig
+    def _record(self, kind: str, **fields: object) -> None:
+        self._ledger.write(self._time.now_ns(), kind, **fields)
 
     def _whereabouts(self) -> Whereabouts:
         seen = self.world.inputs()
@@ -212,39 +218,13 @@ class Board:
             t=self._time.now_ns(),
         )
 
-    def _break_camera(self, fault: str) -> None:
-        if self.camera is None:
-            raise RobotError("This twin has no camera.")
-        faults: dict[str, CameraFault] = {known: known for known in CAMERA_FAULTS}
-        if fault not in faults:
-            raise UnknownName("fault of a camera", fault, CAMERA_FAULTS)
-        self.camera.fault = faults[fault]
-
-    def _press(self, button: str, down: bool) -> None:
-        if button not in _BUTTONS:
-            raise UnknownName("button", button, _BUTTONS)
-        if button == "stop":
-            self._sensors.press_stop(down, self._time.now_ns())
-        else:
-            self._sensors.hold_bumpers(down)
-
 
 class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
 
-    kind: Literal["real", "twin"] = "real"
-
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return time.monotonic_ns()
-
-    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Refuse: real time advances by itself."""
-        raise RobotError("This board runs in real time, which cannot be advanced.")
-
-    def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Refuse: real time is not granted."""
-        raise RobotError("This board runs in real time, which is not granted.")
 
     def run(self, board: Board) -> None:
         """Run a board until its owner is gone."""
@@ -277,8 +257,6 @@ class TwinTime:
         tick_hz: Rate of the grants of time, Hz; a client may ask for further ones in between.
     """
 
-    kind: Literal["real", "twin"] = "twin"
-
     def __init__(self, tick_hz: float) -> None:
         self._tick_hz = tick_hz
         self._now_ns = START_NS
@@ -291,12 +269,23 @@ class TwinTime:
         return self._now_ns
 
     def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Let a client sleep."""
+        """Let a client sleep.
+
+        Args:
+            connection: The client.
+            request_id: Id of its request, to which `SleepResult` is the reply.
+            ns: How long, ns.
+        """
         self._sleeps += 1
         self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, request_id))
 
     def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Finish the grant of a client, which takes part from now on."""
+        """Finish the grant of a client, which takes part from now on.
+
+        Args:
+            connection: The client.
+            until_ns: When its next grant is due at the latest, ns.
+        """
         connection.takes_part = True
         connection.works = False
         connection.until_ns = until_ns
@@ -348,14 +337,6 @@ class TwinTime:
         return tick_ns
 
 
-def _warm_up(world: World, seed: int, *, pictures: bool) -> None:
-    """Let the world prepare what takes a while, before a guard in real time waits for it."""
-    world.put_back()
-    world.place(seed)
-    if pictures:
-        world.picture()
-
-
 def _end(number: int, frame: FrameType | None) -> None:
     sys.exit(0)
 
@@ -368,40 +349,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
     with os.fdopen(settings_fd, "rb") as file:
         settings = msgspec.json.decode(file.read(), type=BoardSettings)
-    plan = GuardPlan.from_json(settings.plan)
-
-    parts = {output.part for output in plan.outputs if output.part}
-    plan_of_camera = settings.camera
-    size = None if plan_of_camera is None else plan_of_camera.size
-    world = open_world(settings.place, parts, size, settings.seed)
-    _warm_up(world, settings.seed, pictures=size is not None)
-    if settings.clock == "real":
-        run_early()  # Hardware is never late because the machine is busy.
-    clock = TwinTime(plan.tick_hz) if settings.clock == "twin" else RealTime()
-    camera = None
-    if plan_of_camera is not None:
-        camera = FrontCameraPipe(
-            settings.fifo,
-            plan_of_camera.fps,
-            plan_of_camera.jpeg_quality,
-            latest_only=settings.clock == "real",
-            start_ns=clock.now_ns(),
-            seed=settings.seed,
-            barcode=not settings.place.world,
-        )
-    listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listening.bind(settings.socket)
-    board = Board(
-        TwinWiring(plan, settings.one_shot_ms),
-        world,
-        clock,
-        LedgerWriter(settings.ledger),
-        camera,
-        listening,
-        owner_fd,
-        settings.seed,
-    )
-    listening.listen()
+    board = Board(settings, owner_fd)
     os.write(owner_fd, b"r")  # Ready.
     board.run()
 

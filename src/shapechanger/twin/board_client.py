@@ -18,7 +18,6 @@ from shapechanger.twin.messages import (
     BoardGreeting,
     BoardReply,
     ConnectClient,
-    ExchangeServoBytes,
     GrantTime,
     InputEdges,
     LeaveBoard,
@@ -111,10 +110,6 @@ class BoardClient:
         if reply.errno:
             raise OSError(reply.errno, os.strerror(reply.errno))
         return msgspec.msgpack.decode(reply.result, type=kind)
-
-    def exchange_servo_bytes(self, device: str, data: bytes) -> bytes:
-        """Send bytes to the servo bus and return those that have arrived from it."""
-        return self.ask(ExchangeServoBytes(device=device, data=data), bytes)
 
     def drain(self) -> None:
         """Receive everything that has arrived, without waiting."""

@@ -11,13 +11,12 @@ from typing import Final, Literal, get_args
 import numpy as np
 import simplejpeg
 
+from shapechanger.errors import UnknownName
 from shapechanger.robot.cameras.pattern import draw_barcode
 from shapechanger.worlds.world import World
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
 """Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""
-
-CAMERA_FAULTS: Final[tuple[CameraFault, ...]] = get_args(CameraFault)
 
 _START_OF_IMAGE: Final = b"\xff\xd8"
 _COMMENT: Final = b"\xff\xfe"
@@ -26,7 +25,12 @@ _FIONREAD: Final = 0x541B
 
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
-    """Add the capture time to a JPEG, as a comment segment."""
+    """Add the capture time to a JPEG, as a comment segment.
+
+    Args:
+        jpeg: The picture.
+        captured_ns: The time, ns.
+    """
     words = b"captured_ns=%d" % captured_ns
     segment = _COMMENT + (len(words) + 2).to_bytes(2, "big") + words
     return _START_OF_IMAGE + segment + jpeg[len(_START_OF_IMAGE) :]
@@ -46,7 +50,6 @@ class FrontCameraPipe:
         barcode: Whether the first rows of a picture show its capture time.
 
     Attributes:
-        fault: Fault of the camera; "" for none.
         next_ns: Time of the next picture.
         newest_ns: Capture time of the newest picture that was written; None before.
     """
@@ -75,31 +78,51 @@ class FrontCameraPipe:
         self._last = b""
         self._last_ns: int | None = None
         self._noise = random.Random(f"camera {seed}")
-        self.fault: CameraFault = ""
+        self._fault = ""
         self.next_ns = start_ns
         self.newest_ns: int | None = None
 
     def take(self, world: World, now_ns: int) -> None:
-        """Take the picture that is due, and skip those whose time has passed."""
+        """Take the picture that is due, and skip those whose time has passed.
+
+        Args:
+            world: World to take it of.
+            now_ns: Time, ns.
+        """
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self._start_ns + round(self._taken * self._period_ns)
-        if self.fault == "off" or not self._ready():
+        if self._fault == "off" or not self._ready():
             return
-        if self.fault == "freeze" and self._last:
+        if self._fault == "freeze" and self._last:
             self._write(self._last, self._last_ns)
             return
         jpeg = self.draw(world, now_ns)
         self._last, self._last_ns = jpeg, now_ns
-        if self.fault == "garbage":
+        if self._fault == "garbage":
             self._write(self._noise.randbytes(len(jpeg)), None)
-        elif self.fault == "short":
+        elif self._fault == "short":
             self._write(jpeg[: len(jpeg) // 2], None)
         else:
             self._write(jpeg, now_ns)
 
+    def break_down(self, fault: CameraFault | str) -> None:
+        """Make the camera fail; "" repairs it.
+
+        Raises:
+            UnknownName: If there is no such fault.
+        """
+        if fault not in (faults := get_args(CameraFault)):
+            raise UnknownName("fault of a camera", fault, faults)
+        self._fault = fault
+
     def draw(self, world: World, now_ns: int) -> bytes:
-        """Return the current picture as JPEG, with its time in a comment and maybe a barcode."""
+        """Return the current picture as JPEG, with its time in a comment and maybe a barcode.
+
+        Args:
+            world: World to draw.
+            now_ns: Time, ns.
+        """
         picture = np.ascontiguousarray(world.picture())
         if self._barcode:
             draw_barcode(picture, now_ns)

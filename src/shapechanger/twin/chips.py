@@ -10,7 +10,7 @@ import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final, Literal, Protocol, get_args, runtime_checkable
+from typing import Final, Literal, Protocol, runtime_checkable
 
 from shapechanger.errors import UnknownName
 from shapechanger.robot.drivers.settings import texts, whole, wholes
@@ -23,11 +23,21 @@ class Chip(Protocol):
     """A chip at one address of an I2C bus."""
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register."""
+        """Read bytes.
+
+        Args:
+            register: Register of the first byte.
+            length: Number of bytes.
+        """
         ...
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, starting at a register."""
+        """Write bytes.
+
+        Args:
+            register: Register of the first byte.
+            data: The bytes.
+        """
         ...
 
 
@@ -49,7 +59,6 @@ Magnet = Literal["", "gone", "weak", "strong"]
 
 _STATUS: Final = 0x0B
 _RAW_ANGLE: Final = 0x0C
-_ANGLE: Final = 0x0E
 _DETECTED: Final = 0x20
 _STATUS_OF: Final = {"": _DETECTED, "gone": 0x10, "weak": _DETECTED | 0x10, "strong": 0x28}
 _COUNTS_PER_TURN: Final = 4096
@@ -75,7 +84,7 @@ class SimulatedAs5600:
         self._angle = angle
         self._zero = zero
         self._direction = direction
-        self._magnet: Magnet = ""
+        self._magnet = ""
 
     def set_magnet(self, state: Magnet | str) -> None:
         """Set the state of the magnet.
@@ -83,21 +92,15 @@ class SimulatedAs5600:
         Raises:
             UnknownName: If there is no such state.
         """
-        for known in get_args(Magnet):
-            if state == known:
-                self._magnet = known
-                return
-        raise UnknownName("fault of a magnet", state, get_args(Magnet))
+        if state not in _STATUS_OF:
+            raise UnknownName("fault of a magnet", state, _STATUS_OF)
+        self._magnet = state
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register.
-
-        A read that starts at an angle repeats its two bytes.
-        """
-        counts = self._counts()
-        if register in (_RAW_ANGLE, _ANGLE):
-            return [self._byte(register + i % 2, counts) for i in range(length)]
-        return [self._byte(register + i & 0xFF, counts) for i in range(length)]
+        """Read bytes, starting at a register; those that no driver reads are 0."""
+        high, low = divmod(self._counts(), 256)
+        known = {_STATUS: _STATUS_OF[self._magnet], _RAW_ANGLE: high, _RAW_ANGLE + 1: low}
+        return [known.get(register + i, 0) for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
         """Do nothing: the settings are not simulated, and no driver writes them."""
@@ -108,29 +111,17 @@ class SimulatedAs5600:
         turned = self._direction * self._angle() / (2.0 * math.pi)
         return (self._zero + round(turned * _COUNTS_PER_TURN)) % _COUNTS_PER_TURN
 
-    def _byte(self, register: int, counts: int) -> int:
-        if register == _STATUS:
-            return _STATUS_OF[self._magnet]
-        if register in (_RAW_ANGLE, _ANGLE):
-            return counts >> 8
-        if register in (_RAW_ANGLE + 1, _ANGLE + 1):
-            return counts & 0xFF
-        return 0
-
 
 _CONFIGURATION: Final = 0
-_CALIBRATION: Final = 5
+_BUS_VOLTAGE: Final = 2
 _RESET: Final = 0x8000
 _AT_POWER_ON: Final = 0x399F
-
-_SHUNT_OHM: Final = 0.1  # On the usual breakout boards.
-_SHUNT_LSB_V: Final = 10e-6
 _BUS_LSB_V: Final = 4e-3
 _CONVERSION_READY: Final = 0x2
 
 
 class SimulatedIna219:
-    """INA219: voltage and current of the battery, in registers of 16 bits.
+    """INA219: voltage of the battery, in registers of 16 bits; the current is not simulated.
 
     Source: Texas Instruments, INA219 data sheet SBOS448G, section 8.6.
 
@@ -141,37 +132,20 @@ class SimulatedIna219:
     def __init__(self, readings: Callable[[], Readings]) -> None:
         self._readings = readings
         self._configuration = _AT_POWER_ON
-        self._calibration = 0
 
     def read(self, register: int, length: int) -> list[int]:
         """Read one register; its two bytes repeat."""
-        word = self._word(register).to_bytes(2, "big")
-        return [word[i % 2] for i in range(length)]
+        word = self._configuration if register == _CONFIGURATION else 0
+        if register == _BUS_VOLTAGE:
+            steps = round(self._readings().battery_v / _BUS_LSB_V)
+            word = min(steps, 0x1FFF) << 3 | _CONVERSION_READY
+        return [word >> 8 if i % 2 == 0 else word & 0xFF for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write one register; the chip accepts only whole ones."""
-        if len(data) != 2:
-            return
-        word = data[0] << 8 | data[1]
-        if register == _CONFIGURATION:
+        """Write the configuration; the chip accepts only whole registers."""
+        if register == _CONFIGURATION and len(data) == 2:
+            word = data[0] << 8 | data[1]
             self._configuration = _AT_POWER_ON if word & _RESET else word
-        elif register == _CALIBRATION:
-            self._calibration = word & 0xFFFE
-
-    def _word(self, register: int) -> int:
-        seen = self._readings()
-        shunt = round(min(0.32, seen.current_a * _SHUNT_OHM) / _SHUNT_LSB_V)
-        bus = round(seen.battery_v / _BUS_LSB_V)
-        current = shunt * self._calibration // 4096
-        words = (
-            self._configuration,
-            shunt & 0xFFFF,
-            min(bus, 0x1FFF) << 3 | _CONVERSION_READY,
-            current * bus // 5000 & 0xFFFF,  # Power.
-            current & 0xFFFF,
-            self._calibration,
-        )
-        return words[register] if register < len(words) else 0
 
 
 _GYRO_CONFIG: Final = 0x1B
@@ -439,6 +413,10 @@ def _at_zero(joint: str) -> float:
 
 def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
     """Return the chips of a robot, by bus and address.
+
+    Args:
+        plan: The robot as it is wired.
+        world: What the chips measure.
 
     Raises:
         RobotError: If the world has other joints than the robot.

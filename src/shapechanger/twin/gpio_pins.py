@@ -16,15 +16,21 @@ _REVISION: Final = 0xC03115
 
 
 class TwinPin(PiPin):
-    """One pin of the board."""
+    """One pin of the board.
+
+    Args:
+        factory: Factory of the pin.
+        info: gpiozero's description of the pin.
+    """
+
+    bounce: float | None = None
+    edges = "both"
 
     def __init__(self, factory: TwinPinFactory, info: Any) -> None:
         super().__init__(factory, info)
         self._board = factory.board
         self._function = "input"
         self._pull = "floating"
-        self._bounce: float | None = None
-        self._edges = "both"
         self._watched = False
         self._pwm_hz = 0
         self._duty = 0.0
@@ -54,8 +60,13 @@ class TwinPin(PiPin):
         self.state = state
 
     def report_edge(self, level: int, at_ns: int) -> None:
-        """Call the callback of the pin, if it watches edges in this direction."""
-        if self._watched and self._edges in ("both", "rising" if level else "falling"):
+        """Call the callback of the pin, if it watches edges in this direction.
+
+        Args:
+            level: Level after the edge.
+            at_ns: Time, ns.
+        """
+        if self._watched and self.edges in ("both", "rising" if level else "falling"):
             self._call_when_changed(at_ns / 1e9, level)
 
     def _claim(self, level: int = 0) -> None:
@@ -118,18 +129,6 @@ class TwinPin(PiPin):
             raise RobotError(f"{self!r} is an {self._function} and takes no pull {value!r}.")
         self._pull = value
         self._claim()
-
-    def _get_bounce(self) -> float | None:
-        return self._bounce
-
-    def _set_bounce(self, value: float | None) -> None:
-        self._bounce = value
-
-    def _get_edges(self) -> str:
-        return self._edges
-
-    def _set_edges(self, value: str) -> None:
-        self._edges = value
 
     def _enable_event_detect(self) -> None:
         self._watched = True

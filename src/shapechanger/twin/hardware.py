@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any
 
+from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.twin.messages import (
     BoardPins,
     ClaimPin,
+    InstructServos,
     PulsePin,
     ReadChip,
     WriteChip,
 )
-
-if TYPE_CHECKING:  # The SDK of the servos is an extra of its own.
-    from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-    from shapechanger.twin.servos.port import ServoPort
-
-_POLL_NS: Final = 2_000_000
-"""A servo bus that was asked less than this ago has nothing new; asking costs a busy board time."""
 
 
 class TwinBus:
@@ -105,27 +101,54 @@ class TwinServoPins:
         self._pulses.clear()
 
 
+class TwinServoPort:
+    """Port of the servo bus; see `ServoPort`. Its servos answer at once or not at all.
+
+    Args:
+        board: The servos.
+        device: Name of the bus.
+
+    Attributes:
+        has_stray: False: no answer is late.
+    """
+
+    def __init__(self, board: BoardPins, device: str) -> None:
+        self._board = board
+        self._device = device
+        self.has_stray = False
+
+    def exchange(
+        self,
+        servo_id: int,
+        instruction: int,
+        parameters: bytes,
+        ids: Sequence[int],
+        length: int,
+    ) -> dict[int, ServoReply]:
+        """Send an instruction and return the replies; see `ServoPort.exchange`."""
+        request = InstructServos(
+            device=self._device, servo_id=servo_id, instruction=instruction, parameters=parameters
+        )
+        return self._board.ask(request, dict[int, ServoReply])
+
+    def close(self) -> None:
+        """Do nothing: the bus outlives the port."""
+
+
 class TwinHardware:
     """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`.
 
     Args:
-        board: Pins and chips.
+        board: Pins, chips and servos.
         clock: Time.
-        open_servo_port: Opens the port of the servo bus.
 
     Attributes:
-        board: Pins and chips.
+        board: Pins, chips and servos.
         clock: Time.
     """
 
-    def __init__(
-        self,
-        board: BoardPins,
-        clock: Clock,
-        open_servo_port: Callable[[BusSettings], ServoPort],
-    ) -> None:
+    def __init__(self, board: BoardPins, clock: Clock) -> None:
         self.board = board
-        self._open_servo_port = open_servo_port
         self._pin_factory: Any = None
         self.clock = clock
 
@@ -145,13 +168,9 @@ class TwinHardware:
         """Return the pins that send servo pulses."""
         return TwinServoPins(self.board, self.clock)
 
-    def servo_port(self, settings: BusSettings) -> ServoPort:
-        """Open the port of the servo bus.
-
-        Raises:
-            RobotError: If the board has no servo bus at that device.
-        """
-        return self._open_servo_port(settings)
+    def servo_port(self, settings: BusSettings) -> TwinServoPort:
+        """Return the port of the servo bus; its first use fails if the board has no such bus."""
+        return TwinServoPort(self.board, settings.device)
 
     def close(self) -> None:
         """Let go of the pins and leave the board."""
@@ -171,21 +190,4 @@ def connect(path: str) -> TwinHardware:
     """
     client = BoardClient(path, "hardware")
     clock = GrantedClock(client, path) if client.clock == "twin" else SteadyClock(client)
-
-    def open_servo_port(settings: BusSettings) -> ServoPort:
-        from shapechanger.twin.servos.port import ServoPort
-
-        asked_ns = 0
-
-        def exchange(data: bytes) -> bytes:
-            nonlocal asked_ns
-            now_ns = clock.now_ns()
-            if not data and asked_ns and now_ns - asked_ns <= _POLL_NS:
-                return b""
-            asked_ns = now_ns
-            return client.exchange_servo_bytes(settings.device, data)
-
-        exchange(b"")  # Refused where the device is not the board's.
-        return ServoPort(exchange, settings.baud)
-
-    return TwinHardware(client, clock, open_servo_port)
+    return TwinHardware(client, clock)

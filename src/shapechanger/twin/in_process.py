@@ -19,20 +19,15 @@ from shapechanger.errors import RobotError
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.drivers.settings import number
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.hardware import TwinHardware
-from shapechanger.twin.messages import PinRequest
-from shapechanger.twin.pin_board import Owner, PinBoard
-from shapechanger.twin.sensors import Surroundings
+from shapechanger.twin.messages import HardwareRequest
+from shapechanger.twin.pin_board import PinBoard
 from shapechanger.twin.server import START_NS
-from shapechanger.twin.servos.port import ServoPort
-from shapechanger.twin.servos.rig import Rig
-from shapechanger.twin.signals import NoLedger
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
@@ -43,52 +38,62 @@ _SESSION: Final = 1
 _MAX_ARM_TICKS: Final = 10
 
 
-class LocalPins:
-    """The pins of a board in this process, which is the only one to use them; see `BoardPins`.
+class LocalBoard:
+    """A board with its world in this process, whose time only `advance` moves.
+
+    It is the board of the only process that uses it, and that process's clock; see `BoardPins` and
+    `Clock`.
 
     Args:
-        pins: Pins and chips of the board.
+        wiring: What is attached to the pins.
+        world: World of the robot.
+        seed: Seed of the phase of software PWM.
+
+    Attributes:
+        pid: This process, which owns the pins.
+        pins: Pins, chips and servos.
+        hardware: Hardware for a guard in this process.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called with pin, level and time of each edge.
+        closed: Whether `close` was called.
     """
 
-    def __init__(self, pins: PinBoard) -> None:
-        self._pins = pins
-        self._owner = Owner(self, os.getpid())
+    def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
+        self._now_ns = START_NS
+        self.pid = os.getpid()
+        self.pins = PinBoard(wiring, world, None, seed, START_NS)
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self.closed = False
+        self.hardware = TwinHardware(self, self)
 
-    def post(self, request: PinRequest) -> None:
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds."""
+        return self._now_ns
+
+    def advance(self, now_ns: int) -> None:
+        """Advance time, the world and the sensors."""
+        self._now_ns = now_ns
+        for t, pin, level in self.pins.advance(now_ns):
+            if pin in self.levels:
+                self.levels[pin] = level
+                if self.on_edge is not None:
+                    self.on_edge(pin, level, t)
+
+    def post(self, request: HardwareRequest) -> None:
         """Execute a request."""
-        self._pins.execute(self._owner, request)
+        self.pins.execute(self, request)
 
-    def ask(self, request: PinRequest, kind: Any = None) -> Any:
-        """Execute a request and return its result."""
-        return self._pins.execute(self._owner, request)
+    def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
+        """Execute a request and return its result; see `BoardPins.ask`."""
+        return self.pins.execute(self, request)
 
     def drain(self) -> None:
-        """Do nothing: edges arrive by `report_edge`."""
-
-    def report_edge(self, pin: int, level: int, at_ns: int) -> None:
-        """Take the change of an input, if it is claimed."""
-        if pin in self.levels:
-            self.levels[pin] = level
-            if self.on_edge is not None:
-                self.on_edge(pin, level, at_ns)
+        """Do nothing: edges arrive with `advance`."""
 
     def close(self) -> None:
         """Use the pins no more."""
         self.closed = True
-
-
-class LocalClock:
-    """The time of a board in this process, which only `LocalBoard.advance` moves."""
-
-    def __init__(self) -> None:
-        self.time_ns = START_NS
-
-    def now_ns(self) -> int:
-        """Return the time in nanoseconds."""
-        return self.time_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
         """Refuse: the caller is the one who would have to advance the board."""
@@ -97,53 +102,6 @@ class LocalClock:
     async def sleep(self, seconds: float) -> int | None:
         """Refuse; see `wait`."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
-
-
-class LocalBoard:
-    """A board with its world in this process.
-
-    Args:
-        wiring: What is attached to the pins.
-        world: World of the vehicle.
-        seed: Seed of the phase of software PWM.
-
-    Attributes:
-        pins: Pins and chips.
-        hardware: Hardware for a guard in this process.
-        rig: Servos on a bus; None without any.
-    """
-
-    def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
-        self._clock = LocalClock()
-        self._surroundings = Surroundings(wiring, world, self._clock.time_ns)
-        self.pins = PinBoard(wiring, world, self._surroundings.sensors, NoLedger(), seed)
-        self._local_pins = LocalPins(self.pins)
-        self.rig = self._surroundings.rig
-        self.hardware = TwinHardware(self._local_pins, self._clock, self._open_servo_port)
-
-    @property
-    def now_ns(self) -> int:
-        """Time in nanoseconds."""
-        return self._clock.time_ns
-
-    def advance(self, now_ns: int) -> None:
-        """Advance time, the world and the sensors."""
-        self._clock.time_ns = now_ns
-        for t, pin, level in self._surroundings.advance(now_ns, self.pins.levels):
-            self._local_pins.report_edge(pin, level, t)
-
-    def _open_servo_port(self, settings: BusSettings) -> ServoPort:
-        if self.rig is None:
-            raise RobotError(f"There is no {settings.device} at this twin.")
-        self.rig.require(settings.device)
-        bus = self.rig.bus
-
-        def exchange(data: bytes) -> bytes:
-            if data:
-                bus.receive(data)
-            return bus.send()
-
-        return ServoPort(exchange, settings.baud)
 
 
 class _Orders:
@@ -230,7 +188,7 @@ class InProcessRobot:
     @property
     def now_ns(self) -> int:
         """Time of the robot in nanoseconds."""
-        return self._board.now_ns
+        return self._board.now_ns()
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
         """Restart the robot, arm it, and place it at a start.
@@ -264,7 +222,7 @@ class InProcessRobot:
             The observation at the end of the period, and whether the robot bumped into something.
         """
         bumps = self._state.bumps
-        self._command_ns = self._board.now_ns
+        self._command_ns = self._board.now_ns()
         self._seq += 1
         self._orders.waiting.append(
             Order(
@@ -273,7 +231,7 @@ class InProcessRobot:
                 seq=self._seq,
                 issued_ns=self._command_ns,
                 ttl_ms=self._profile.limits.deadline_ms,
-                frame_ns=self._board.now_ns,
+                frame_ns=self._board.now_ns(),
                 values=tuple(values),
             )
         )
@@ -289,7 +247,7 @@ class InProcessRobot:
         self._orders.refused = refused = ""  # An earlier refusal is about something else.
         seen = self._state.emergencies
         for _ in range(_MAX_ARM_TICKS):
-            now_ns = self._board.now_ns
+            now_ns = self._board.now_ns()
             self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
             self._advance(self._tick_ns)
             refused = self.refused
@@ -298,13 +256,8 @@ class InProcessRobot:
         raise RobotError(f"The robot does not arm: {refused or self._state.stop_reason}")
 
     @property
-    def rig(self) -> Rig | None:
-        """Servos on a bus, since the last start; None without any."""
-        return self._board.rig
-
-    @property
     def pins(self) -> PinBoard:
-        """Pins and chips, since the last start."""
+        """Pins, chips and servos, since the last start."""
         return self._board.pins
 
     @property
@@ -341,9 +294,9 @@ class InProcessRobot:
         guard, board = self._guard, self._board
         if guard is None:
             raise RobotError("This robot is closed.")
-        end_ns = board.now_ns + ns
-        while board.now_ns < end_ns:
-            now_ns = min(board.now_ns + self._tick_ns, end_ns)
+        end_ns = board.now_ns() + ns
+        while board.now_ns() < end_ns:
+            now_ns = min(board.now_ns() + self._tick_ns, end_ns)
             board.advance(now_ns)
             guard.round(now_ns)
 
@@ -363,10 +316,10 @@ class InProcessRobot:
             jpeg = simplejpeg.encode_jpeg(
                 np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
             )
-            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns))
+            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns()))
         return build_observation(
             seq=self._observed,
-            now_ns=self._board.now_ns,
+            now_ns=self._board.now_ns(),
             reader=self._reader,
             state=self._state,
             newest=newest,

@@ -76,13 +76,13 @@ class ConnectClient(_Request):
     pid: int
 
 
-class _PinRequest(_Request, kw_only=True):
-    """A request about a pin or chip, at a time in ns; a board with a twin's clock sets its own."""
+class _HardwareRequest(_Request, kw_only=True):
+    """A request of a robot's process, at a time in ns; a board with a twin's clock sets its own."""
 
     t: int = 0
 
 
-class ClaimPin(_PinRequest):
+class ClaimPin(_HardwareRequest):
     """Claim a pin, answered by its level; refused while another process holds it.
 
     Attributes:
@@ -98,7 +98,7 @@ class ClaimPin(_PinRequest):
     level: int = 0
 
 
-class DrivePin(_PinRequest):
+class DrivePin(_HardwareRequest):
     """Set the level of an output (`hz` 0), or the duty of its software PWM."""
 
     pin: int
@@ -106,7 +106,7 @@ class DrivePin(_PinRequest):
     hz: int
 
 
-class PulsePin(_PinRequest):
+class PulsePin(_HardwareRequest):
     """Send servo pulses on an output; a width of 0 us ends them."""
 
     pin: int
@@ -114,7 +114,7 @@ class PulsePin(_PinRequest):
     hz: int
 
 
-class ReadChip(_PinRequest):
+class ReadChip(_HardwareRequest):
     """Read registers of an I2C chip, answered by their bytes; an `errno` if no chip answers."""
 
     bus: int
@@ -123,7 +123,7 @@ class ReadChip(_PinRequest):
     length: int
 
 
-class WriteChip(_PinRequest):
+class WriteChip(_HardwareRequest):
     """Write registers of an I2C chip; an `errno` if no chip answers."""
 
     bus: int
@@ -132,11 +132,13 @@ class WriteChip(_PinRequest):
     data: list[int]
 
 
-class ExchangeServoBytes(_Request):
-    """Send bytes to the servo bus, answered by the bytes that have arrived from it."""
+class InstructServos(_HardwareRequest):
+    """Send an instruction to the servo bus, answered by the replies of the servos, by id."""
 
     device: str
-    data: bytes
+    servo_id: int
+    instruction: int
+    parameters: bytes
 
 
 class WaitForGrant(_Request):
@@ -155,104 +157,22 @@ class LeaveBoard(_Request):
     """Last message of a client that closes its connection in order."""
 
 
-class PlaceVehicle(_Request):
-    """Place the vehicle at the start that follows from a seed."""
+class OperatorRequest(_Request):
+    """Do what a person beside the robot does, or read the truth; see `Operator`.
 
-    seed: int
+    Attributes:
+        action: What to do.
+        values: Arguments of the action.
+    """
 
-
-class PutVehicleBack(_Request):
-    """Put a vehicle that has collided back on its lane."""
-
-
-class LayOutCourse(_Request):
-    """Replace the surroundings of the vehicle."""
-
-    seed: int
+    action: str
+    values: tuple[bool | int | float | str | None, ...] = ()
 
 
-class BreakCamera(_Request):
-    """Make the camera fail; "" repairs it."""
-
-    fault: str
-
-
-class PressButton(_Request):
-    """Press or release all bumpers ("bumper") or the stop button ("stop")."""
-
-    button: str
-    down: bool
-
-
-class SetBattery(_Request):
-    """Set the battery's voltage without load; None for a full one."""
-
-    volts: float | None
-
-
-class SetDistance(_Request):
-    """Override what distance sensors measure; None restores the truth, `dead` silences them."""
-
-    metres: float | None
-    dead: bool
-
-
-class BreakChip(_Request):
-    """Make an I2C chip stop answering, or answer again."""
-
-    bus: int
-    address: int
-    dead: bool
-
-
-class BreakServo(_Request):
-    """Make the servo of a tendon fail; "" repairs what can be repaired."""
-
-    tendon: str
-    fault: str
-
-
-class BreakMagnet(_Request):
-    """Change the magnet of a joint's encoder; "" repairs it."""
-
-    joint: str
-    fault: str
-
-
-class ReadTensions(_Request):
-    """Ask for the tension of each tendon, N, by name."""
-
-
-class ReadLevels(_Request):
-    """Ask for the state of all outputs, a `Levels`."""
-
-
-class ReadWhereabouts(_Request):
-    """Ask for the true state of the vehicle, a `Whereabouts`."""
-
-
-PinRequest = ClaimPin | DrivePin | PulsePin | ReadChip | WriteChip
+HardwareRequest = ClaimPin | DrivePin | PulsePin | ReadChip | WriteChip | InstructServos
 
 Request = (
-    ConnectClient
-    | PinRequest
-    | ExchangeServoBytes
-    | WaitForGrant
-    | SleepOnBoard
-    | LeaveBoard
-    | PlaceVehicle
-    | PutVehicleBack
-    | LayOutCourse
-    | BreakCamera
-    | PressButton
-    | SetBattery
-    | SetDistance
-    | BreakChip
-    | BreakServo
-    | BreakMagnet
-    | ReadTensions
-    | ReadLevels
-    | ReadWhereabouts
+    ConnectClient | HardwareRequest | WaitForGrant | SleepOnBoard | LeaveBoard | OperatorRequest
 )
 
 
@@ -303,7 +223,7 @@ decode_event: Callable[[bytes], BoardEvent] = msgspec.msgpack.Decoder(BoardEvent
 
 
 class BoardPins(Protocol):
-    """Pins and chips of a board: in this process, or over the socket of another.
+    """Pins, chips and servos of a board: in this process, or over the socket of another.
 
     Attributes:
         levels: Level of each pin that is claimed as an input.
@@ -318,11 +238,11 @@ class BoardPins(Protocol):
         """True if `close` was called."""
         ...
 
-    def post(self, request: PinRequest) -> None:
+    def post(self, request: HardwareRequest) -> None:
         """Send a request that has no result."""
         ...
 
-    def ask(self, request: PinRequest, kind: Any = None) -> Any:
+    def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
         """Send a request and return its result.
 
         Args:

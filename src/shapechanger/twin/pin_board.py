@@ -1,39 +1,38 @@
-"""The board's pins and chips: their owners, and the levels that stay when a process dies."""
+"""Pins, chips and servos of the board: their owners, and the levels that outlive a process."""
 
 from __future__ import annotations
 
 import errno
 import random
-from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a, chips_of
 from shapechanger.twin.messages import (
     ClaimPin,
     DrivePin,
-    PinRequest,
+    Edge,
+    HardwareRequest,
+    InstructServos,
     PulsePin,
     ReadChip,
     WriteChip,
 )
-from shapechanger.twin.sensors import PinSensors
-from shapechanger.twin.signals import Ledger, Levels, Pulse, PwmChannel
+from shapechanger.twin.sensors import Surroundings
+from shapechanger.twin.servos.rig import Rig
+from shapechanger.twin.signals import LedgerWriter, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.worlds.world import World
 
 
-@dataclass(frozen=True, slots=True)
-class Owner:
-    """A process that holds pins.
+class Owner(Protocol):
+    """Connection of a process that holds pins; two connections of one process are two owners.
 
     Attributes:
-        connection: Identity of the process; two connections of one process are two owners.
         pid: Process id.
     """
 
-    connection: Hashable
     pid: int
 
 
@@ -48,28 +47,27 @@ class _Claim:
 
 
 class PinBoard:
-    """Pins, pulses and chips, with a record of their changes in the ledger.
+    """Pins, pulses, chips and servos, with the world that moves their sensors.
 
     Args:
         wiring: What is attached; it gives undriven pins their level.
-        world: What the chips measure.
-        sensors: Sensors on input pins; they see each change of an output.
-        ledger: Record of changes.
+        world: World of the robot.
+        ledger: Record of the changes of outputs; None to keep none.
         seed: Seed of the phase of software PWM.
+        now_ns: Time, ns.
 
     Attributes:
         levels: State of all outputs.
         sensors: Sensors on input pins.
+        rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
+
+    Raises:
+        RobotError: If the world does not fit the robot.
     """
 
     def __init__(
-        self,
-        wiring: TwinWiring,
-        world: World,
-        sensors: PinSensors,
-        ledger: Ledger,
-        seed: int,
+        self, wiring: TwinWiring, world: World, ledger: LedgerWriter | None, seed: int, now_ns: int
     ) -> None:
         self._wiring = wiring
         self._chips = chips_of(wiring.plan, world)
@@ -77,18 +75,30 @@ class PinBoard:
         self._random = random.Random(f"phase {seed}")
         self._claims: dict[int, _Claim] = {}
         self.levels = Levels()
-        self.sensors = sensors
+        self._surroundings = Surroundings(wiring, world, now_ns)
+        self.sensors = self._surroundings.sensors
+        self.rig = self._surroundings.rig
         self.dead_chips: set[tuple[int, int]] = set()
         for address, chip in self._chips.items():
             if isinstance(chip, SimulatedPca9685):
                 self._update_channels(address, chip)
+
+    def advance(self, now_ns: int) -> list[Edge]:
+        """Advance the world to a time and return the edges of inputs on the way."""
+        return self._surroundings.advance(now_ns, self.levels)
+
+    def require_rig(self) -> Rig:
+        """Return the servos; raise RobotError if there are none."""
+        if self.rig is None:
+            raise RobotError("This twin has no servo bus.")
+        return self.rig
 
     def owner(self, pin: int) -> Owner | None:
         """Return the owner of a pin; None for a free one."""
         claim = self._claims.get(pin)
         return None if claim is None else claim.owner
 
-    def execute(self, owner: Owner, request: PinRequest) -> object:
+    def execute(self, owner: Owner, request: HardwareRequest) -> object:
         """Execute a request and return its result.
 
         Args:
@@ -111,6 +121,10 @@ class PinBoard:
                 )
             case WriteChip():
                 self._write_chip(owner.pid, request)
+            case InstructServos():
+                rig = self.require_rig()
+                rig.require(request.device)
+                return rig.bus.execute(request.servo_id, request.instruction, request.parameters)
             case ClaimPin():
                 return self._claim(owner, request)
         return None
@@ -124,9 +138,9 @@ class PinBoard:
             died: Whether it ended without closing its pins.
         """
         if died:
-            self._ledger.write(t, "gone", pid=owner.pid)
+            self._record(t, "gone", pid=owner.pid)
         for pin, claim in sorted(self._claims.items()):
-            if claim.owner != owner:
+            if claim.owner is not owner:
                 continue
             claim.owner = None
             if claim.mode != "output" or not (died or claim.hz):
@@ -136,9 +150,7 @@ class PinBoard:
                 period_ns = 1e9 / claim.hz
                 duty = float((t - claim.phase_ns) % period_ns < duty * period_ns)
             claim.hz = 0
-            self.levels.drive(pin, duty, t)
-            self._ledger.write(t, "pin", pin=pin, duty=duty, hz=0, pid=owner.pid)
-            self.sensors.output_changed(t, pin, duty)
+            self._drive(owner.pid, pin, duty, 0, t)
 
     def encoder(self, joint: str) -> SimulatedAs5600:
         """Return the encoder of a joint.
@@ -153,11 +165,15 @@ class PinBoard:
             raise UnknownName("joint with an encoder", joint, encoders)
         return encoders[joint]
 
+    def _record(self, t: int, kind: str, **fields: Any) -> None:
+        if self._ledger is not None:
+            self._ledger.write(t, kind, **fields)
+
     def _claim(self, owner: Owner, request: ClaimPin) -> int:
         """Return the level of the pin; for an input that of its sensor, pull or resistors."""
         pin, t = request.pin, request.t
         claim = self._claims.setdefault(pin, _Claim())
-        if claim.owner is not None and claim.owner != owner:
+        if claim.owner is not None and claim.owner is not owner:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
         claim.owner, claim.mode, claim.hz = owner, request.mode, 0
         if request.mode == "output":
@@ -166,9 +182,7 @@ class PinBoard:
         idle = self._wiring.idle_level(pin)
         if pin in self.levels.duties:
             self.levels.release(pin)
-            self._ledger.write(
-                t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True
-            )
+            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
             self.sensors.output_changed(t, pin, float(idle))
         if request.pull != "floating":
             idle = int(request.pull == "up")
@@ -180,7 +194,7 @@ class PinBoard:
         pulse = Pulse(us, hz)
         if self.levels.pulses.get(pin) != pulse:
             self.levels.pulse(pin, pulse)
-            self._ledger.write(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+            self._record(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
 
     def _write_chip(self, pid: int, request: WriteChip) -> None:
         t, bus, address = request.t, request.bus, request.address
@@ -189,11 +203,11 @@ class PinBoard:
         if isinstance(chip, Tca9548a):
             return  # It moves nothing, and hundreds of writes a second would fill the ledger.
         at = {"bus": bus, "address": address}
-        self._ledger.write(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
+        self._record(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
         if isinstance(chip, SimulatedPca9685):
             for channel, pulse in self._update_channels((bus, address), chip):
                 us, hz = round(pulse.us, 3), round(pulse.hz, 3)
-                self._ledger.write(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
+                self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
 
     def _update_channels(
         self, at: tuple[int, int], chip: SimulatedPca9685
@@ -210,7 +224,7 @@ class PinBoard:
 
     def _output(self, owner: Owner, pin: int) -> _Claim:
         claim = self._claims.get(pin)
-        if claim is None or claim.owner != owner or claim.mode != "output":
+        if claim is None or claim.owner is not owner or claim.mode != "output":
             raise RobotError(f"Process {owner.pid} does not hold GPIO{pin} as an output.")
         return claim
 
@@ -221,7 +235,7 @@ class PinBoard:
 
     def _drive(self, pid: int, pin: int, duty: float, hz: float, t: int) -> None:
         self.levels.drive(pin, duty, t)
-        self._ledger.write(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
+        self._record(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
         self.sensors.output_changed(t, pin, duty)
 
     def _chip(self, bus: int, address: int) -> Chip:

@@ -24,26 +24,10 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.board_client import BoardClient
 from shapechanger.twin.camera import CameraFault
 from shapechanger.twin.chips import Magnet
-from shapechanger.twin.messages import (
-    BreakCamera,
-    BreakChip,
-    BreakMagnet,
-    BreakServo,
-    LayOutCourse,
-    PlaceVehicle,
-    PressButton,
-    PutVehicleBack,
-    ReadLevels,
-    ReadTensions,
-    ReadWhereabouts,
-    SetBattery,
-    SetDistance,
-    SleepOnBoard,
-    SleepResult,
-    Whereabouts,
-)
+from shapechanger.twin.messages import OperatorRequest, SleepOnBoard, SleepResult, Whereabouts
 from shapechanger.twin.servos.rig import ServoFault
 from shapechanger.twin.signals import Levels
+from shapechanger.twin.start import BoardAt
 
 
 class Operator:
@@ -69,14 +53,14 @@ class Operator:
 
     def place(self, seed: int) -> None:
         """Place the vehicle at the start that follows from a seed."""
-        self._client.ask(PlaceVehicle(seed=seed))
+        self._act("place", seed)
 
     def put_back(self) -> None:
         """Put a vehicle that has collided back on its lane, at rest, to continue from there.
 
         In the plain room, which has no lane, it returns to its start. Its truth counts on.
         """
-        self._client.ask(PutVehicleBack())
+        self._act("put_back")
 
     def lay_out(self, seed: int) -> None:
         """Replace the surroundings, and place the vehicle at a start in them.
@@ -85,7 +69,7 @@ class Operator:
         for the first `put_back` on it. On a busy machine a guard in real time may then be taken for
         dead; a twin that is started with another seed has no such wait.
         """
-        self._client.ask(LayOutCourse(seed=seed))
+        self._act("lay_out", seed)
 
     def advance(self, seconds: float) -> int:
         """Advance the twin's clock and return its time in nanoseconds.
@@ -97,19 +81,19 @@ class Operator:
 
     def break_camera(self, fault: CameraFault) -> None:
         """Make the camera fail; "" repairs it."""
-        self._client.ask(BreakCamera(fault=fault))
+        self._act("camera", fault)
 
     def press_bumper(self, down: bool = True) -> None:
         """Press or release all bumpers."""
-        self._client.ask(PressButton(button="bumper", down=down))
+        self._act("bumper", down)
 
     def press_stop(self, down: bool = True) -> None:
         """Press or release the emergency stop button."""
-        self._client.ask(PressButton(button="stop", down=down))
+        self._act("stop", down)
 
     def set_battery(self, volts: float | None) -> None:
         """Set the battery's voltage without load, V; None for a full one."""
-        self._client.ask(SetBattery(volts=volts))
+        self._act("battery", None if volts is None else float(volts))
 
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
         """Override what distance sensors measure.
@@ -118,7 +102,7 @@ class Operator:
             metres: Distance, m; None for the truth.
             dead: Whether they do not answer at all.
         """
-        self._client.ask(SetDistance(metres=metres, dead=dead))
+        self._act("distance", None if metres is None else float(metres), dead)
 
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
         """Make an I2C chip stop answering, or answer again.
@@ -128,31 +112,44 @@ class Operator:
             address: Address on the bus.
             dead: Whether it stops answering.
         """
-        self._client.ask(BreakChip(bus=bus, address=address, dead=dead))
+        self._act("chip", bus, address, dead)
 
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
-        """Make the servo of a tendon fail; "" repairs what can be repaired."""
-        self._client.ask(BreakServo(tendon=tendon, fault=fault))
+        """Make the servo of a tendon fail.
+
+        Args:
+            tendon: Name of the tendon.
+            fault: The fault; "" repairs what can be repaired.
+        """
+        self._act("servo", tendon, fault)
 
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
-        """Change the magnet of a joint's encoder; "" repairs it."""
-        self._client.ask(BreakMagnet(joint=joint, fault=state))
+        """Change the magnet of a joint's encoder.
+
+        Args:
+            joint: Name of the joint.
+            state: State of the magnet; "" repairs it.
+        """
+        self._act("magnet", joint, state)
 
     def tensions(self) -> dict[str, float]:
         """Return the tension of each tendon on the servo bus, N, by name."""
-        return self._client.ask(ReadTensions(), dict[str, float])
+        return self._act("tensions", kind=dict[str, float])
 
     def levels(self) -> Levels:
         """Return the state of all outputs."""
-        return self._client.ask(ReadLevels(), Levels)
+        return self._act("levels", kind=Levels)
 
     def where(self) -> Whereabouts:
         """Return the true state of the vehicle."""
-        return self._client.ask(ReadWhereabouts(), Whereabouts)
+        return self._act("whereabouts", kind=Whereabouts)
 
     def close(self) -> None:
         """Leave the board."""
         self._client.close()
+
+    def _act(self, action: str, *values: bool | int | float | str | None, kind: Any = None) -> Any:
+        return self._client.ask(OperatorRequest(action=action, values=values), kind)
 
 
 _READY: Final = "ready.json"
@@ -212,7 +209,7 @@ class RunningRobot:
     @property
     def ledger_path(self) -> Path:
         """Ledger of the twin."""
-        return self.folder / "ledger.jsonl"
+        return BoardAt(self.folder).ledger_path
 
     @property
     def known(self) -> KnownRobot:
@@ -230,7 +227,7 @@ class RunningRobot:
 
     def operator(self) -> Operator:
         """Connect an operator to its twin."""
-        return Operator(str(self.folder / "board.socket"))
+        return Operator(BoardAt(self.folder).socket_path)
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
         """Return the process id of a program of the robot.

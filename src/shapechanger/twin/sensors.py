@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from typing import Final, Protocol
+from typing import Final
 
 from shapechanger.robot.drivers.settings import number, text, whole, wholes
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
@@ -21,10 +21,6 @@ _NO_ECHO_NS: Final = 38_000_000
 _NEAREST_M: Final = 0.02
 _FARTHEST_M: Final = 4.0
 _SOUND_M_PER_S: Final = 343.2
-
-
-class _Sensor(Protocol):
-    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]: ...
 
 
 class _Encoder:
@@ -123,7 +119,6 @@ class PinSensors:
         self._encoders = [_Encoder(one, rolled_m) for one in encoders]
         self._bumpers = [_Bumper(one) for one in plan.sensors if one.driver == "switch"]
         self._distances = [_Distance(one, world) for one in plan.sensors if one.driver == "hcsr04"]
-        self._sensors: list[_Sensor] = [*self._encoders, *self._bumpers]
         self._stop_pin = plan.stop_pin
         self._due: list[Edge] = []
         self.levels: dict[int, int] = {}
@@ -146,7 +141,7 @@ class PinSensors:
             seen: Current state of the world.
         """
         found: list[Edge] = []
-        for sensor in self._sensors:
+        for sensor in (*self._encoders, *self._bumpers):
             found += sensor.edges(start_ns, end_ns, seen)
         while self._due and self._due[0].t <= end_ns:
             found.append(heapq.heappop(self._due))
@@ -156,14 +151,25 @@ class PinSensors:
         return found
 
     def output_changed(self, t: int, pin: int, level: float) -> None:
-        """Let a distance sensor ping when its trigger, an output, falls."""
+        """Let a distance sensor ping when its trigger, an output, falls.
+
+        Args:
+            t: Time, ns.
+            pin: BCM number of the output.
+            level: Its level or duty, 0 to 1.
+        """
         for sensor in self._distances:
             if sensor.trigger == pin and level == 0.0:
                 for edge in sensor.ping(t):
                     heapq.heappush(self._due, edge)
 
     def press_stop(self, down: bool, t: int) -> None:
-        """Press or release the stop button."""
+        """Press or release the stop button.
+
+        Args:
+            down: Whether to press it.
+            t: Time, ns.
+        """
         if self._stop_pin is not None:
             heapq.heappush(self._due, Edge(t, self._stop_pin, int(not down)))
 
@@ -205,15 +211,15 @@ class SpeedController:
         self._braked = False
         self._reverses = False
 
-    def obey(self, value: float, pulses: bool, now_ns: int) -> float:
+    def obey(self, value: float | None, now_ns: int) -> float:
         """Return the value for the motor, -1 to 1.
 
         Args:
-            value: Value of the pulses, -1 to 1.
-            pulses: Whether there are pulses; without, it stops and must see neutral again.
+            value: Value of the pulses, -1 to 1; None without pulses or power, when it stops and
+                must see neutral again.
             now_ns: Time, ns.
         """
-        if not pulses:
+        if value is None:
             self._neutral_since_ns = None
             self._armed = self._braked = self._reverses = False
             return 0.0
@@ -267,7 +273,12 @@ class Surroundings:
         }
 
     def advance(self, now_ns: int, levels: Levels) -> list[Edge]:
-        """Advance the world to a time and return the edges of inputs on the way."""
+        """Advance the world to a time and return the edges of inputs on the way.
+
+        Args:
+            now_ns: The time, ns.
+            levels: State of all outputs.
+        """
         start_ns = self.now_ns
         if now_ns > start_ns:
             if self.rig is not None:
@@ -283,8 +294,7 @@ class Surroundings:
             part = self._wiring.outputs[name].part
             shares = values.setdefault(part, [])
             if name in self._controllers:
-                pulses = self._wiring.has_pulses(name, levels, self.now_ns)
-                value = self._controllers[name].obey(value or 0.0, pulses, self.now_ns)
+                value = self._controllers[name].obey(value, self.now_ns)
             if value is not None:
                 shares.append(value)
         return {part: sum(got) / len(got) if got else None for part, got in values.items()}

@@ -1,4 +1,4 @@
-"""The board's server: its clients, and what they may do with pins and chips."""
+"""Server of the board: connections to its clients, and their requests."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from shapechanger.twin.messages import (
     ConnectClient,
     DrivePin,
     Edge,
+    HardwareRequest,
     InputEdges,
+    InstructServos,
     LeaveBoard,
-    PinRequest,
     PulsePin,
     ReadChip,
     Request,
@@ -33,7 +34,7 @@ from shapechanger.twin.messages import (
     decode_request,
     encode,
 )
-from shapechanger.twin.pin_board import Owner, PinBoard
+from shapechanger.twin.pin_board import PinBoard
 
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
@@ -57,7 +58,7 @@ class BoardConnection:
 
     Attributes:
         role: Role of the client.
-        owner: Owner of the pins that it claims.
+        pid: Process id of the client.
         inputs: Pins whose edges it receives.
         takes_part: Whether time waits for it.
         works: Whether it has a grant that it has not finished.
@@ -70,7 +71,7 @@ class BoardConnection:
         self._socket = connected
         self._outbox: deque[bytes] = deque()
         self.role: Role = "clock"
-        self.owner = Owner(self, 0)
+        self.pid = 0
         self.inputs: set[int] = set()
         self.takes_part = False
         self.works = False
@@ -103,7 +104,7 @@ class BoardConnection:
         try:
             return decode_request(data)
         except msgspec.MsgspecError as error:
-            _log.warning("process %d sends a malformed request: %s", self.owner.pid, error)
+            _log.warning("process %d sends a malformed request: %s", self.pid, error)
             raise EOFError from error
 
     def send(self, event: BoardEvent) -> None:
@@ -147,7 +148,7 @@ class BoardConnection:
 
 
 Operate = Callable[[BoardConnection, Request], Any]
-"""Executes a request about neither pins nor chips; returns its result, or `LATER`."""
+"""Executes a request of time or of an operator; returns its result, or `LATER`."""
 
 LATER: Final = object()
 """Result of a request that is answered later, or never."""
@@ -159,10 +160,10 @@ class BoardServer:
     Args:
         listening: Listening socket.
         owner_fd: Descriptor whose end ends the board.
-        pins: Pins and chips.
+        pins: Pins, chips and servos.
         clock: Kind of clock.
         now_ns: Time of that clock.
-        operate: Executes the requests that are not about pins and chips.
+        operate: Executes the requests of time and of operators.
     """
 
     def __init__(
@@ -220,13 +221,24 @@ class BoardServer:
                 self._watch(connection)
 
     def send(self, connection: BoardConnection, event: BoardEvent) -> None:
-        """Send a message to a client."""
+        """Send a message to a client, now or when it reads.
+
+        Args:
+            connection: The client.
+            event: The message.
+        """
         connection.send(event)
         if connection.wants_to_write:
             self._watch(connection)
 
     def reply(self, connection: BoardConnection, request_id: int, result: object) -> None:
-        """Send the result of a request."""
+        """Send the result of a request.
+
+        Args:
+            connection: The client.
+            request_id: Id of its request.
+            result: The result, which msgspec can encode.
+        """
         self.send(connection, BoardReply(request_id, msgspec.Raw(encode(result))))
 
     def close(self) -> None:
@@ -270,7 +282,7 @@ class BoardServer:
             number = refusal.errno or 0
         if request.id is None:
             if error or number:
-                _log.warning("process %d: %s", connection.owner.pid, error or f"errno {number}")
+                _log.warning("process %d: %s", connection.pid, error or f"errno {number}")
         elif error or number:
             self.send(connection, BoardReply(request.id, error=error, errno=number))
         elif result is not LATER:
@@ -280,11 +292,11 @@ class BoardServer:
         match request:
             case ClaimPin():
                 return self._claim(connection, request)
-            case DrivePin() | PulsePin() | ReadChip() | WriteChip():
-                return self._execute_on_pins(connection, request)
+            case DrivePin() | PulsePin() | ReadChip() | WriteChip() | InstructServos():
+                return self._execute_on_hardware(connection, request)
             case ConnectClient():
                 connection.role = request.role
-                connection.owner = Owner(connection, request.pid)
+                connection.pid = request.pid
                 return BoardGreeting(self._clock, self._now_ns())
             case LeaveBoard():
                 connection.has_left = True
@@ -294,17 +306,16 @@ class BoardServer:
                 return self._operate(connection, request)
         return None
 
-    def _execute_on_pins(self, connection: BoardConnection, request: PinRequest) -> object:
+    def _execute_on_hardware(self, connection: BoardConnection, request: HardwareRequest) -> object:
         if self._clock == "twin":
             request.t = self._now_ns()
-        return self._pins.execute(connection.owner, request)
+        return self._pins.execute(connection, request)
 
     def _claim(self, connection: BoardConnection, request: ClaimPin) -> object:
         holder = self._pins.owner(request.pin)
-        other = None if holder is None else holder.connection
-        if isinstance(other, BoardConnection) and other is not connection:
-            self._execute_all(other)  # It may have ended meanwhile.
-        level = self._execute_on_pins(connection, request)
+        if isinstance(holder, BoardConnection) and holder is not connection:
+            self._execute_all(holder)  # It may have ended meanwhile.
+        level = self._execute_on_hardware(connection, request)
         if request.mode == "input":
             connection.inputs.add(request.pin)
         else:
@@ -322,5 +333,5 @@ class BoardServer:
             return
         self._epoll.unregister(connection.fileno())
         if connection.role == "hardware":
-            self._pins.leave(connection.owner, self._now_ns(), died=not connection.has_left)
+            self._pins.leave(connection, self._now_ns(), died=not connection.has_left)
         connection.close()

@@ -27,7 +27,7 @@ import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -75,21 +75,6 @@ class Transition:
     what: str | None = None
 
 
-class Ledger(Protocol):
-    """Record of changes."""
-
-    def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Record a change."""
-        ...
-
-
-class NoLedger:
-    """A ledger that keeps nothing."""
-
-    def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Do nothing."""
-
-
 class LedgerWriter:
     """A ledger in a file.
 
@@ -102,7 +87,13 @@ class LedgerWriter:
         self._encoder = json.JSONEncoder(allow_nan=False)
 
     def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Append a line, which the kernel has when this returns."""
+        """Append a line, which the kernel has when this returns.
+
+        Args:
+            t: Time, ns.
+            kind: Kind of line; see the module.
+            **fields: Other fields of the line.
+        """
         line = self._encoder.encode({"t": t, "kind": kind, **fields}) + "\n"
         os.write(self._fd, line.encode())
 
@@ -168,7 +159,13 @@ class Levels:
     edges_ns: dict[int, int] = field(default_factory=dict[int, int])
 
     def drive(self, pin: int, duty: float, t: int) -> None:
-        """Drive a pin from a time `t` on."""
+        """Drive a pin.
+
+        Args:
+            pin: BCM number.
+            duty: Share of the time at which it is high, 0 to 1.
+            t: Time of the change, ns.
+        """
         if duty in (0.0, 1.0) and self.duties.get(pin, 0.0) == 1.0 - duty:
             self.edges_ns[pin] = t
         self.duties[pin] = duty
@@ -180,7 +177,12 @@ class Levels:
         self.pulses.pop(pin, None)
 
     def pulse(self, pin: int, pulse: Pulse) -> None:
-        """Send servo pulses on a pin."""
+        """Send servo pulses on a pin.
+
+        Args:
+            pin: BCM number.
+            pulse: The pulses.
+        """
         self.duties[pin] = pulse.us * pulse.hz / 1e6
         self.pulses[pin] = pulse
 

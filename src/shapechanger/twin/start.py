@@ -23,9 +23,6 @@ from shapechanger.twin.world.place import Place
 _HARDWARE: Final = "shapechanger.twin.hardware:connect"
 """Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 
-_SOCKET: Final = "board.socket"
-_LEDGER: Final = "ledger.jsonl"
-_FIFO: Final = "camera.mjpeg"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
 _MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
@@ -36,40 +33,47 @@ class BoardSettings(msgspec.Struct, frozen=True):
 
     Attributes:
         plan: The robot as it is wired, as the JSON of a `GuardPlan`.
-        socket: Path of the socket to listen on.
-        ledger: Path of the ledger to write.
+        folder: Folder of its files; see `BoardAt`.
         clock: Kind of clock.
         seed: Seed of everything random.
         one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
         place: Place of the robot.
         camera: Front camera; None without one.
-        fifo: Path of the pipe for its pictures.
     """
 
     plan: str
-    socket: str
-    ledger: str
+    folder: str
     clock: Literal["real", "twin"]
     seed: int
     one_shot_ms: float | None
     place: Place
     camera: CameraPlan | None
-    fifo: str
 
 
 @dataclass(frozen=True, slots=True)
 class BoardAt:
-    """Paths of a board.
+    """Files of a board.
 
     Attributes:
-        socket_path: Socket on which it listens; the argument of `_HARDWARE`.
-        ledger_path: Its ledger.
-        fifo_path: Pipe of its pictures; None without a camera.
+        folder: Their folder.
     """
 
-    socket_path: str
-    ledger_path: Path
-    fifo_path: Path | None
+    folder: Path
+
+    @property
+    def socket_path(self) -> str:
+        """Socket on which it listens; the argument of `_HARDWARE`."""
+        return str(self.folder / "board.socket")
+
+    @property
+    def ledger_path(self) -> Path:
+        """Its ledger."""
+        return self.folder / "ledger.jsonl"
+
+    @property
+    def fifo_path(self) -> Path:
+        """Pipe of its pictures; it exists only with a camera."""
+        return self.folder / "camera.mjpeg"
 
     @property
     def hardware(self) -> tuple[str, str]:
@@ -82,7 +86,7 @@ class BoardAt:
         Raises:
             RobotError: If the board has no camera.
         """
-        if self.fifo_path is None:
+        if not self.fifo_path.is_fifo():
             raise RobotError("This twin was started without a camera.")
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
 
@@ -121,19 +125,15 @@ class RunningBoard(BoardAt):
 
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
     """Return the board that runs in a folder, and its clock; None without one."""
-    folder = Path(folder).absolute()
-    socket_path = folder / _SOCKET
-    if not socket_path.is_socket():
+    board = BoardAt(Path(folder).absolute())
+    if not Path(board.socket_path).is_socket():
         return None
     try:
-        client = BoardClient(str(socket_path), "operator")
+        client = BoardClient(board.socket_path, "operator")
     except RobotError:
         return None
-    clock = client.clock
     client.close()
-    fifo_path = folder / _FIFO
-    found = BoardAt(str(socket_path), folder / _LEDGER, fifo_path if fifo_path.is_fifo() else None)
-    return found, clock
+    return board, client.clock
 
 
 def start_board(
@@ -160,27 +160,24 @@ def start_board(
         RobotError: If it does not start, or the folder cannot be used.
     """
     TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
-    folder = Path(folder).absolute()
-    socket_path, ledger_path, fifo_path = (folder / name for name in (_SOCKET, _LEDGER, _FIFO))
-    if len(os.fsencode(socket_path)) > _MAX_SOCKET_PATH:
-        raise RobotError(f"The path {socket_path} is too long for a socket.")
-    if not folder.is_dir():
-        raise RobotError(f"There is no folder {folder} for the twin: make it first.")
-    for left in (socket_path, ledger_path, fifo_path):
+    at = BoardAt(Path(folder).absolute())
+    if len(os.fsencode(at.socket_path)) > _MAX_SOCKET_PATH:
+        raise RobotError(f"The path {at.socket_path} is too long for a socket.")
+    if not at.folder.is_dir():
+        raise RobotError(f"There is no folder {at.folder} for the twin: make it first.")
+    for left in (at.socket_path, at.ledger_path, at.fifo_path):
         if os.path.lexists(left):
             raise RobotError(f"A twin has left {left}: give a folder without it.")
     if camera is not None:
-        os.mkfifo(fifo_path)
+        os.mkfifo(at.fifo_path)
     settings = BoardSettings(
         plan=wiring.to_json(),
-        socket=str(socket_path),
-        ledger=str(ledger_path),
+        folder=str(at.folder),
         clock=clock,
         seed=seed,
         one_shot_ms=one_shot_ms,
         place=place or Place(),
         camera=camera,
-        fifo=str(fifo_path),
     )
     ours, theirs = socket.socketpair()
     with theirs, tempfile.TemporaryFile() as file:
@@ -193,8 +190,7 @@ def start_board(
             pass_fds=fds,
             start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
-    pipe = None if camera is None else fifo_path
-    board = RunningBoard(str(socket_path), ledger_path, pipe, process, ours)
+    board = RunningBoard(at.folder, process, ours)
     ours.settimeout(_READY_S)
     try:
         ready = ours.recv(1)

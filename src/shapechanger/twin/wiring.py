@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
@@ -23,16 +22,13 @@ ONE_SHOT_MS: Final = 100.0
 _ESC_DEAD_BAND_US: Final = 20.0
 """Dead band of a speed controller on each side of neutral; makers state 10 to 50."""
 
-# Outputs whose power goes through the one-shot: motors, not steering servos or joints.
-_POWERED: Final = ("hbridge", "phase_enable", "esc")
-
 
 class WiredOutput(NamedTuple):
     """State of an output.
 
     Attributes:
-        value: Value from -1 to 1, as its driver takes it; None for a servo without pulses, which
-            has no torque.
+        value: Value from -1 to 1, as its driver takes it; None for a servo or speed controller
+            without pulses or power.
         at_rest: Whether it is in the state after a stop; a motor with any duty above 0 is not.
     """
 
@@ -40,21 +36,12 @@ class WiredOutput(NamedTuple):
     at_rest: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Output:
-    """An output, with its settings read once.
-
-    Attributes:
-        plan: The output.
-        propels: Whether it propels the robot.
-        state: Reads its state, apart from the motors' power.
-        pulse_us: Reads the width of its pulses, us; 0 for none.
-    """
-
-    plan: OutputPlan
-    propels: bool
-    state: Callable[[Levels], WiredOutput]
-    pulse_us: Callable[[Levels], float]
+# Outputs whose power goes through the one-shot: motors, not steering servos or joints.
+_UNPOWERED: Final = {
+    "hbridge": WiredOutput(0.0, True),
+    "phase_enable": WiredOutput(0.0, True),
+    "esc": WiredOutput(None, True),
+}
 
 
 class TwinWiring:
@@ -80,9 +67,10 @@ class TwinWiring:
         self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
         enables = (_output_enable(output) for output in plan.outputs)
         self._high = {pin for pin in enables if pin >= 0}
-        self._outputs = {output.name: self._build(output) for output in plan.outputs}
+        self._actions = {action.name: action for action in plan.actions}
+        self._states = {output.name: self._state(output) for output in plan.outputs}
         self.outputs: Mapping[str, OutputPlan] = {output.name: output for output in plan.outputs}
-        self.propelling = tuple(name for name, output in self._outputs.items() if output.propels)
+        self.propelling = tuple(name for name in self.outputs if self._propels(name))
 
     def idle_level(self, pin: int) -> int:
         """Return the level of an undriven pin.
@@ -100,46 +88,42 @@ class TwinWiring:
         return 0 if edge_ns is None else edge_ns + self._one_shot_ns
 
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
-        """Return the state of each output at a time."""
-        powered = self._is_powered(levels, now_ns)
+        """Return the state of each output, by name.
+
+        Args:
+            levels: Levels of all pins.
+            now_ns: Time, ns, by which the one-shot may have cut the power.
+        """
+        ends_ns = self.power_ends_ns(levels)
+        powered = ends_ns is None or now_ns < ends_ns
         return {
-            name: output.state(levels)
-            if powered or output.plan.driver not in _POWERED
-            else WiredOutput(0.0, True)
-            for name, output in self._outputs.items()
+            name: state(levels)
+            if powered or self.outputs[name].driver not in _UNPOWERED
+            else _UNPOWERED[self.outputs[name].driver]
+            for name, state in self._states.items()
         }
 
-    def has_pulses(self, name: str, levels: Levels, now_ns: int) -> bool:
-        """Return whether a servo or speed controller has pulses and power."""
-        return self._is_powered(levels, now_ns) and self._outputs[name].pulse_us(levels) > 0.0
+    def _propels(self, name: str) -> bool:
+        weights = self.outputs[name].mix.items()
+        return any(w and one in self._actions and self._actions[one].propels for one, w in weights)
 
-    def _is_powered(self, levels: Levels, now_ns: int) -> bool:
-        ends_ns = self.power_ends_ns(levels)
-        return ends_ns is None or now_ns < ends_ns
-
-    def _build(self, plan: OutputPlan) -> _Output:
-        actions = {action.name: action for action in self.plan.actions}
-        weights = {name: weight for name, weight in plan.mix.items() if name in actions}
-        rest = plan.offset + sum(weight * actions[name].rest for name, weight in weights.items())
-        rest = max(-1.0, min(1.0, rest))
-        propels = any(weight and actions[name].propels for name, weight in weights.items())
-        pulse_us: Callable[[Levels], float] = _no_pulses
+    def _state(self, plan: OutputPlan) -> Callable[[Levels], WiredOutput]:
+        """Return what reads the state of an output, apart from the motors' power."""
+        known = ((self._actions[n].rest, w) for n, w in plan.mix.items() if n in self._actions)
+        rest = max(-1.0, min(1.0, plan.offset + sum(weight * value for value, weight in known)))
         match plan.driver:
             case "hbridge":
-                state = self._hbridge(plan, rest)
+                return self._hbridge(plan, rest)
             case "phase_enable":
-                state = self._phase_enable(plan, rest)
+                return self._phase_enable(plan, rest)
             case "servo":
-                pulse_us = self._pulse(plan)
-                state = _servo(plan, rest, pulse_us)
+                return _servo(plan, rest, self._pulse(plan))
             case "esc":
-                pulse_us = self._pulse(plan)
-                state = _esc(plan, pulse_us)
+                return _esc(plan, self._pulse(plan))
             case "dynamixel":  # On a bus: no level of a pin determines its state.
-                state = _without_torque
+                return lambda levels: WiredOutput(None, True)
             case driver:
                 raise RobotError(f"The twin does not support the output driver {driver!r}.")
-        return _Output(plan, propels, state, pulse_us)
 
     def _hbridge(self, plan: OutputPlan, rest: float) -> Callable[[Levels], WiredOutput]:
         keys = ("forward", "backward", "enable")
@@ -192,14 +176,6 @@ class TwinWiring:
         return float(self.idle_level(pin)) if duty is None else duty
 
 
-def _no_pulses(levels: Levels) -> float:
-    return 0.0
-
-
-def _without_torque(levels: Levels) -> WiredOutput:
-    return WiredOutput(None, True)
-
-
 def _duty_of(plan: OutputPlan) -> Duty:
     return Duty(number(plan.settings, "start"), number(plan.settings, "full"))
 
@@ -228,7 +204,9 @@ def _esc(plan: OutputPlan, pulse_us: Callable[[Levels], float]) -> Callable[[Lev
 
     def state(levels: Levels) -> WiredOutput:
         us = pulse_us(levels)
-        if not us or abs(us - middle) <= _ESC_DEAD_BAND_US:
+        if not us:
+            return WiredOutput(None, True)
+        if abs(us - middle) <= _ESC_DEAD_BAND_US:
             return WiredOutput(0.0, True)
         return WiredOutput(_between(us, low, middle, high), False)
 

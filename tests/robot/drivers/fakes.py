@@ -9,7 +9,7 @@ from typing import Any
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.protocol import Port
+from shapechanger.robot.drivers.dynamixel.protocol import ServoPort
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings
 from shapechanger.robot.drivers.output import OutputDriver, open_output
 from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
@@ -169,7 +169,7 @@ class FakeHardware:
         """The pulses."""
         return self.pulses
 
-    def servo_port(self, settings: BusSettings) -> Port:
+    def servo_port(self, settings: BusSettings) -> ServoPort:
         """There is none here: servos have a twin of their own."""
         raise RobotError(f"The bus at {settings.device} cannot be opened.")
 

@@ -29,22 +29,22 @@ def _plan(zero: int) -> GuardPlan:
 def test_zeros_are_measured_with_taut_tendons() -> None:
     """All servos are released afterwards."""
     board = _board(_plan(5000))
-    zeros = find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
+    zeros = find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns() + 10_000_000))
     # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
     assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
     assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
-    assert board.rig is not None
-    assert not any(servo.has_torque for servo in board.rig.bus.servos.values())
+    assert board.pins.rig is not None
+    assert not any(servo.has_torque for servo in board.pins.rig.bus.servos.values())
 
 
 def test_a_loose_tendon_is_an_error() -> None:
     """It is named, and all servos are released."""
     board = _board(_plan(0))
-    assert board.rig is not None
-    board.rig.break_servo("EIP", "snapped")
+    assert board.pins.rig is not None
+    board.pins.rig.break_servo("EIP", "snapped")
     with pytest.raises(RobotError, match="EIP"):
-        find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns + 10_000_000))
-    assert not any(servo.has_torque for servo in board.rig.bus.servos.values())
+        find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns() + 10_000_000))
+    assert not any(servo.has_torque for servo in board.pins.rig.bus.servos.values())
 
 
 def test_a_car_has_no_tendons() -> None:

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from shapechanger.twin.servos.motor import MODELS, EndStops, SimulatedMotor, Tendon
+from shapechanger.robot.drivers.dynamixel.settings import MODELS
+from shapechanger.twin.servos.motor import EndStops, SimulatedMotor, Tendon, motor_model
 
 
 def _run(
@@ -21,7 +22,7 @@ def _run(
 def test_without_load_it_turns_as_fast_as_its_data_sheet_says(name: str) -> None:
     """With all the current it can have."""
     model = MODELS[name]
-    motor = SimulatedMotor(model, Tendon(snapped=True))
+    motor = SimulatedMotor(motor_model(name), Tendon(snapped=True))
     _run(motor, model.stall_a, model.volts, 3.0)
     assert motor.speed * 60 / (2 * math.pi) == pytest.approx(model.no_load_rpm, rel=0.02)
 
@@ -37,26 +38,26 @@ def test_at_a_stop_it_pulls_what_its_current_says_but_for_friction(
     """
     model = MODELS[name]
     tendon = Tendon(direction=direction)
-    motor = SimulatedMotor(model, tendon)
+    motor = SimulatedMotor(motor_model(name), tendon)
     amperes = 0.4 * model.stall_a
     _run(motor, direction * amperes, model.volts, 1.5)
     pull = model.torque_constant * amperes / tendon.spool_radius_m
-    friction = model.friction_nm / tendon.spool_radius_m
+    friction = motor_model(name).friction_nm / tendon.spool_radius_m
     assert motor.tension == pytest.approx(pull, abs=1.01 * friction)
     assert motor.speed == 0.0
 
 
 def test_friction_holds_what_is_too_weak() -> None:
     """The pretension alone may move nothing at all."""
-    model = MODELS["XL330-M288"]
+    model = motor_model("XL330-M288")
     motor = SimulatedMotor(model, Tendon())
-    _run(motor, 0.9 * model.friction_nm / model.torque_constant, model.volts, 0.5)
+    _run(motor, 0.9 * model.friction_nm / model.servo.torque_constant, 5.0, 0.5)
     assert (motor.angle, motor.tension) == (0.0, 0.0)
 
 
 def test_a_tendon_is_never_pushed() -> None:
     """Letting out makes it slack."""
-    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
     _run(motor, -0.3, 5.0, 0.3)
     assert motor.angle < -1.0
     assert motor.tension == 0.0
@@ -65,7 +66,7 @@ def test_a_tendon_is_never_pushed() -> None:
 def test_a_pull_ends_at_the_stop_of_its_load() -> None:
     """Spool and far end then differ by the stretch of the cable alone."""
     load = EndStops(1, nearest_m=0.01)
-    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
     _run(motor, 0.5, 5.0, 2.0, load)
     assert load.travels[0] == 0.01
     stretch = motor.tension / Tendon().stiffness
@@ -76,7 +77,7 @@ def test_it_gets_warm_with_the_square_of_its_current() -> None:
     """And nears its end with its time constant."""
     warm: list[float] = []
     for share in (0.25, 0.5):
-        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+        motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
         motor.advance(share * 1.47, 5.0, 0.0, 120.0)
         warm.append(motor.temperature - 25.0)
     assert warm[1] == pytest.approx(4 * warm[0], rel=1e-9)
@@ -87,7 +88,7 @@ def test_it_loses_its_current_with_its_voltage() -> None:
     """A dip of the supply takes the top speed with it."""
     speeds: list[float] = []
     for volts in (5.0, 2.5):
-        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon(snapped=True))
+        motor = SimulatedMotor(motor_model("XL330-M077"), Tendon(snapped=True))
         _run(motor, 1.47, volts, 2.0)
         speeds.append(motor.speed)
     assert 0.3 * speeds[0] < speeds[1] < 0.55 * speeds[0]

@@ -8,6 +8,8 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
+from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+from shapechanger.robot.drivers.dynamixel.homing import Homing
 from shapechanger.robot.drivers.dynamixel.settings import bus_settings, servo_settings
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
@@ -66,16 +68,12 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     Raises:
         RobotError: If the robot has no servo bus, a servo fails, or a tendon never gets taut.
     """
-    # Imported here, because only a rig has the SDK.
-    from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-    from shapechanger.robot.drivers.dynamixel.homing import Homing
-
     outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
     if not outputs:
         raise RobotError(f"{plan.name} has no tendons on a servo bus.")
     settings = bus_settings(outputs[0].settings, tuple(map(servo_settings, outputs)))
     homing = Homing(settings)
-    bus = ServoBus(settings, hardware.servo_port)
+    bus = ServoBus(settings, hardware.servo_port(settings))
     try:
         bus.set_up()
         bus.hold()

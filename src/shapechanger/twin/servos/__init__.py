@@ -1,7 +1,7 @@
-"""Simulated Dynamixel servos, which speak protocol 2.0 byte by byte.
+"""Simulated Dynamixel servos.
 
-`bus` has the bus and its servos, `rig` the servos of a robot by tendon, `port` a port for the
-SDK. Below them, `protocol` has packets and registers, `servo` one servo, and `motor` its motor,
-its tendon and the load. The SDK's own packet code never runs on this side, so each side tests the
-other. Assumptions are marked "assumed" and listed in `servo`.
+`rig` has the servos of a robot by tendon and `bus` their bus. Below them, `servo` is one servo with
+its registers, and `motor` its motor, its tendon and the load. They execute instructions of protocol
+2.0; bytes and packets are left to the SDK, below the driver's port. Assumptions are marked
+"assumed" and listed in `servo`.
 """

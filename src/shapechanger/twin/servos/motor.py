@@ -3,156 +3,59 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final, Protocol
 
-from shapechanger.errors import UnknownName
+from shapechanger.robot.drivers.dynamixel.settings import ServoModel, model_named
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TwinModel:
-    """Model of a servo.
+@dataclass(frozen=True, slots=True)
+class MotorModel:
+    """Motor and gears of a servo model, beyond what its driver knows.
 
     Attributes:
-        number: Model number.
-        ampere_per_count: Unit of current registers, A.
-        most_counts: Largest current limit, in that unit.
-        stall_nm: Stall torque at `volts`, N·m.
-        stall_a: Stall current at `volts`, A.
-        no_load_rpm: Speed without load at `volts`, turns per minute.
-        volts: Nominal voltage, V.
-        least_v: Lowest voltage limit, V.
-        most_v: Highest voltage limit, V.
-        most_c: Temperature limit, degrees Celsius.
+        servo: The model, with its electrical numbers.
         shutdown: Hardware errors that shut it off, as bits.
         inertia: Inertia of motor and gears at the output, kg·m2.
         friction_nm: Coulomb friction at the output, N·m.
         viscous: Viscous friction at the output, N·m·s/rad.
     """
 
-    number: int
-    ampere_per_count: float
-    most_counts: int
-    stall_nm: float
-    stall_a: float
-    no_load_rpm: float
-    volts: float
-    least_v: float
-    most_v: float
-    most_c: int
+    servo: ServoModel
     shutdown: int
     inertia: float
     friction_nm: float
     viscous: float
 
     @property
-    def torque_constant(self) -> float:
-        """Torque at the output per current, N·m/A."""
-        return self.stall_nm / self.stall_a
-
-    @property
     def electric_rad_per_s(self) -> float:
         """Speed at which no current flows, above that without load, where friction takes some."""
-        no_load = self.no_load_rpm * 2.0 * math.pi / 60.0
-        lost = (self.friction_nm + self.viscous * no_load) / self.stall_nm
+        no_load = self.servo.no_load_rad_per_s
+        lost = (self.friction_nm + self.viscous * no_load) / self.servo.stall_nm
         return no_load / (1.0 - lost)
 
 
-# Limits, torques and speeds: ROBOTIS e-manual. Inertia and friction of the XL330-M288: identified
-# by Rhoban's `bam` (xl330/m1); of the M077: the same, scaled by the square of the
-# gear ratio; of the XC330-M288: fits on joints of a LEAP hand, with the viscous part of the XL330
-# assumed; of the XM430: chosen for want of a source.
-_X330: Final = {
-    "ampere_per_count": 1e-3,
-    "volts": 5.0,
-    "least_v": 3.5,
-    "most_v": 7.0,
-    "most_c": 70,
-}
-_XM430: Final = {
-    "ampere_per_count": 2.69e-3,
-    "most_counts": 1193,
-    "stall_a": 2.3,
-    "volts": 12.0,
-    "least_v": 9.5,
-    "most_v": 16.0,
-    "most_c": 80,
-    "shutdown": 52,
-}
+# Shutdown: ROBOTIS e-manual. Inertia and friction of the XL330-M288: identified by Rhoban's `bam`
+# (xl330/m1); of the M077: the same, scaled by the square of the gear ratio; of the XC330-M288: fits
+# on joints of a LEAP hand, with the viscous part of the XL330 assumed; of the XM430: chosen for
+# want of a source.
 _MODELS: Final = {
-    "XL330-M288": {
-        **_X330,
-        "number": 1200,
-        "most_counts": 1750,
-        "stall_nm": 0.52,
-        "stall_a": 1.47,
-        "no_load_rpm": 103.0,
-        "shutdown": 53,
-        "inertia": 0.00199,
-        "friction_nm": 0.018,
-        "viscous": 0.0059,
-    },
-    "XL330-M077": {
-        **_X330,
-        "number": 1190,
-        "most_counts": 1750,
-        "stall_nm": 0.215,
-        "stall_a": 1.47,
-        "no_load_rpm": 383.0,
-        "shutdown": 53,
-        "inertia": 0.000144,
-        "friction_nm": 0.005,
-        "viscous": 0.00043,
-    },
-    "XC330-M288": {
-        **_X330,
-        "number": 1240,
-        "most_counts": 2352,
-        "stall_nm": 0.93,
-        "stall_a": 1.80,
-        "no_load_rpm": 81.0,
-        "shutdown": 52,
-        "inertia": 0.00141,
-        "friction_nm": 0.029,
-        "viscous": 0.0059,
-    },
-    "XM430-W210": {
-        **_XM430,
-        "number": 1030,
-        "stall_nm": 3.0,
-        "no_load_rpm": 77.0,
-        "inertia": 0.003,
-        "friction_nm": 0.09,
-        "viscous": 0.02,
-    },
-    "XM430-W350": {
-        **_XM430,
-        "number": 1020,
-        "stall_nm": 4.1,
-        "no_load_rpm": 46.0,
-        "inertia": 0.008,
-        "friction_nm": 0.12,
-        "viscous": 0.05,
-    },
+    "XL330-M288": (53, 0.00199, 0.018, 0.0059),
+    "XL330-M077": (53, 0.000144, 0.005, 0.00043),
+    "XC330-M288": (52, 0.00141, 0.029, 0.0059),
+    "XM430-W210": (52, 0.003, 0.09, 0.02),
+    "XM430-W350": (52, 0.008, 0.12, 0.05),
 }
 
-MODELS: Final[Mapping[str, TwinModel]] = MappingProxyType(
-    {name: TwinModel(**numbers) for name, numbers in _MODELS.items()}  # pyright: ignore[reportArgumentType]
-)
-"""Models of simulated servos, by name."""
 
-
-def twin_model(name: str) -> TwinModel:
-    """Return a model by its name.
+def motor_model(name: str) -> MotorModel:
+    """Return the motor of a servo model.
 
     Raises:
         UnknownName: If there is no such model.
     """
-    if name not in MODELS:
-        raise UnknownName("servo model", name, MODELS)
-    return MODELS[name]
+    return MotorModel(model_named(name), *_MODELS[name])
 
 
 # Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
@@ -184,7 +87,7 @@ class SimulatedMotor:
     """A motor with its gears, its spool and its end of a tendon.
 
     Args:
-        model: Model of the servo.
+        model: Motor and gears.
         tendon: Its tendon.
         angle: Angle of the spool while the tendon is just taut and its far end at 0, rad.
 
@@ -196,7 +99,7 @@ class SimulatedMotor:
         temperature: Temperature, degrees Celsius.
     """
 
-    def __init__(self, model: TwinModel, tendon: Tendon, angle: float = 0.0) -> None:
+    def __init__(self, model: MotorModel, tendon: Tendon, angle: float = 0.0) -> None:
         self._model = model
         self._tendon = tendon
         self._taut_at = angle
@@ -215,18 +118,18 @@ class SimulatedMotor:
             travel_m: How far the tendon's far end is towards the spool, m.
             dt_s: Length of the step, s.
         """
-        model, tendon = self._model, self._tendon
+        model, servo, tendon = self._model, self._model.servo, self._tendon
         # The faster it turns, the less current the voltage can still drive.
-        share = volts / model.volts
+        share = volts / servo.volts
         free = model.electric_rad_per_s
-        most = model.stall_a * (share - self.speed / free)
-        least = model.stall_a * (-share - self.speed / free)
+        most = servo.stall_a * (share - self.speed / free)
+        least = servo.stall_a * (-share - self.speed / free)
         self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, min(least, 0.0)), max(most, 0.0))
         lever = tendon.direction * tendon.spool_radius_m
         # Friction and cable use the speed at the end of the step, so that a stiff cable does not
         # need a tiny step.
         inertia = model.inertia + dt_s * model.viscous
-        torque = model.torque_constant * self.current
+        torque = servo.torque_constant * self.current
         if self._pull(travel_m) > 0.0:
             stretch = lever * (self.angle - self._taut_at) - travel_m
             torque -= lever * tendon.stiffness * stretch
@@ -247,7 +150,7 @@ class SimulatedMotor:
         return max(0.0, tendon.stiffness * stretch)
 
     def _warm(self, dt_s: float) -> None:
-        ohm = self._model.volts / self._model.stall_a
+        ohm = self._model.servo.volts / self._model.servo.stall_a
         warm = _ROOM_C + _KELVIN_PER_WATT * ohm * self.current**2
         self.temperature += (warm - self.temperature) * -math.expm1(-dt_s / _HEAT_S)
 

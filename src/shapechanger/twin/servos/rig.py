@@ -90,13 +90,17 @@ class Rig:
         load: Load = EndStops(len(plans))
         if self._world is not None:
             load = self._world.connect(self._names, self)
-        self.bus = SimulatedBus(plans, load, whole(settings[0], "baud"))
+        self.bus = SimulatedBus(plans, load)
         self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
         self.settle()
 
     @classmethod
     def of(cls, plan: GuardPlan, world: World) -> Rig | None:
         """Return the rig of a robot; None for one without a servo bus.
+
+        Args:
+            plan: The robot as it is wired.
+            world: World of the robot.
 
         Raises:
             RobotError: If the world has other tendons.
@@ -105,11 +109,7 @@ class Rig:
         return cls(plan, world) if has_bus else None
 
     def require(self, device: str) -> None:
-        """Check that the bus is at a device.
-
-        Raises:
-            RobotError: If it is at another one.
-        """
+        """Raise RobotError if the bus is at another device."""
         if device != self._device:
             raise RobotError(f"There is no {device} at this twin, only {self._device}.")
 
@@ -151,12 +151,12 @@ class Rig:
         servo = self.servo(tendon)
         match fault:
             case "":
-                servo.faults.mute = servo.faults.deaf = False
+                servo.mute = servo.deaf = False
                 servo.motor.temperature = min(servo.motor.temperature, _WELL_C)
             case "mute":
-                servo.faults.mute = True
+                servo.mute = True
             case "deaf":
-                servo.faults.deaf = True
+                servo.deaf = True
             case "hot":
                 servo.motor.temperature = _HOT_C
             case "overload":

@@ -1,11 +1,13 @@
-"""One simulated servo: its answers, its safety functions and its current control.
+"""One simulated servo: its registers, its safety functions and its current control.
 
-Assumed for want of a source, to be tried on a rig:
+Source: ROBOTIS e-manual, control tables and DYNAMIXEL Protocol 2.0. It has the registers that the
+driver uses. Assumed for want of a source, to be tried on a rig:
 
 - A bus watchdog that trips in current mode takes the current away; torque enable stays 1
   (`on_trip` "coast"), or goes to 0 ("release"). In the manual the servo "will stop".
-- Any valid instruction packet on the bus feeds the watchdog, whichever servo it is for.
-- The gaps between registers cannot be read.
+- Any valid instruction on the bus feeds the watchdog, whichever servo it is for.
+- The gaps between registers cannot be read, nor parts of registers. (Real servos may answer 0 for
+  the gaps, so a driver must not rely on an error.)
 - Without power the count of turns is lost: the position starts again within one turn.
 - It needs 0.3 s to start.
 """
@@ -13,48 +15,60 @@ Assumed for want of a source, to be tried on a rig:
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
-from shapechanger.twin.servos.motor import SimulatedMotor, Tendon, TwinModel, twin_model
-from shapechanger.twin.servos.protocol import BROADCAST, LIMIT, RANGE, Table, TableError
+from shapechanger.robot.drivers.dynamixel.protocol import (
+    ALERT,
+    BUS_WATCHDOG,
+    CURRENT_LIMIT,
+    CURRENT_MODE,
+    DRIVE_MODE,
+    FIRMWARE,
+    GOAL_CURRENT,
+    HARDWARE_ERROR,
+    OPERATING_MODE,
+    PING,
+    READ,
+    REBOOT,
+    RETURN_DELAY,
+    TORQUE_ENABLE,
+    TRIPPED,
+    WATCHDOG_STEP_NS,
+    WRITE,
+    Register,
+    ServoReply,
+)
+from shapechanger.robot.drivers.dynamixel.settings import COUNTS_PER_TURN
+from shapechanger.twin.servos.motor import SimulatedMotor, Tendon, motor_model
 
-_PING: Final = 0x01
-_READ: Final = 0x02
-_WRITE: Final = 0x03
-_REBOOT: Final = 0x08
+_MODEL_NUMBER: Final = Register("model number", 0, 2)
+_PRESENT_CURRENT: Final = Register("present current", 126, 2, signed=True)
+_PRESENT_VELOCITY: Final = Register("present velocity", 128, 4, signed=True)
+_PRESENT_POSITION: Final = Register("present position", 132, 4, signed=True)
+_VELOCITY_TRAJECTORY: Final = Register("velocity trajectory", 136, 4, signed=True)
+_POSITION_TRAJECTORY: Final = Register("position trajectory", 140, 4, signed=True)
+_PRESENT_VOLTAGE: Final = Register("present input voltage", 144, 2)
+_PRESENT_TEMPERATURE: Final = Register("present temperature", 146, 1)
+_EEPROM_END: Final = 64
+_OPERATING_MODES: Final = (0, 1, 3, 4, 5, 16)
 
+# Reasons of refusals.
 _UNKNOWN_INSTRUCTION: Final = 2
-_WRONG_LENGTH: Final = 5
-_ALERT: Final = 0x80
+_RANGE: Final = 4
+_LENGTH: Final = 5
+_LIMIT: Final = 6
+_ACCESS: Final = 7
+
+# Bits of the hardware error status.
 _VOLTAGE: Final = 0x01
 _HOT: Final = 0x04
 _OVERLOAD: Final = 0x20
 
-_COUNTS_PER_RAD: Final = 4096 / (2.0 * math.pi)
+_COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 _PER_RAD_PER_S: Final = 60.0 / (2.0 * math.pi * 0.229)
-_WATCHDOG_STEP_NS: Final = 20_000_000
-_TRIPPED: Final = 0xFF
 _START_NS: Final = 300_000_000
-_GOALS: Final = (100, 102, 104, 116)
-_CURRENT_MODE: Final = 0
-
-
-@dataclass(slots=True)
-class Faults:
-    """Faults of a servo.
-
-    Attributes:
-        mute: Whether it obeys without answering.
-        deaf: Whether it receives nothing, as without its data line.
-        late_ns: Delay of its answers.
-        bad_crc: Whether its answers are damaged.
-    """
-
-    mute: bool = False
-    deaf: bool = False
-    late_ns: int = 0
-    bad_crc: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,17 +92,16 @@ class ServoPlan:
     on_trip: Literal["coast", "release"] = "coast"
 
 
-@dataclass(frozen=True, slots=True)
-class StatusPacket:
-    """Content of a status packet.
+class _Refusal(Exception):
+    """An instruction that the servo refuses; its argument is the number of the reason."""
 
-    Attributes:
-        error: Error byte.
-        data: Parameters.
-    """
 
-    error: int
-    data: bytes = b""
+class _Field(NamedTuple):
+    """A register, its value at delivery, and the values that it takes; None if read-only."""
+
+    register: Register
+    initial: int
+    values: Container[int] | None = None
 
 
 class SimulatedServo:
@@ -96,23 +109,48 @@ class SimulatedServo:
 
     Args:
         plan: The servo and its tendon.
-        baud_code: Value of register 8, the baud rate.
 
     Attributes:
         plan: The servo and its tendon.
-        model: Its model.
-        faults: Its faults.
+        mute: Whether it obeys without answering.
+        deaf: Whether it receives nothing, as without its data line.
         motor: Its motor.
         volts: Voltage of its supply.
+
+    Raises:
+        UnknownName: If there is no such model.
     """
 
-    def __init__(self, plan: ServoPlan, baud_code: int = 3) -> None:
+    def __init__(self, plan: ServoPlan) -> None:
+        motor = motor_model(plan.model)
         self.plan = plan
-        self.model: TwinModel = twin_model(plan.model)
-        self.faults = Faults()
-        self.volts = self.model.volts
-        self.motor = SimulatedMotor(self.model, plan.tendon, plan.angle)
-        self._table = Table(self.model, plan.id, plan.firmware, baud_code, self._check)
+        self.mute = self.deaf = False
+        self.volts = motor.servo.volts
+        self.motor = SimulatedMotor(motor, plan.tendon, plan.angle)
+        self._model = motor.servo
+        self._shutdown = motor.shutdown
+        most = self._model.most_counts
+        fields = (
+            _Field(_MODEL_NUMBER, self._model.number),
+            _Field(FIRMWARE, plan.firmware),
+            _Field(RETURN_DELAY, 250, range(255)),
+            _Field(DRIVE_MODE, 0, range(14)),
+            _Field(OPERATING_MODE, 3, _OPERATING_MODES),
+            _Field(CURRENT_LIMIT, most, range(most + 1)),
+            _Field(TORQUE_ENABLE, 0, range(2)),
+            _Field(HARDWARE_ERROR, 0),
+            _Field(BUS_WATCHDOG, 0, range(128)),
+            _Field(GOAL_CURRENT, most, range(-32768, 32768)),
+            _Field(_PRESENT_CURRENT, 0),
+            _Field(_PRESENT_VELOCITY, 0),
+            _Field(_PRESENT_POSITION, 0),
+            _Field(_VELOCITY_TRAJECTORY, 0),
+            _Field(_POSITION_TRAJECTORY, 0),
+            _Field(_PRESENT_VOLTAGE, 0),
+            _Field(_PRESENT_TEMPERATURE, 0),
+        )
+        self._fields = {one.register.address: one for one in fields}
+        self._values = {one.register: one.initial for one in fields}
         self._now_ns = 0
         self._fed_ns = 0
         self._starts_until_ns = 0
@@ -121,13 +159,13 @@ class SimulatedServo:
 
     @property
     def is_awake(self) -> bool:
-        """True if it receives packets."""
-        return self._now_ns >= self._starts_until_ns and not self.faults.deaf
+        """True if it receives instructions."""
+        return self._now_ns >= self._starts_until_ns and not self.deaf
 
     @property
     def has_torque(self) -> bool:
         """True if torque enable is on."""
-        return self._torque
+        return bool(self._values[TORQUE_ENABLE])
 
     @property
     def pulls_a(self) -> float:
@@ -135,52 +173,26 @@ class SimulatedServo:
         return self._goal_a
 
     def register(self, at: int) -> int:
-        """Return the current value of a register."""
+        """Return the current value of the register at an address."""
         self._measure()
-        return self._table.get(at)
+        return self._values[self._fields[at].register]
 
     def feed_watchdog(self) -> None:
-        """Notice a valid instruction packet on the bus."""
-        if self.is_awake:
-            self._fed_ns = self._now_ns
+        """Notice a valid instruction on the bus."""
+        self._fed_ns = self._now_ns
 
-    def execute(self, instruction: int, parameters: bytes, addressed: int) -> StatusPacket | None:
-        """Execute an instruction.
+    def execute(self, instruction: int, parameters: bytes) -> ServoReply:
+        """Execute an instruction and return the reply.
 
         Args:
             instruction: Code of the instruction.
             parameters: Its parameters.
-            addressed: Id in the packet.
-
-        Returns:
-            The answer; None without one.
         """
-        self._measure()
         try:
-            data = self._do(instruction, parameters)
-            error = 0
-        except TableError as refusal:
-            data, error = b"", refusal.number
-        level = self._table.get(68)
-        if instruction == _PING:
-            return self._status(error, data)
-        answers = level == 2 or (instruction == _READ and level == 1)
-        return self._status(error, data) if answers and addressed != BROADCAST else None
-
-    def read(self, at: int, length: int) -> StatusPacket:
-        """Return the answer to a sync read."""
-        self._measure()
-        try:
-            return self._status(0, self._table.read(at, length))
-        except TableError as refusal:
-            return self._status(refusal.number, b"")
-
-    def write(self, at: int, data: bytes) -> None:
-        """Execute its part of a sync write, which has no answer."""
-        try:
-            self._write(at, data)
-        except TableError:
-            return
+            error, data = 0, self._do(instruction, parameters)
+        except _Refusal as refusal:
+            error, data = refusal.args[0], b""
+        return ServoReply(error | (ALERT if self._values[HARDWARE_ERROR] else 0), data)
 
     def overload(self) -> None:
         """Set the overload error."""
@@ -188,9 +200,11 @@ class SimulatedServo:
 
     def lose_power(self) -> None:
         """Interrupt its supply, so that it restarts."""
-        self._table.lose_power()
+        for at, one in self._fields.items():
+            if at >= _EEPROM_END:
+                self._values[one.register] = one.initial
         self._cache()
-        self._turns = math.floor(self.motor.angle / (2.0 * math.pi)) * 4096
+        self._turns = math.floor(self.motor.angle / (2.0 * math.pi)) * COUNTS_PER_TURN
         self._starts_until_ns = self._now_ns + _START_NS
         self._fed_ns = self._starts_until_ns
 
@@ -198,88 +212,108 @@ class SimulatedServo:
         """Advance to a time.
 
         Args:
-            now_ns: The time.
+            now_ns: The time, ns.
             travel_m: How far the tendon's far end is towards the spool, m.
         """
         dt_s = (now_ns - self._now_ns) / 1e9
         self._now_ns = now_ns
-        self._watch()
-        self.motor.advance(self.pulls_a, self.volts, travel_m, dt_s)
-        most_c, least_v, most_v = self._limits
-        if self.motor.temperature > most_c:
+        if self._watchdog_ns is not None and now_ns - self._fed_ns >= self._watchdog_ns:
+            self._trip()
+        self.motor.advance(self._goal_a, self.volts, travel_m, dt_s)
+        if self.motor.temperature > self._model.most_c:
             self._fail(_HOT)
-        if not least_v <= self.volts <= most_v:
+        if not self._model.least_v <= self.volts <= self._model.most_v:
             self._fail(_VOLTAGE)
 
     def _cache(self) -> None:
-        """Cache the registers that are used in each step."""
-        table = self._table
-        self._torque = bool(table.get(64))
-        steps = table.get(98)
-        self._watchdog_ns = steps * _WATCHDOG_STEP_NS if self._torque and 0 < steps < 128 else None
-        pulls = self._torque and steps != _TRIPPED and table.get(11) == _CURRENT_MODE
-        # Other modes are not simulated.
-        self._goal_a = table.get(102) * self.model.ampere_per_count if pulls else 0.0
-        self._limits = (table.get(31), table.get(34) / 10, table.get(32) / 10)
+        """Cache what each step needs of the registers."""
+        values = self._values
+        steps = values[BUS_WATCHDOG]
+        counts = self.has_torque and 0 < steps < TRIPPED
+        self._watchdog_ns = steps * WATCHDOG_STEP_NS if counts else None
+        in_current_mode = values[OPERATING_MODE] == CURRENT_MODE  # Others are not simulated.
+        pulls = self.has_torque and steps != TRIPPED and in_current_mode
+        self._goal_a = values[GOAL_CURRENT] * self._model.ampere_per_count if pulls else 0.0
 
-    def _watch(self) -> None:
-        if self._watchdog_ns is None or self._now_ns - self._fed_ns < self._watchdog_ns:
-            return
-        self._table.set(98, _TRIPPED)
-        self._table.set(102, 0)
+    def _trip(self) -> None:
+        self._values[BUS_WATCHDOG] = TRIPPED
+        self._values[GOAL_CURRENT] = 0
         if self.plan.on_trip == "release":
-            self._table.set(64, 0)
+            self._values[TORQUE_ENABLE] = 0
+        self._cache()
+
+    def _fail(self, bit: int) -> None:
+        self._values[HARDWARE_ERROR] |= bit
+        if bit & self._shutdown:
+            self._values[TORQUE_ENABLE] = 0
         self._cache()
 
     def _do(self, instruction: int, parameters: bytes) -> bytes:
-        if instruction == _PING:
-            return self._table.read(0, 2) + self._table.read(6, 1)
-        if instruction == _READ:
-            if len(parameters) != 4:
-                raise TableError(_WRONG_LENGTH)
-            at, length = (int.from_bytes(parameters[i : i + 2], "little") for i in (0, 2))
-            return self._table.read(at, length)
-        if instruction == _WRITE:
-            if len(parameters) < 3:
-                raise TableError(_WRONG_LENGTH)
-            self._write(int.from_bytes(parameters[:2], "little"), parameters[2:])
-            return b""
-        if instruction == _REBOOT:
+        at = int.from_bytes(parameters[:2], "little")
+        if instruction == PING:
+            return self._read(0, 2) + self._read(FIRMWARE.address, FIRMWARE.size)
+        if instruction == READ:
+            return self._read(at, int.from_bytes(parameters[2:4], "little"))
+        if instruction == WRITE:
+            self._write(at, parameters[2:])
+        elif instruction == REBOOT:
             self.lose_power()
-            return b""
-        raise TableError(_UNKNOWN_INSTRUCTION)
+        else:
+            raise _Refusal(_UNKNOWN_INSTRUCTION)
+        return b""
+
+    def _read(self, at: int, length: int) -> bytes:
+        self._measure()
+        data = b""
+        while len(data) < length:
+            if (one := self._fields.get(at + len(data))) is None:
+                raise _Refusal(_ACCESS)
+            data += one.register.encode(self._values[one.register])
+        if len(data) != length or not length:
+            raise _Refusal(_ACCESS)
+        return data
 
     def _write(self, at: int, data: bytes) -> None:
-        for register in self._table.write(at, data):
-            if register == 11:  # A change of mode sets the goals to their limits.
-                self._table.set(102, self._table.get(38))
-                self._table.set(100, self._table.get(36))
-            elif register in (64, 98):
-                self._fed_ns = self._now_ns
+        """Write registers: all of them, or none if one is refused."""
+        new: dict[Register, int] = {}
+        while data:
+            one = self._fields.get(at)
+            if one is None or one.values is None:
+                raise _Refusal(_ACCESS)
+            register = one.register
+            if len(data) < register.size:
+                raise _Refusal(_LENGTH)
+            if at < _EEPROM_END and self.has_torque:
+                raise _Refusal(_ACCESS)  # Locked while torque is on.
+            new[register] = value = register.decode(data)
+            if value not in one.values:
+                raise _Refusal(_RANGE)
+            self._check(register, value)
+            at, data = at + register.size, data[register.size :]
+        if not new:
+            raise _Refusal(_LENGTH)
+        self._values |= new
+        if OPERATING_MODE in new:  # A change of mode sets the goal to its limit.
+            self._values[GOAL_CURRENT] = self._values[CURRENT_LIMIT]
+        if TORQUE_ENABLE in new or BUS_WATCHDOG in new:
+            self._fed_ns = self._now_ns
         self._cache()
 
-    def _check(self, at: int, value: int) -> None:
-        if at in _GOALS and self._table.get(98) == _TRIPPED:
-            raise TableError(RANGE)
-        if at == 102 and abs(value) > self._table.get(38):
-            raise TableError(LIMIT)
-        if at == 64 and value and self._table.get(70) & self._table.get(63):
-            raise TableError(RANGE)  # Until a reboot.
-
-    def _fail(self, bit: int) -> None:
-        self._table.set(70, self._table.get(70) | bit)
-        if bit & self._table.get(63):
-            self._table.set(64, 0)
-        self._cache()
-
-    def _status(self, error: int, data: bytes) -> StatusPacket:
-        return StatusPacket(error | (_ALERT if self._table.get(70) else 0), data)
+    def _check(self, register: Register, value: int) -> None:
+        """Refuse a value that the present state of the servo does not allow."""
+        if register == GOAL_CURRENT and self._values[BUS_WATCHDOG] == TRIPPED:
+            raise _Refusal(_RANGE)
+        if register == GOAL_CURRENT and abs(value) > self._values[CURRENT_LIMIT]:
+            raise _Refusal(_LIMIT)
+        failed = self._values[HARDWARE_ERROR] & self._shutdown
+        if register == TORQUE_ENABLE and value and failed:
+            raise _Refusal(_RANGE)  # Until a reboot.
 
     def _measure(self) -> None:
         """Update the registers of its measurements."""
-        motor, table = self.motor, self._table
-        table.set(126, round(motor.current / self.model.ampere_per_count))
-        table.set(128, round(motor.speed * _PER_RAD_PER_S))
-        table.set(132, math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns)
-        table.set(144, round(10 * self.volts))
-        table.set(146, round(motor.temperature))
+        motor, values = self.motor, self._values
+        values[_PRESENT_CURRENT] = round(motor.current / self._model.ampere_per_count)
+        values[_PRESENT_VELOCITY] = round(motor.speed * _PER_RAD_PER_S)
+        values[_PRESENT_POSITION] = math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns
+        values[_PRESENT_VOLTAGE] = round(10 * self.volts)
+        values[_PRESENT_TEMPERATURE] = round(motor.temperature)

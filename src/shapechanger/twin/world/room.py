@@ -43,7 +43,12 @@ class Box:
         )
 
     def gap(self, x: float, y: float) -> float:
-        """Return the distance from a point outside, m."""
+        """Return the distance from a point outside, m.
+
+        Args:
+            x: Of the point, m.
+            y: Of the point, m.
+        """
         return math.hypot(
             max(self.left - x, 0.0, x - self.right), max(self.bottom - y, 0.0, y - self.top)
         )
@@ -82,7 +87,15 @@ class Room:
         self.edges = np.concatenate([np.roll(c, -1, axis=0) - c for c in corners])
 
     def clearance(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return the distance to the nearest wall, negative outside, and where that is."""
+        """Find the nearest point of a wall or box.
+
+        Args:
+            x: Of the point to start from, m.
+            y: Of the point to start from, m.
+
+        Returns:
+            Distance, negative outside the room, and x and y of the nearest point, m.
+        """
         nearest = min(
             (x, 0.0, y),
             (self.length - x, self.length, y),
@@ -144,7 +157,12 @@ def lay_out(seed: int) -> Room:
 
 
 def find_start(room: Room, seed: int) -> Pose:
-    """Return the start of a seed, with free space around and more of it ahead."""
+    """Return a start with free space around and more of it ahead.
+
+    Args:
+        room: The room.
+        seed: Seed of the start.
+    """
     rng = random.Random(f"start {seed}")
     best, best_pose = -math.inf, Pose(room.length / 2, room.width / 2, 0.0)
     for _ in range(_TRIES):
@@ -213,7 +231,14 @@ class FrontCamera:
         )
 
     def picture(self, room: Room, x: float, y: float, heading: float) -> NDArray[np.uint8]:
-        """A picture, RGB, shape (height, width, 3)."""
+        """Draw a picture, RGB, shape (height, width, 3).
+
+        Args:
+            room: The room.
+            x: Position of the camera, m.
+            y: Position of the camera, m.
+            heading: Angle of its axis from the x axis, rad, counter-clockwise.
+        """
         angles = heading + self._angles
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
         directions *= self._lengths[:, np.newaxis]  # So that distances are along the heading.

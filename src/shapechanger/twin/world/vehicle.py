@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,19 +59,23 @@ class VehicleMotion(NamedTuple):
     yaw_rate: float
 
 
-class RoomVehicle(Protocol):
-    """A vehicle in the plain room."""
+class RoomVehicle:
+    """A body in the plain room that does not move, such as legs or a finger."""
 
     def move(self, dt_s: float, outputs: Outputs) -> VehicleMotion:
-        """Advance by a short step and return the motion at its end."""
-        ...
+        """Advance by a short step and return the motion at its end.
+
+        Args:
+            dt_s: Length of the step, s.
+            outputs: Output of each part, from -1 to 1; None for a part without torque.
+        """
+        return VehicleMotion(0.0, 0.0, 0.0)
 
     def halt(self) -> None:
         """Stop at once after a collision, while the motors continue."""
-        ...
 
 
-class _Car:
+class _Car(RoomVehicle):
     """Wheels that drive and wheels that steer: the kinematic bicycle model."""
 
     def __init__(self) -> None:
@@ -95,7 +99,7 @@ class _Car:
         self._speed = 0.0
 
 
-class _Tracks:
+class _Tracks(RoomVehicle):
     """One track or row of wheels on each side."""
 
     def __init__(self) -> None:
@@ -115,7 +119,7 @@ class _Tracks:
         self._right -= middle
 
 
-class _Boat:
+class _Boat(RoomVehicle):
     """A hull with a propeller and a rudder, or with two propellers."""
 
     def __init__(self) -> None:
@@ -143,23 +147,13 @@ class _Boat:
         self._ahead = self._left = 0.0
 
 
-class _Still:
-    """Legs, fingers and other bodies, which do not move in this world."""
-
-    def move(self, dt_s: float, outputs: Outputs) -> VehicleMotion:
-        return VehicleMotion(0.0, 0.0, 0.0)
-
-    def halt(self) -> None:
-        pass
-
-
 def _vehicle_for(parts: Collection[str]) -> RoomVehicle:
     """Return a vehicle with these parts.
 
     Raises:
         RobotError: If they belong to vehicles of different kinds.
     """
-    kinds: list[type[_Car] | type[_Tracks] | type[_Boat]] = []
+    kinds: list[type[RoomVehicle]] = []
     if {"wheels", "steering"} & set(parts):
         kinds.append(_Car)
     if {"left track", "right track"} & set(parts):
@@ -168,7 +162,7 @@ def _vehicle_for(parts: Collection[str]) -> RoomVehicle:
         kinds.append(_Boat)
     if len(kinds) > 1:
         raise RobotError(f"No vehicle has all of these parts: {', '.join(sorted(parts))}.")
-    return kinds[0]() if kinds else _Still()
+    return kinds[0]() if kinds else RoomVehicle()
 
 
 def _after_dead_band(value: float | None) -> float:

@@ -11,8 +11,10 @@ from types import TracebackType
 from typing import Final, Self
 
 from shapechanger.twin.servos.bus import SimulatedBus
+from tests.robot.drivers.dynamixel import wire
 
 _CHUNK: Final = 4096
+_HEADER: Final = 7
 
 
 class ServoPty:
@@ -45,8 +47,6 @@ class ServoPty:
         """Advance the time of the bus."""
         with self.lock:
             self.bus.advance(ns)
-            late = self.bus.send()
-        self._give(late)
 
     def close(self) -> None:
         """End the thread and the device."""
@@ -68,15 +68,17 @@ class ServoPty:
         self.close()
 
     def _run(self) -> None:
+        data = b""
         while True:
             ready, _, _ = select.select([self._host, self._wake_in], [], [])
             if self._wake_in in ready:
                 return
-            data = os.read(self._host, _CHUNK)
-            with self.lock:
-                self.bus.receive(data)
-                answer = self.bus.send()
-            self._give(answer)
+            data += os.read(self._host, _CHUNK)
+            while len(data) >= _HEADER and len(data) >= (size := wire.size_of(data)):
+                with self.lock:
+                    answers = wire.execute(self.bus, data[:size])
+                self._give(b"".join(answers.values()))
+                data = data[size:]
 
     def _give(self, data: bytes) -> None:
         """Send bytes; as on a serial line, unread ones are lost."""

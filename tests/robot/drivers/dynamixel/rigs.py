@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from dynamixel_sdk import PortHandler
+
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
 from shapechanger.robot.drivers.dynamixel.health import BusState
+from shapechanger.robot.drivers.dynamixel.serial_port import SerialServoPort
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
 from shapechanger.twin.servos.bus import SimulatedBus
-from shapechanger.twin.servos.port import ServoPort
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
+from tests.robot.drivers.dynamixel import wire
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
 """The tendons; their servos have the ids 1 to 7."""
@@ -40,40 +44,81 @@ def settings(**changes: Any) -> BusSettings:
     return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
 
 
-class FaultyPort(ServoPort):
-    """A port of a simulated bus that can fail, and keeps what was sent.
+class FaultyPort(PortHandler):
+    """A port of the SDK at a simulated bus, without real time.
+
+    An answer that is late or missing counts as timed out as soon as the SDK asks.
 
     Attributes:
         is_cut: Whether the cable is cut: bytes arrive nowhere.
         is_gone: Whether the device is gone: every use raises OSError.
         is_closed: Whether it was closed.
+        late_ns: Delay of the answers of a servo, by id.
+        damaged: Ids of servos whose answers are damaged.
         sent: Packets that were written.
+        received: Number of bytes that the servos have answered.
     """
 
     def __init__(self, line: SimulatedBus) -> None:
-        super().__init__(self._reach)
+        super().__init__("the twin")
         self._line = line
+        self._arrived = bytearray()
+        self._late: list[tuple[int, bytes]] = []
         self.is_cut = self.is_gone = self.is_closed = False
+        self.late_ns: dict[int, int] = {}
+        self.damaged: set[int] = set()
         self.sent: list[bytes] = []
+        self.received = 0
 
     def inject(self, data: bytes) -> None:
         """Let bytes arrive that no servo has sent."""
         self._arrived += data
 
+    def clearPort(self) -> None:
+        """Discard what has arrived."""
+        self.getBytesAvailable()
+        self._arrived.clear()
+
+    def writePort(self, packet: Sequence[int]) -> int:
+        """Send a packet."""
+        self.getBytesAvailable()
+        self.sent.append(bytes(packet))
+        if not self.is_cut:
+            for servo_id, answer in wire.execute(self._line, bytes(packet)).items():
+                if servo_id in self.late_ns:
+                    self._late.append((self._line.now_ns + self.late_ns[servo_id], answer))
+                    break  # Servos behind it wait.
+                damage = 0x55 if servo_id in self.damaged else 0
+                self._arrived += answer[:-1] + bytes([answer[-1] ^ damage])
+                self.received += len(answer)
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:
+        """Return at most `length` bytes of what has arrived."""
+        self.getBytesAvailable()
+        data = bytes(self._arrived[: max(length, 0)])
+        del self._arrived[: max(length, 0)]
+        return data
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Do nothing: answers take no time."""
+
+    def isPacketTimeout(self) -> bool:
+        """Return whether nothing is left to read."""
+        return not self.getBytesAvailable()
+
+    def getBytesAvailable(self) -> int:
+        """Return the number of bytes that have arrived."""
+        if self.is_gone:
+            raise OSError(5, "Input/output error")
+        due = [one for one in self._late if one[0] <= self._line.now_ns]
+        self._late = [one for one in self._late if one not in due]
+        self._arrived += b"".join(data for _, data in due)
+        return len(self._arrived)
+
     def closePort(self) -> None:
         """Note that the port was closed."""
         self.is_closed = True
-
-    def _reach(self, data: bytes) -> bytes:
-        if self.is_gone:
-            raise OSError(5, "Input/output error")
-        if data:
-            self.sent.append(data)
-        if self.is_cut:
-            return b""
-        if data:
-            self._line.receive(data)
-        return self._line.send()
 
 
 class Rig:
@@ -92,7 +137,7 @@ class Rig:
             plans = [ServoPlan(one.id, MODEL, angle=2.0 * one.id) for one in self.settings.servos]
         self.line = SimulatedBus(plans)
         self.port = FaultyPort(self.line)
-        self.bus = ServoBus(self.settings, lambda _: self.port)
+        self.bus = ServoBus(self.settings, SerialServoPort(self.port, self.settings.device))
 
     def start(self) -> Rig:
         """Set it up and hold it, with the zeros where the spools are."""

@@ -61,7 +61,7 @@ def test_a_fault_ends_it() -> None:
     rig.bus.set_up()
     rig.bus.hold()
     homing = Homing(rig.settings)
-    rig.twin("PI").faults.mute = True
+    rig.twin("PI").mute = True
     _home(rig, homing)
     assert homing.failure.startswith("No zero: Servo PI (id 7) does not answer")
 

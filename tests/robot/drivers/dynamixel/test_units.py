@@ -24,6 +24,7 @@ def _servos(draw: st.DrawFn) -> ServoSettings:
         spool_radius_m=radius,
         most_tension_n=most,
         pretension_n=draw(st.floats(least, most)),
+        homing_n=most,
         direction=draw(st.sampled_from((1, -1))),
     )
 

@@ -2,5 +2,6 @@
 
 `ServoBus` (`bus`) is the bus of a rig, and `Homing` finds the zeros of its tendons. `output` and
 `sensor` are the drivers that a profile names. Below them, `settings` has models, servos and their
-units, `protocol` registers and packets over `dynamixel_sdk`, and `health` the fault detection.
+units, `health` the fault detection, and `protocol` registers and instructions. Only `serial_port`
+needs `dynamixel_sdk`, for bytes and packets.
 """

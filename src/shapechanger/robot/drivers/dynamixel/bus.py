@@ -29,131 +29,15 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
     RETURN_DELAY,
     TORQUE_ENABLE,
     WATCHDOG_STEP_NS,
-    OpenPort,
     Register,
     RegisterBus,
     ServoPoller,
+    ServoPort,
     ServoReply,
     decode_present,
     hardware_errors,
-    open_serial_port,
 )
 from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
-
-
-class Ramp:
-    """Linear ramp of tensions.
-
-    Args:
-        start: First tension of each tendon, N, by name.
-        end: Last tension of each tendon, N; no tendon starts below it.
-        since_ns: Time of the start.
-        ramp_ms: Duration, ms.
-    """
-
-    def __init__(
-        self, start: Mapping[str, float], end: Mapping[str, float], since_ns: int, ramp_ms: int
-    ) -> None:
-        # A stop never pulls harder.
-        self._start = {name: max(value, end[name]) for name, value in start.items()}
-        self._end = dict(end)
-        self._since_ns = since_ns
-        self._ramp_ns = ramp_ms * 1_000_000
-
-    def tensions(self, now_ns: int) -> dict[str, float]:
-        """Return the tension of each tendon, N."""
-        left = self._left(now_ns)
-        return {
-            name: self._end[name] + left * (value - self._end[name])
-            for name, value in self._start.items()
-        }
-
-    def is_over(self, now_ns: int) -> bool:
-        """Return whether the ramp has ended."""
-        return self._left(now_ns) == 0.0
-
-    def _left(self, now_ns: int) -> float:
-        """Return the share of the ramp that is left, 1 to 0."""
-        gone_ns = now_ns - self._since_ns
-        if gone_ns >= self._ramp_ns:
-            return 0.0
-        return min(1.0, 1.0 - gone_ns / self._ramp_ns)
-
-
-def _watchdog_steps(bus: BusSettings) -> int:
-    """Return the time of the watchdog in steps of 20 ms."""
-    return bus.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
-
-
-def _check_servos(registers: RegisterBus, bus: BusSettings) -> None:
-    """Check that every servo answers and has the right model.
-
-    Raises:
-        RobotError: If one is missing, is of another model, or its firmware is too old.
-    """
-    models = {servo.id: registers.ping(servo.id) for servo in bus.servos}
-    if missing := [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is None]:
-        there = [f"{one.name} (id {one.id})" for one in bus.servos if models[one.id] is not None]
-        raise RobotError(
-            f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
-            f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and baud, "
-            "and at the latency timer of the adapter."
-        )
-    for servo in bus.servos:
-        known, number = servo.known, models[servo.id]
-        if number != known.number:
-            raise RobotError(
-                f"{servo.words} is not an {known.name}: its model number is {number}, "
-                f"not {known.number}."
-            )
-        firmware = registers.read(servo.id, FIRMWARE)
-        if firmware < known.least_firmware:
-            raise RobotError(
-                f"{servo.words} has firmware {firmware}; its own watchdog needs "
-                f"{known.least_firmware} or newer."
-            )
-
-
-def _prepare_servo(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
-    """Prepare a servo: current mode, its current limit, no goal, and no torque.
-
-    Raises:
-        RobotError: If it does not answer, refuses, or has switched itself off.
-    """
-    registers.write(servo.id, TORQUE_ENABLE, 0)
-    registers.write(servo.id, BUS_WATCHDOG, 0)  # A tripped watchdog blocks all goals.
-    if error := registers.read(servo.id, HARDWARE_ERROR):
-        words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
-        raise RobotError(
-            f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque again, "
-            "after which its zero must be found again."
-        )
-    # These are in the EEPROM, which wears out: write them only if they differ.
-    _ensure(registers, servo, RETURN_DELAY, 0)
-    _ensure(registers, servo, DRIVE_MODE, 0)
-    _ensure(registers, servo, OPERATING_MODE, CURRENT_MODE)
-    _ensure(registers, servo, CURRENT_LIMIT, servo.most_counts)
-    # A change of mode sets the goal to the limit.
-    registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
-
-
-def _enable_torque(registers: RegisterBus, bus: BusSettings, servo: ServoSettings) -> None:
-    """Enable the torque of a servo, with a goal of 0 and a running watchdog.
-
-    Raises:
-        RobotError: If it does not answer or refuses.
-    """
-    registers.write(servo.id, BUS_WATCHDOG, 0)
-    registers.write(servo.id, GOAL_CURRENT, 0)
-    registers.write(servo.id, BUS_WATCHDOG, _watchdog_steps(bus))
-    registers.write(servo.id, TORQUE_ENABLE, 1)
-
-
-def _ensure(registers: RegisterBus, servo: ServoSettings, register: Register, value: int) -> None:
-    if registers.read(servo.id, register) != value:
-        registers.write(servo.id, register, value)
-
 
 # One of them is read in each cycle, so a trip is detected within four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
@@ -167,22 +51,20 @@ class ServoBus:
 
     Args:
         settings: The bus and its servos.
-        open_port: Opens the port; a twin has its own.
-
-    Raises:
-        RobotError: If the port cannot be opened.
+        port: Port of the bus, which `close` closes.
     """
 
-    def __init__(self, settings: BusSettings, open_port: OpenPort = open_serial_port) -> None:
+    def __init__(self, settings: BusSettings, port: ServoPort) -> None:
         self._settings = settings
         self._servos = {servo.name: servo for servo in settings.servos}
-        self._registers = RegisterBus(open_port(settings), settings.device)
+        self._registers = RegisterBus(port, settings.device)
         self._ids = {servo.id: servo for servo in settings.servos}
         self._poller = ServoPoller(self._registers, tuple(self._ids))
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
         self._zeros: dict[str, int] = {}
         self._mode: Mode = "off"
-        self._ramp: Ramp | None = None
+        self._stopped_at: dict[str, float] = {}  # N, when the stop began.
+        self._stopped_ns = 0
         self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
         self._requested = dict.fromkeys(self._servos, 0.0)  # N, as last requested.
         self._cycles = 0
@@ -202,7 +84,11 @@ class ServoBus:
     @property
     def faults(self) -> dict[str, str]:
         """Faults, as in `BusState.faults`."""
-        return self._faults()
+        faults = {"": self._gone} if self._gone else {}
+        for servo_id, servo in self._ids.items():
+            if fault := self._health[servo_id].fault:
+                faults[servo.name] = fault
+        return faults
 
     @property
     def is_ready(self) -> bool:
@@ -215,12 +101,12 @@ class ServoBus:
         Raises:
             RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
         """
-        self._mode, self._ramp, self._gone, self._is_ready = "off", None, "", False
+        self._mode, self._gone, self._is_ready = "off", "", False
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.sync_write(TORQUE_ENABLE, dict.fromkeys(self._ids, 0))
-        _check_servos(self._registers, self._settings)
+        self._check_servos()
         for servo in self._settings.servos:
-            _prepare_servo(self._registers, self._settings, servo)
+            self._prepare(servo)
         self._poller.suspects.clear()
         for health in self._health.values():
             health.clear()
@@ -232,14 +118,16 @@ class ServoBus:
         Raises:
             RobotError: If there is a fault, or a servo refuses; then all have let go.
         """
-        if self._mode != "off" or self._faults() or not self._is_ready:
-            why = " ".join(self._faults().values())
+        if self._mode != "off" or self.faults or not self._is_ready:
+            why = " ".join(self.faults.values())
             why = why or ("they are not set up." if not self._is_ready else "they are already.")
             raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
         self._goals = dict.fromkeys(self._ids, 0)
         try:
             for servo in self._settings.servos:
-                _enable_torque(self._registers, self._settings, servo)
+                self._registers.write(servo.id, BUS_WATCHDOG, 0)
+                self._start_watchdog(servo)
+                self._registers.write(servo.id, TORQUE_ENABLE, 1)
         except RobotError:
             self.release()
             raise
@@ -274,22 +162,22 @@ class ServoBus:
         if tensions is not None:
             self._request(tensions)
         if self._mode == "silent":
-            return BusState(now_ns, "silent", {}, self._missed(), self._faults())
+            return BusState(now_ns, "silent", {}, self.faults)
         heard: dict[int, ServoReply] = {}
-        self._registers.has_stray = False
+        self._registers.port.has_stray = False
         try:
             self._send_goals(now_ns)
             heard = self._poller.read(PRESENT)
             self._audit(heard)
         except RobotError as error:
             self._gone = self._gone or str(error)
-        servos = self._evaluate(heard, now_ns, late=self._registers.has_stray)
-        if self._faults() and self._mode == "held":
+        servos = self._evaluate(heard, now_ns, late=self._registers.port.has_stray)
+        if self.faults and self._mode == "held":
             self.stop(now_ns)
-        if self._ramp is not None and self._ramp.is_over(now_ns):
+        if self._mode == "stopping" and self._ramp_left(now_ns) == 0.0:
             self.release()
         self._cycles += 1
-        return BusState(now_ns, self._mode, servos, self._missed(), self._faults())
+        return BusState(now_ns, self._mode, servos, self.faults)
 
     def send(self, tensions: Mapping[str, float]) -> None:
         """Send tensions at once, without reading anything.
@@ -315,10 +203,8 @@ class ServoBus:
     def stop(self, now_ns: int) -> None:
         """Start to ramp the tensions down in the coming cycles, and then to let go."""
         if self._mode == "held":
-            # A tendon that was not pulled yet stays so.
-            start = {one.name: self._goal_n(one) for one in self._settings.servos}
-            end = {name: min(self._servos[name].pretension_n, n) for name, n in start.items()}
-            self._ramp = Ramp(start, end, now_ns, self._settings.ramp_ms)
+            self._stopped_at = {one.name: self._goal_n(one) for one in self._settings.servos}
+            self._stopped_ns = now_ns
             self._mode = "stopping"
 
     def release(self) -> None:
@@ -327,7 +213,6 @@ class ServoBus:
         If a servo does not confirm it, even when asked twice, the bus falls silent, so that the
         watchdog of that servo stops it. `set_up` ends the silence.
         """
-        self._ramp = None
         self._goals = dict.fromkeys(self._ids, 0)
         holding = set(self._ids)
         try:
@@ -362,7 +247,66 @@ class ServoBus:
         """Let go of all tendons and close the port."""
         if self._mode != "silent":
             self.release()
-        self._registers.close()
+        self._registers.port.close()
+
+    def _check_servos(self) -> None:
+        """Check that every servo answers, has the right model and firmware that is new enough."""
+        bus, registers = self._settings, self._registers
+        models = {servo.id: registers.ping(servo.id) for servo in bus.servos}
+        names = {servo.id: f"{servo.name} (id {servo.id})" for servo in bus.servos}
+        if missing := [names[one] for one, number in models.items() if number is None]:
+            there = [names[one] for one, number in models.items() if number is not None]
+            raise RobotError(
+                f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
+                f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and "
+                "baud, and at the latency timer of the adapter."
+            )
+        for servo in bus.servos:
+            known, number = servo.known, models[servo.id]
+            if number != known.number:
+                raise RobotError(
+                    f"{servo.words} is not an {known.name}: its model number is {number}, "
+                    f"not {known.number}."
+                )
+            firmware = registers.read(servo.id, FIRMWARE)
+            if firmware < known.least_firmware:
+                raise RobotError(
+                    f"{servo.words} has firmware {firmware}; its own watchdog needs "
+                    f"{known.least_firmware} or newer."
+                )
+
+    def _prepare(self, servo: ServoSettings) -> None:
+        """Set up current mode, the current limit, no goal and no torque.
+
+        Raises:
+            RobotError: If the servo does not answer, refuses, or has switched itself off.
+        """
+        registers = self._registers
+        registers.write(servo.id, TORQUE_ENABLE, 0)
+        registers.write(servo.id, BUS_WATCHDOG, 0)  # A tripped watchdog blocks all goals.
+        if error := registers.read(servo.id, HARDWARE_ERROR):
+            words = ", ".join(hardware_errors(error)) or f"it gives the unknown code {error}"
+            raise RobotError(
+                f"{servo.words} has switched itself off: {words}. Only a reboot gives it torque "
+                "again, after which its zero must be found again."
+            )
+        for register, value in (
+            (RETURN_DELAY, 0),
+            (DRIVE_MODE, 0),
+            (OPERATING_MODE, CURRENT_MODE),
+            (CURRENT_LIMIT, servo.most_counts),
+        ):
+            # These are in the EEPROM, which wears out: write them only if they differ.
+            if registers.read(servo.id, register) != value:
+                registers.write(servo.id, register, value)
+        self._start_watchdog(servo)
+
+    def _start_watchdog(self, servo: ServoSettings) -> None:
+        """Set the goal to 0 and start the watchdog."""
+        # A change of mode sets the goal to the limit.
+        self._registers.write(servo.id, GOAL_CURRENT, 0)
+        steps = self._settings.watchdog_ms * 1_000_000 // WATCHDOG_STEP_NS
+        self._registers.write(servo.id, BUS_WATCHDOG, steps)
 
     def _let_go(self) -> set[int]:
         """Return the servos that confirm that they have no torque."""
@@ -386,13 +330,22 @@ class ServoBus:
     def _send_goals(self, now_ns: int) -> None:
         if self._mode == "off":
             return
-        wanted = self._requested if self._ramp is None else self._ramp.tensions(now_ns)
         for name, servo in self._servos.items():
-            # A servo with a fault lets go at once, while the others ramp down.
-            failed = self._mode == "stopping" and self._health[servo.id].fault
-            pull = wanted[name] if self._ramp is not None else servo.clip(wanted[name])
-            self._goals[servo.id] = 0 if failed else servo.goal_count(pull)
+            if self._mode == "held":
+                pull = servo.clip(self._requested[name])
+            elif self._health[servo.id].fault:
+                pull = 0.0  # A servo with a fault lets go at once, while the others ramp down.
+            else:
+                start = self._stopped_at[name]
+                end = min(servo.pretension_n, start)  # A tendon that was not pulled yet stays so.
+                pull = end + self._ramp_left(now_ns) * (start - end)
+            self._goals[servo.id] = servo.goal_count(pull)
         self._registers.sync_write(GOAL_CURRENT, self._goals)
+
+    def _ramp_left(self, now_ns: int) -> float:
+        """Return the share of the ramp of a stop that is left, 1 to 0."""
+        gone_ns, ramp_ns = now_ns - self._stopped_ns, self._settings.ramp_ms * 1_000_000
+        return 0.0 if gone_ns >= ramp_ns else min(1.0, 1.0 - gone_ns / ramp_ns)
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
         """Read a register that shows obedience, and drop servos that may have restarted."""
@@ -436,25 +389,11 @@ class ServoBus:
                 lengthening_m_per_s=servo.lengthening(present.speed),
                 tension_n=servo.tension_n(present.current),
                 goal_n=self._goal_n(servo),
-                is_capped=self._mode == "held"
-                and self._requested[servo.name] > servo.most_tension_n,
-                voltage_v=present.voltage,
-                temperature_c=present.temperature,
             )
         return states
 
     def _goal_n(self, servo: ServoSettings) -> float:
         return servo.tension_n(self._goals[servo.id])
-
-    def _missed(self) -> dict[str, int]:
-        return {servo.name: self._health[one].missed for one, servo in self._ids.items()}
-
-    def _faults(self) -> dict[str, str]:
-        faults = {"": self._gone} if self._gone else {}
-        for servo_id, servo in self._ids.items():
-            if fault := self._health[servo_id].fault:
-                faults[servo.name] = fault
-        return faults
 
     def _servo(self, name: str) -> ServoSettings:
         if name not in self._servos:

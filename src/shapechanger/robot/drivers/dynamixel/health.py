@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from shapechanger.robot.drivers.dynamixel.protocol import (
     BUS_WATCHDOG,
@@ -37,9 +37,6 @@ class ServoState:
         lengthening_m_per_s: Rate of change of that length, m/s.
         tension_n: Tension of its present current, N, without the gears' friction.
         goal_n: Tension of its goal current, N: limited and in whole counts.
-        is_capped: Whether the requested tension was above the limit.
-        voltage_v: Voltage, V.
-        temperature_c: Temperature, degrees Celsius.
     """
 
     position: int
@@ -47,9 +44,6 @@ class ServoState:
     lengthening_m_per_s: float
     tension_n: float
     goal_n: float
-    is_capped: bool
-    voltage_v: float
-    temperature_c: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +54,6 @@ class BusState:
         at_ns: Time of the cycle.
         mode: Mode from now on.
         servos: Readings of this cycle by tendon, without servos that did not answer.
-        missed: Cycles in a row without an answer, by tendon.
         faults: Faults as sentences, by tendon, or "" for the bus. They stay until
             `ServoBus.set_up`.
     """
@@ -68,13 +61,26 @@ class BusState:
     at_ns: int
     mode: Mode
     servos: Mapping[str, ServoState]
-    missed: Mapping[str, int]
     faults: Mapping[str, str]
 
     @property
     def reason(self) -> str:
         """All faults as one text; empty without faults."""
         return " ".join(self.faults.values())
+
+
+# Consecutive cycles with a wrong voltage or temperature that make a fault.
+_BELIEVED_CYCLES: Final = 3
+# K below the model's temperature limit at which a servo is too hot.
+_MARGIN_C: Final = 5.0
+# One wrong goal was lost on the way and is replaced by the next.
+_MAX_WRONG_GOALS: Final = 2
+# Length from the zero, m, to which the finger cannot let a tendon shorten. Chosen: the longest
+# excursion of a finger's tendon is 42 mm.
+_SHORTEST_M: Final = -0.06
+# Share of the speed without load, and time at it, with which a tendon counts as lost.
+_SLACK_SHARE: Final = 0.7
+_SLACK_NS: Final = 100_000_000
 
 
 class SlackDetector:
@@ -86,15 +92,11 @@ class SlackDetector:
     while its servo stands still at the pretension is detected with the next pull.
 
     Args:
-        shortest_m: Length to which the finger cannot let the tendon shorten, m.
-        most_m_per_s: Speed of winding in of a servo without load, m/s.
-        slack_ms: Time for which it must be so fast, ms.
+        no_load_m_per_s: Speed of winding in of a servo without load, m/s.
     """
 
-    def __init__(self, shortest_m: float, most_m_per_s: float, slack_ms: int) -> None:
-        self._shortest_m = shortest_m
-        self._most_m_per_s = most_m_per_s
-        self._slack_ns = slack_ms * 1_000_000
+    def __init__(self, no_load_m_per_s: float) -> None:
+        self._most_m_per_s = _SLACK_SHARE * no_load_m_per_s
         self._since_ns: int | None = None
 
     def see(self, length: float | None, lengthening: float, now_ns: int) -> str:
@@ -108,20 +110,16 @@ class SlackDetector:
         Returns:
             Reason why the tendon is lost; empty if it is not.
         """
-        if length is not None and length < self._shortest_m:
+        if length is not None and length < _SHORTEST_M:
             return f"it is wound in by {-1e3 * length:.0f} mm, further than the finger lets it"
         if -lengthening < self._most_m_per_s:
             self._since_ns = None
             return ""
         if self._since_ns is None:
             self._since_ns = now_ns
-        if now_ns - self._since_ns >= self._slack_ns:
+        if now_ns - self._since_ns >= _SLACK_NS:
             return f"it winds in at {-1e3 * lengthening:.0f} mm/s, as without any load"
         return ""
-
-
-# One wrong goal was lost on the way and is replaced by the next.
-_MAX_WRONG_GOALS = 2
 
 
 class ServoHealth:
@@ -145,9 +143,8 @@ class ServoHealth:
 
     def clear(self) -> None:
         """Clear the fault."""
-        model, bus = self._servo.known, self._bus
-        most_m_per_s = bus.slack_share * model.no_load_rad_per_s * self._servo.spool_radius_m
-        self._slack = SlackDetector(self._servo.shortest_m, most_m_per_s, bus.slack_ms)
+        no_load = self._servo.known.no_load_rad_per_s
+        self._slack = SlackDetector(no_load * self._servo.spool_radius_m)
         self._wrong_volts = self._hot = self._refused = 0
         self._was_late = False
         self.fault = ""
@@ -178,11 +175,11 @@ class ServoHealth:
         model = self._servo.known
         volts, degrees = present.voltage, present.temperature
         self._wrong_volts = 0 if model.least_v <= volts <= model.most_v else self._wrong_volts + 1
-        if self._wrong_volts >= self._bus.believed_cycles:
+        if self._wrong_volts >= _BELIEVED_CYCLES:
             self._fail(f"has {volts:.1f} V, and needs {model.least_v:g} to {model.most_v:g} V")
-        most_c = model.most_c - self._bus.margin_c
+        most_c = model.most_c - _MARGIN_C
         self._hot = self._hot + 1 if degrees > most_c else 0
-        if self._hot >= self._bus.believed_cycles:
+        if self._hot >= _BELIEVED_CYCLES:
             self._fail(f"has {degrees:.0f} C, more than {most_c:g} C")
         if pulls:
             speed = self._servo.lengthening(present.speed)

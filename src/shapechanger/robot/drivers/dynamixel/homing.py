@@ -59,7 +59,7 @@ class Homing:
         travel_m: float = 0.06,
     ) -> None:
         for servo in settings.servos:
-            friction, pull = servo.friction_n, servo.homing_tension_n
+            friction, pull = servo.friction_n, servo.homing_n
             if friction is not None and pull <= friction:
                 raise RobotError(
                     f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
@@ -79,7 +79,7 @@ class Homing:
         """Tension to send for each tendon, N."""
         if self.failure:
             return {name: servo.pretension_n for name, servo in self._servos.items()}
-        return {name: servo.homing_tension_n for name, servo in self._servos.items()}
+        return {name: servo.homing_n for name, servo in self._servos.items()}
 
     def see(self, state: BusState) -> None:
         """Evaluate the state of the bus after a cycle."""

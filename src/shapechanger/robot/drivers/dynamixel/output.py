@@ -7,9 +7,11 @@ tensions, which are sent in one packet when all of them are staged.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.dynamixel.bus import ServoBus
+from shapechanger.robot.drivers.dynamixel.health import BusState
 from shapechanger.robot.drivers.dynamixel.settings import (
     ServoSettings,
     bus_settings,
@@ -18,10 +20,6 @@ from shapechanger.robot.drivers.dynamixel.settings import (
 from shapechanger.robot.drivers.settings import text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
-
-if TYPE_CHECKING:  # They need the SDK, which is loaded when a bus is opened.
-    from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-    from shapechanger.robot.drivers.dynamixel.health import BusState
 
 
 class SharedBus:
@@ -57,10 +55,8 @@ class SharedBus:
 
     def begin(self) -> None:
         """Set up all servos, without torque; see `SharedDevice.begin`."""
-        from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-
         settings = bus_settings(self._settings, tuple(self._servos.values()))
-        bus = ServoBus(settings, self._hardware.servo_port)
+        bus = ServoBus(settings, self._hardware.servo_port(settings))
         try:
             bus.set_up()
         except BaseException:
@@ -155,6 +151,10 @@ def _join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSet
 
 def bus_at(device: str, hardware: Hardware) -> SharedBus:
     """Return the bus at a device.
+
+    Args:
+        device: Serial device.
+        hardware: Hardware of the bus.
 
     Raises:
         RobotError: If no output is on it.

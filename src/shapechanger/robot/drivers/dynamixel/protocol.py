@@ -1,134 +1,13 @@
-"""Serial port, registers and packets of Dynamixel protocol 2.0, on top of the SDK."""
+"""Registers and instructions of Dynamixel protocol 2.0, independent of how packets travel."""
 
 from __future__ import annotations
 
-import contextlib
-import select
-import termios
-import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
 
-from shapechanger.errors import MissingExtra, RobotError
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-
-try:
-    from dynamixel_sdk import PacketHandler, PortHandler
-except ImportError as error:
-    raise MissingExtra("dynamixel-sdk", "finger") from error
-
-
-# Bytes that may still be read after the timeout of an answer: they arrived while the process did
-# not run. More is endless noise, which the SDK would read for ever.
-_MAX_LATE_BYTES: Final = 1024
-
-
-class Port(Protocol):
-    """Port of the SDK's packet handler, such as its `PortHandler`."""
-
-    is_using: bool
-
-    def clearPort(self) -> None:
-        """Discard what has arrived."""
-        ...
-
-    def writePort(self, packet: Sequence[int]) -> int:
-        """Send bytes and return how many were accepted."""
-        ...
-
-    def readPort(self, length: int) -> bytes:
-        """Return at most `length` bytes of what has arrived."""
-        ...
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the timeout of an answer of so many bytes."""
-        ...
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Start a timeout."""
-        ...
-
-    def isPacketTimeout(self) -> bool:
-        """Return whether the timeout has passed."""
-        ...
-
-    def getBytesAvailable(self) -> int:
-        """Return the number of bytes that have arrived and were not read."""
-        ...
-
-    def getBaudRate(self) -> int:
-        """Return the baud rate."""
-        ...
-
-    def closePort(self) -> None:
-        """Close the device."""
-        ...
-
-
-OpenPort = Callable[[BusSettings], Port]
-"""Opens the port of a bus."""
-
-
-class PromptPort(PortHandler):
-    """The SDK's port with a timeout as short as the bus allows.
-
-    The SDK alone waits 34 ms for each missing answer, by a clock that changes with the date, and
-    keeps the processor busy meanwhile. A stop cannot wait for that.
-
-    Args:
-        device: Serial device.
-        answer_ms: Time for the servos to start an answer, ms.
-    """
-
-    def __init__(self, device: str, answer_ms: float) -> None:
-        super().__init__(device)
-        self._answer_ms = answer_ms
-        self._late_bytes = 0
-
-    def getCurrentTime(self) -> float:
-        """Return the monotonic time in milliseconds."""
-        return time.monotonic_ns() / 1e6
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the timeout of an answer of so many bytes."""
-        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self._answer_ms)
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Start a timeout."""
-        self._late_bytes = _MAX_LATE_BYTES
-        super().setPacketTimeoutMillis(msec)
-
-    def readPort(self, length: int) -> bytes:
-        """Return at most `length` bytes, waiting for the first until the timeout."""
-        if length <= 0:
-            return b""
-        left_ms = self.packet_timeout - self.getTimeSinceStart()
-        if left_ms > 0.0:
-            select.select([self.ser.fd], [], [], left_ms / 1e3)
-            return super().readPort(length)
-        data = super().readPort(min(length, self._late_bytes))
-        self._late_bytes -= len(data)
-        return data
-
-
-def open_serial_port(settings: BusSettings) -> PromptPort:
-    """Open the port of a bus.
-
-    Raises:
-        RobotError: If it cannot be opened with this baud rate.
-    """
-    port = PromptPort(settings.device, settings.answer_ms)
-    try:
-        opened = port.setBaudRate(settings.baud)
-    except OSError as error:
-        raise RobotError(f"The bus at {settings.device} cannot be opened: {error}.") from error
-    if not opened:
-        raise RobotError(
-            f"The bus at {settings.device} cannot have {settings.baud} baud; "
-            "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
-        )
-    return port
+from shapechanger.errors import RobotError
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +25,11 @@ class Register:
     address: int
     size: int
     signed: bool = False
+
+    @property
+    def span(self) -> bytes:
+        """Address and size, as parameters of an instruction."""
+        return self.address.to_bytes(2, "little") + self.size.to_bytes(2, "little")
 
     def encode(self, value: int) -> bytes:
         """Encode a value."""
@@ -174,6 +58,7 @@ TRIPPED: Final = 0xFF
 """Value of the bus watchdog after it has stopped the servo."""
 WATCHDOG_STEP_NS: Final = 20_000_000
 
+_PRESENT: Final = struct.Struct("<hiiiiHB")
 _A_VELOCITY: Final = 0.229 * 6.283185307179586 / 60.0  # rad/s: 0.229 rpm.
 _HARDWARE_ERRORS: Final = {
     0: "its voltage is out of range",
@@ -204,17 +89,8 @@ class Present(NamedTuple):
 
 def decode_present(data: bytes) -> Present:
     """Decode the 21 bytes of `PRESENT`."""
-
-    def signed(start: int, size: int) -> int:
-        return int.from_bytes(data[start : start + size], "little", signed=True)
-
-    return Present(
-        current=signed(0, 2),
-        speed=signed(2, 4) * _A_VELOCITY,
-        position=signed(6, 4),
-        voltage=int.from_bytes(data[18:20], "little") * 0.1,
-        temperature=float(data[20]),
-    )
+    current, speed, position, _, _, tenth_volts, degrees = _PRESENT.unpack(data)
+    return Present(current, speed * _A_VELOCITY, position, tenth_volts * 0.1, float(degrees))
 
 
 def hardware_errors(bits: int) -> tuple[str, ...]:
@@ -222,15 +98,22 @@ def hardware_errors(bits: int) -> tuple[str, ...]:
     return tuple(words for bit, words in _HARDWARE_ERRORS.items() if bits >> bit & 1)
 
 
-ALERT: Final = 0x80
-"""Bit of a status packet's error: the hardware error status is not 0."""
+BROADCAST: Final = 0xFE
+"""Id that addresses all servos."""
 
-# Results of the SDK (robotis_def.py).
-_SUCCESS: Final = 0
-_RX_TIMEOUT: Final = -3001
-_RX_CORRUPT: Final = -3002
-# Damaged packets to skip while waiting for valid ones.
-_MAX_DAMAGED: Final = 8
+PING: Final = 0x01
+READ: Final = 0x02
+WRITE: Final = 0x03
+REBOOT: Final = 0x08
+SYNC_READ: Final = 0x82
+SYNC_WRITE: Final = 0x83
+
+ALERT: Final = 0x80
+"""Bit of a reply's error: the hardware error status is not 0."""
+REFUSED: Final = 0x7F
+"""Bits of a reply's error with the reason of a refusal."""
+
+_PING_BYTES: Final = 3  # Model number and firmware.
 # A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
 
@@ -246,7 +129,7 @@ _REFUSALS: Final = {
 
 
 class ServoReply(NamedTuple):
-    """Answer of a servo.
+    """Reply of a servo.
 
     Attributes:
         error: Error byte of the status packet.
@@ -257,6 +140,45 @@ class ServoReply(NamedTuple):
     data: bytes
 
 
+class ServoPort(Protocol):
+    """Port of a servo bus: serial, or of a twin.
+
+    Attributes:
+        has_stray: Whether a late answer was found before a request; the reader resets it.
+    """
+
+    has_stray: bool
+
+    def exchange(
+        self,
+        servo_id: int,
+        instruction: int,
+        parameters: bytes,
+        ids: Sequence[int],
+        length: int,
+    ) -> dict[int, ServoReply]:
+        """Send an instruction and wait for the replies.
+
+        Args:
+            servo_id: Id of the addressed servo, or `BROADCAST`.
+            instruction: Code of the instruction.
+            parameters: Its parameters.
+            ids: Servos that reply; empty for an instruction without a reply.
+            length: Bytes of data in each reply; a refusal may have fewer.
+
+        Returns:
+            The replies by id, without servos that did not answer.
+
+        Raises:
+            RobotError: If the bus is gone.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close the port."""
+        ...
+
+
 class RegisterBus:
     """Reads and writes registers of the servos on a bus.
 
@@ -265,14 +187,12 @@ class RegisterBus:
         device: Name of the bus in messages.
 
     Attributes:
-        has_stray: Whether a late answer was found before a request; the reader resets it.
+        port: Port of the bus.
     """
 
-    def __init__(self, port: Port, device: str) -> None:
-        self._port = port
+    def __init__(self, port: ServoPort, device: str) -> None:
+        self.port = port
         self._device = device
-        self._sdk = PacketHandler(2.0)
-        self.has_stray = False
 
     def ping(self, servo_id: int) -> int | None:
         """Return the model number of a servo; None if it does not answer.
@@ -280,55 +200,37 @@ class RegisterBus:
         Raises:
             RobotError: If the bus is gone.
         """
-        for _ in range(_TRIES):
-            with self._request():
-                model, result, _ = self._sdk.ping(self._port, servo_id)
-                if result == _SUCCESS:
-                    return model
-        return None
+        reply = self._ask(servo_id, PING, b"", _PING_BYTES)
+        if reply is None or len(reply.data) != _PING_BYTES:
+            return None
+        return int.from_bytes(reply.data[:2], "little")
 
     def read(self, servo_id: int, register: Register) -> int:
         """Read a register of one servo.
 
         Args:
-            servo_id: Number of the servo on the bus.
+            servo_id: Id of the servo.
             register: The register.
 
         Raises:
             RobotError: If it does not answer or refuses.
         """
-        for _ in range(_TRIES):
-            with self._request():
-                data, result, error = self._sdk.readTxRx(
-                    self._port, servo_id, register.address, register.size
-                )
-                if result == _SUCCESS:
-                    self._check(servo_id, f"read its {register.name}", error)
-                    if len(data) == register.size:
-                        return register.decode(bytes(data))
-        raise self._no_answer(servo_id)
+        what = f"read its {register.name}"
+        return register.decode(self._demand(what, servo_id, READ, register.span, register.size))
 
     def write(self, servo_id: int, register: Register, value: int) -> None:
         """Write a register of one servo and wait for its confirmation.
 
         Args:
-            servo_id: Number of the servo on the bus.
+            servo_id: Id of the servo.
             register: The register.
             value: The new value, in the register's unit.
 
         Raises:
             RobotError: If it does not answer or refuses.
         """
-        data = register.encode(value)
-        for _ in range(_TRIES):
-            with self._request():
-                result, error = self._sdk.writeTxRx(
-                    self._port, servo_id, register.address, register.size, data
-                )
-                if result == _SUCCESS:
-                    self._check(servo_id, f"set its {register.name} to {value}", error)
-                    return
-        raise self._no_answer(servo_id)
+        what = f"set its {register.name} to {value}"
+        self._demand(what, servo_id, WRITE, register.span[:2] + register.encode(value), 0)
 
     def reboot(self, servo_id: int) -> None:
         """Reboot a servo.
@@ -336,99 +238,61 @@ class RegisterBus:
         Raises:
             RobotError: If it does not answer.
         """
-        with self._request():
-            result, _ = self._sdk.reboot(self._port, servo_id)
-            if result == _SUCCESS:
-                return
-        raise self._no_answer(servo_id)
+        # Only once: it does not answer while it starts.
+        if self._ask(servo_id, REBOOT, b"", 0, tries=1) is None:
+            raise self._no_answer(servo_id)
 
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
-        """Write a register of several servos in one packet, which has no answer.
+        """Write a register of several servos with one packet, which has no reply.
 
         Args:
             register: The register.
-            values: New values by the servo's number.
+            values: New values by id.
 
         Raises:
             RobotError: If the bus is gone.
         """
-        data: list[int] = []
-        for servo_id, value in values.items():
-            data += [servo_id, *register.encode(value)]
-        with self._request():
-            result = self._sdk.syncWriteTxOnly(
-                self._port, register.address, register.size, data, len(data)
-            )
-            if result == _SUCCESS:
-                return
-        raise RobotError(f"The bus at {self._device} does not take what is written to it.")
+        items = (bytes([one]) + register.encode(value) for one, value in values.items())
+        self.port.exchange(BROADCAST, SYNC_WRITE, register.span + b"".join(items), (), 0)
 
     def sync_read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read a register of several servos with one packet.
 
         Args:
             register: The register.
-            ids: Numbers of the servos.
+            ids: Ids of the servos.
 
         Returns:
-            The answers by id, without servos that did not answer.
+            The replies by id, without servos that did not answer or refused.
 
         Raises:
             RobotError: If the bus is gone.
         """
-        with self._request():
-            result = self._sdk.syncReadTx(
-                self._port, register.address, register.size, list(ids), len(ids), False
-            )
-            if result == _SUCCESS:
-                return self._answers(register, ids)
-        raise RobotError(f"The bus at {self._device} does not take what is written to it.")
+        parameters = register.span + bytes(ids)
+        heard = self.port.exchange(BROADCAST, SYNC_READ, parameters, ids, register.size)
+        return {one: reply for one, reply in heard.items() if len(reply.data) == register.size}
 
-    def close(self) -> None:
-        """Close the port."""
-        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
-            self._port.closePort()
+    def _ask(
+        self, servo_id: int, instruction: int, parameters: bytes, length: int, tries: int = _TRIES
+    ) -> ServoReply | None:
+        """Send an instruction to one servo until it replies; None if it does not."""
+        for _ in range(tries):
+            heard = self.port.exchange(servo_id, instruction, parameters, (servo_id,), length)
+            if servo_id in heard:
+                return heard[servo_id]
+        return None
 
-    def _answers(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
-        # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
-        # keeps no error byte; so the packets are received one by one here.
-        heard: dict[int, ServoReply] = {}
-        for _ in range(len(ids) + _MAX_DAMAGED):
-            packet, result = self._receive()
-            if result == _RX_TIMEOUT:
-                break
-            if result != _SUCCESS:
-                continue
-            end = 5 + int.from_bytes(bytes(packet[5:7]), "little")
-            servo_id, error, data = packet[4], packet[8], bytes(packet[9:end])
-            if servo_id in ids and len(data) == register.size:
-                heard[servo_id] = ServoReply(error, data)
-            if len(heard) == len(ids):
-                break
-        return heard
-
-    def _receive(self) -> tuple[list[int], int]:
-        try:
-            return self._sdk.rxPacket(self._port, False)
-        except IndexError:  # The SDK trusts the length in a packet.
-            return [], _RX_CORRUPT
-
-    @contextlib.contextmanager
-    def _request(self) -> Generator[None]:
-        """Turn errors of the device into RobotError, and malformed answers into missing ones."""
-        self._port.is_using = False  # The SDK leaves it set after an exception.
-        try:
-            self.has_stray |= self._port.getBytesAvailable() > 0
-            yield
-        except (OSError, termios.error) as error:
-            raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
-        except IndexError:
-            pass  # As in `_receive`: the caller continues as without an answer.
-
-    def _check(self, servo_id: int, what: str, error: int) -> None:
-        if number := error & ~ALERT:
+    def _demand(
+        self, what: str, servo_id: int, instruction: int, parameters: bytes, length: int
+    ) -> bytes:
+        """Return the data of a servo's reply; raise RobotError if it does not answer or refuses."""
+        reply = self._ask(servo_id, instruction, parameters, length)
+        if reply is None:
+            raise self._no_answer(servo_id)
+        if number := reply.error & REFUSED:
             why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
             raise RobotError(f"Servo {servo_id} at {self._device} refuses to {what}: {why}.")
+        return reply.data
 
     def _no_answer(self, servo_id: int) -> RobotError:
         return RobotError(f"Servo {servo_id} at {self._device} does not answer.")

@@ -29,8 +29,10 @@ class ServoModel:
         number: Model number, its answer to a ping.
         ampere_per_count: Unit of its currents, A.
         most_counts: Largest value of its current limit, in that unit.
-        torque_constant: Torque at the output per current, N·m/A: stall torque over stall current.
-        no_load_rad_per_s: Speed without load, rad/s.
+        stall_nm: Stall torque at `volts`, N·m.
+        stall_a: Stall current at `volts`, A.
+        no_load_rpm: Speed without load at `volts`, turns per minute.
+        volts: Nominal voltage, V.
         least_v: Lowest operating voltage, V.
         most_v: Highest operating voltage, V.
         most_c: Temperature at which it shuts itself off, degrees Celsius.
@@ -42,35 +44,43 @@ class ServoModel:
     number: int
     ampere_per_count: float
     most_counts: int
-    torque_constant: float
-    no_load_rad_per_s: float
+    stall_nm: float
+    stall_a: float
+    no_load_rpm: float
+    volts: float
     least_v: float
     most_v: float
-    most_c: float
+    most_c: int
     least_firmware: int = 0
     friction_nm: float | None = None
 
+    @property
+    def torque_constant(self) -> float:
+        """Torque at the output per current, N·m/A."""
+        return self.stall_nm / self.stall_a
 
-def _rpm(value: float) -> float:
-    return value * 2.0 * math.pi / 60.0
+    @property
+    def no_load_rad_per_s(self) -> float:
+        """Speed without load, rad/s."""
+        return self.no_load_rpm * 2.0 * math.pi / 60.0
 
 
-# Source: ROBOTIS e-manual; X330 at 5 V, XM430 at 12 V. Friction: XL330-M288 identified by Rhoban's
-# `bam` (xl330/m1), XC330-M288 fitted on joints of a LEAP hand. The bus watchdog of the X430 needs
-# firmware 38 (e-manual, Bus Watchdog).
+# Source: ROBOTIS e-manual. Friction: XL330-M288 identified by Rhoban's `bam` (xl330/m1),
+# XC330-M288 fitted on joints of a LEAP hand. The bus watchdog of the X430 needs firmware 38
+# (e-manual, Bus Watchdog). The numbers are in the order of the attributes.
 _MODELS: Final = (
-    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52 / 1.47, _rpm(103), 3.5, 7, 70, 0, 0.018),
-    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215 / 1.47, _rpm(383), 3.5, 7, 70),
-    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93 / 1.80, _rpm(81), 3.5, 7, 70, 0, 0.029),
-    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0 / 2.3, _rpm(77), 9.5, 16, 80, 38),
-    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1 / 2.3, _rpm(46), 9.5, 16, 80, 38),
+    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52, 1.47, 103.0, 5.0, 3.5, 7.0, 70, 0, 0.018),
+    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215, 1.47, 383.0, 5.0, 3.5, 7.0, 70),
+    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93, 1.80, 81.0, 5.0, 3.5, 7.0, 70, 0, 0.029),
+    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0, 2.3, 77.0, 12.0, 9.5, 16.0, 80, 38),
+    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1, 2.3, 46.0, 12.0, 9.5, 16.0, 80, 38),
 )
 
 MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for one in _MODELS})
 """Models that the driver supports, by name."""
 
 
-def _model_named(name: str) -> ServoModel:
+def model_named(name: str) -> ServoModel:
     """Return a model by its name.
 
     Raises:
@@ -83,6 +93,7 @@ def _model_named(name: str) -> ServoModel:
 
 _MOST_ID: Final = 252  # Protocol 2.0: 253 to 255 are reserved, 254 is broadcast.
 _MOST_WATCHDOG_MS: Final = 127 * 20
+_BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +110,8 @@ class ServoSettings:
         spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
         most_tension_n: Largest tension, N. The servo's own current limit is set to it.
         pretension_n: Smallest tension while it holds the tendon, N.
+        homing_n: Tension for finding the zero, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
-        torque_constant: Torque per current, N·m/A; None for that of the data sheet. Measuring it
-            with the spool on a scale is better.
-        homing_n: Tension for finding the zero, N; None for the pretension.
-        shortest_m: Length from the zero, m, below 0, to which the finger cannot let the tendon
-            shorten: a servo that winds in further has lost its tendon.
     """
 
     name: str
@@ -113,35 +120,24 @@ class ServoSettings:
     spool_radius_m: float
     most_tension_n: float
     pretension_n: float
+    homing_n: float
     direction: int = 1
-    torque_constant: float | None = None
-    homing_n: float | None = None
-    shortest_m: float = -0.06  # Chosen: the longest excursion of a finger's tendon is 42 mm.
 
     def __post_init__(self) -> None:
-        known = _model_named(self.model)
+        known = model_named(self.model)
         if not 0 <= self.id <= _MOST_ID:
             self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
         if self.direction not in (1, -1):
             self._refuse(f"its direction must be 1 or -1, not {self.direction}")
-        for label, value in (
-            ("spool radius", self.spool_radius_m),
-            ("torque constant", self.newton_metre_per_ampere),
-            ("most tension", self.most_tension_n),
-            ("pretension", self.pretension_n),
-            ("tension for homing", self.homing_tension_n),
-        ):
-            if not 0.0 < value < math.inf:  # Also refuses NaN.
-                self._refuse(f"its {label} must be above 0, not {value:g}")
-        if not -math.inf < self.shortest_m < 0.0:
-            self._refuse(f"its shortest length must be below 0, not {self.shortest_m:g} m")
+        if not 0.0 < self.spool_radius_m < math.inf:  # Also refuses NaN.
+            self._refuse(f"its spool radius must be above 0, not {self.spool_radius_m:g}")
         least, most = self.newton_per_count, known.most_counts * self.newton_per_count
         if not least <= self.most_tension_n <= most:
             words = f"{least:.2g} to {most:.0f} N with this spool, not {self.most_tension_n:g} N"
             self._refuse(f"its most tension must be {words}")
         for label, value in (
             ("pretension", self.pretension_n),
-            ("tension for homing", self.homing_tension_n),
+            ("tension for homing", self.homing_n),
         ):
             if not least <= value <= self.most_tension_n:
                 words = f"{least:.2g} to {self.most_tension_n:g} N, not {value:g} N"
@@ -150,23 +146,12 @@ class ServoSettings:
     @property
     def known(self) -> ServoModel:
         """Model of the servo."""
-        return _model_named(self.model)
-
-    @property
-    def newton_metre_per_ampere(self) -> float:
-        """Torque constant in use, N·m/A."""
-        given = self.torque_constant
-        return self.known.torque_constant if given is None else given
+        return model_named(self.model)
 
     @property
     def newton_per_count(self) -> float:
         """Tension per count of current, N."""
-        return self.newton_metre_per_ampere * self.known.ampere_per_count / self.spool_radius_m
-
-    @property
-    def homing_tension_n(self) -> float:
-        """Tension for finding the zero, N."""
-        return self.pretension_n if self.homing_n is None else self.homing_n
+        return self.known.torque_constant * self.known.ampere_per_count / self.spool_radius_m
 
     @property
     def friction_n(self) -> float | None:
@@ -253,11 +238,6 @@ class BusSettings:
         watchdog_ms: Silence after which the servos stop by themselves, ms; a multiple of 20.
         most_missed: Missed cycles in a row that make a fault.
         ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
-        believed_cycles: Cycles in a row for which a wrong voltage or temperature makes a fault.
-        margin_c: Margin below the model's temperature limit that makes a fault, K.
-        slack_share: Share of the speed without load at which a servo that winds in has lost its
-            tendon.
-        slack_ms: Time for which it must wind in so fast, ms.
     """
 
     device: str
@@ -267,10 +247,6 @@ class BusSettings:
     watchdog_ms: int = 100
     most_missed: int = 5
     ramp_ms: int = 300
-    believed_cycles: int = 3
-    margin_c: float = 5.0
-    slack_share: float = 0.7
-    slack_ms: int = 100
 
     def __post_init__(self) -> None:
         if not self.servos:
@@ -282,6 +258,9 @@ class BusSettings:
             value, times = Counter[object](values).most_common(1)[0]
             if times > 1:
                 raise RobotError(f"The bus at {self.device} has {times} servos of {label} {value}.")
+        if self.baud not in _BAUD_RATES:
+            rates = ", ".join(map(str, _BAUD_RATES))
+            raise RobotError(f"No servo has {self.baud} baud; the baud rates are {rates}.")
         if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % 20:
             raise RobotError(
                 f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
@@ -291,10 +270,6 @@ class BusSettings:
             ("answer_ms", self.answer_ms, 0.1),
             ("most_missed", self.most_missed, 1),
             ("ramp_ms", self.ramp_ms, 0),
-            ("believed_cycles", self.believed_cycles, 1),
-            ("margin_c", self.margin_c, 0),
-            ("slack_share", self.slack_share, 0.05),
-            ("slack_ms", self.slack_ms, 1),
         ):
             if not least <= value < math.inf:
                 raise RobotError(f"{label} must be {least:g} or more, not {value:g}.")

@@ -3,8 +3,8 @@
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
 from shapechanger.twin.servos.bus import SimulatedBus
-from shapechanger.twin.servos.protocol import pack, status
 from shapechanger.twin.servos.servo import ServoPlan
 
 MS = 1_000_000
@@ -14,21 +14,20 @@ def _line(count: int = 1) -> SimulatedBus:
     return SimulatedBus([ServoPlan(i + 1, "XL330-M077") for i in range(count)])
 
 
-def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> bytes:
-    line.receive(pack(servo_id, code, body))
-    return line.send()
+def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> ServoReply | None:
+    return line.execute(servo_id, code, body).get(servo_id)
 
 
-def _write(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
+def _write(line: SimulatedBus, at: int, value: int, size: int = 1) -> int | None:
     """The error of a write to servo 1."""
     data = at.to_bytes(2, "little") + value.to_bytes(size, "little", signed=value < 0)
-    return _ask(line, 1, 3, data)[8]
+    reply = _ask(line, 1, 3, data)
+    return None if reply is None else reply.error
 
 
-def _read(line: SimulatedBus, at: int, size: int) -> tuple[int, bytes]:
+def _read(line: SimulatedBus, at: int, size: int) -> ServoReply | None:
     """Error and data of a read from servo 1."""
-    answer = _ask(line, 1, 2, at.to_bytes(2, "little") + size.to_bytes(2, "little"))
-    return answer[8], answer[9:-2]
+    return _ask(line, 1, 2, at.to_bytes(2, "little") + size.to_bytes(2, "little"))
 
 
 def _pull(line: SimulatedBus, counts: int = 200) -> None:
@@ -37,15 +36,21 @@ def _pull(line: SimulatedBus, counts: int = 200) -> None:
     assert errors == [0, 0, 0]
 
 
-def test_all_answer_a_ping_of_all_in_turn() -> None:
-    """With model number and firmware."""
-    said = b"".join(status(i, 0, b"\xa6\x04\x34") for i in (1, 2, 3))
-    assert _ask(_line(3), 0xFE, 1) == said
+def test_a_ping_is_answered_with_model_and_firmware() -> None:
+    """By the servo that it addresses."""
+    assert _line(3).execute(2, 1, b"") == {2: ServoReply(0, b"\xa6\x04\x34")}
 
 
 def test_nobody_answers_for_an_id_that_is_not_there() -> None:
     """As on a real bus."""
-    assert _ask(_line(), 9, 1) == b""
+    assert _line().execute(9, 1, b"") == {}
+
+
+def test_servos_behind_a_silent_one_stay_silent() -> None:
+    """In a sync read each waits for the one before it."""
+    line = _line(3)
+    line.servos[2].mute = True
+    assert line.execute(0xFE, 0x82, b"\x40\x00\x01\x00\x01\x02\x03") == {1: ServoReply(0, b"\0")}
 
 
 @pytest.mark.parametrize(
@@ -107,8 +112,8 @@ def test_a_silent_host_trips_the_watchdog() -> None:
     assert _write(line, 102, 10, 2) == 0
 
 
-def test_any_packet_feeds_the_watchdog_and_a_damaged_one_does_not() -> None:
-    """Assumed for packets to others; see the module."""
+def test_any_instruction_feeds_the_watchdog() -> None:
+    """Assumed for instructions to others; see the module."""
     line = _line(2)
     _pull(line)
     assert _write(line, 98, 5) == 0
@@ -116,9 +121,7 @@ def test_any_packet_feeds_the_watchdog_and_a_damaged_one_does_not() -> None:
         line.advance(80 * MS)
         _ask(line, 2, 1)
     assert line.servos[1].pulls_a > 0.0
-    line.advance(80 * MS)
-    line.receive(pack(2, 1, b"")[:-1] + b"\x00")
-    line.advance(30 * MS)
+    line.advance(110 * MS)
     assert line.servos[1].pulls_a == 0.0
 
 
@@ -138,13 +141,13 @@ def test_an_error_of_the_hardware_takes_torque_until_a_reboot() -> None:
     line = _line()
     _pull(line)
     line.servos[1].overload()
-    assert _ask(line, 1, 1)[8] == 0x80
+    assert _ask(line, 1, 1) == (0x80, b"\xa6\x04\x34")
     assert _read(line, 70, 1) == (0x80, b"\x20")
     assert _read(line, 64, 1) == (0x80, b"\x00")
-    assert _write(line, 64, 1) & 0x7F == 4
-    assert _ask(line, 1, 8) != b""
+    assert _write(line, 64, 1) == 0x84
+    assert _ask(line, 1, 8) == (0, b"")
     line.advance(299 * MS)
-    assert _ask(line, 1, 1) == b""  # It starts.
+    assert _ask(line, 1, 1) is None  # It starts.
     line.advance(2 * MS)
     assert _read(line, 70, 1) == (0, b"\x00")
     assert _write(line, 64, 1) == 0
@@ -164,37 +167,9 @@ def test_a_reboot_keeps_the_eeprom_and_forgets_turns() -> None:
     assert (before - after) % 4096 == 0
 
 
-def test_a_late_answer_comes_when_its_time_is_there() -> None:
-    """Neither before nor never."""
-    line = _line()
-    line.servos[1].faults.late_ns = 8 * MS
-    assert _ask(line, 1, 1) == b""
-    line.advance(7 * MS)
-    assert line.send() == b""
-    line.advance(2 * MS)
-    assert line.send() == status(1, 0, b"\xa6\x04\x34")
-
-
-def test_half_a_packet_is_dropped_after_a_while() -> None:
-    """Else what comes later would be taken for its end."""
-    line = _line()
-    line.receive(pack(1, 1, b"")[:7])
-    line.advance(20 * MS)
-    assert _ask(line, 1, 1) != b""
-
-
-def test_bytes_take_their_time_on_the_wire() -> None:
-    """10 bytes there, 14 back and 500 us of return delay, at 1 Mbaud."""
-    line = _line()
-    _ask(line, 1, 1)
-    assert line.busy_ns == 240_000 + 500_000
-
-
 def test_lines_that_cannot_be_are_refused() -> None:
-    """Two servos of one id, a baud rate or a model that does not exist."""
+    """Two servos of one id, or a model that does not exist."""
     with pytest.raises(RobotError, match="same id"):
         SimulatedBus([ServoPlan(1), ServoPlan(1)])
-    with pytest.raises(RobotError, match="No servo has 12345 baud"):
-        SimulatedBus([ServoPlan(1)], baud=12345)
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
         SimulatedBus([ServoPlan(1, "XL330-M28")])

@@ -1,0 +1,163 @@
+"""Serial port of a servo bus, with the packets of `dynamixel_sdk`."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import termios
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from shapechanger.errors import MissingExtra, RobotError
+from shapechanger.robot.drivers.dynamixel.protocol import REFUSED, ServoReply
+from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+
+try:
+    from dynamixel_sdk import PacketHandler, PortHandler
+except ImportError as error:
+    raise MissingExtra("dynamixel-sdk", "finger") from error
+
+# Bytes that may still be read after the timeout of an answer: they arrived while the process did
+# not run. More is endless noise, which the SDK would read for ever.
+_MAX_LATE_BYTES: Final = 1024
+# Damaged packets to skip while waiting for valid ones.
+_MAX_DAMAGED: Final = 8
+_STATUS_BYTES: Final = 11  # Of a status packet without data.
+
+# Results of the SDK (robotis_def.py).
+_SUCCESS: Final = 0
+_RX_TIMEOUT: Final = -3001
+_RX_CORRUPT: Final = -3002
+
+
+class PromptPort(PortHandler):
+    """The SDK's port with a timeout as short as the bus allows.
+
+    The SDK alone waits 34 ms for each missing answer, by a clock that changes with the date, and
+    keeps the processor busy meanwhile. A stop cannot wait for that.
+
+    Args:
+        device: Serial device.
+        answer_ms: Time for the servos to start an answer, ms.
+    """
+
+    def __init__(self, device: str, answer_ms: float) -> None:
+        super().__init__(device)
+        self._answer_ms = answer_ms
+        self._late_bytes = 0
+
+    def getCurrentTime(self) -> float:
+        """Return the monotonic time in milliseconds."""
+        return time.monotonic_ns() / 1e6
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Start the timeout of an answer of `packet_length` bytes."""
+        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self._answer_ms)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Start a timeout."""
+        self._late_bytes = _MAX_LATE_BYTES
+        super().setPacketTimeoutMillis(msec)
+
+    def readPort(self, length: int) -> bytes:
+        """Return at most `length` bytes, waiting for the first until the timeout."""
+        if length <= 0:
+            return b""
+        left_ms = self.packet_timeout - self.getTimeSinceStart()
+        if left_ms > 0.0:
+            select.select([self.ser.fd], [], [], left_ms / 1e3)
+            return super().readPort(length)
+        data = super().readPort(min(length, self._late_bytes))
+        self._late_bytes -= len(data)
+        return data
+
+
+class SerialServoPort:
+    """Sends instructions and receives replies on a serial port; see `ServoPort`.
+
+    Args:
+        port: Port of the SDK.
+        device: Name of the bus in messages.
+
+    Attributes:
+        has_stray: Whether a late answer was found before a request; the reader resets it.
+    """
+
+    def __init__(self, port: PortHandler, device: str) -> None:
+        self._port = port
+        self._device = device
+        self._sdk = PacketHandler(2.0)
+        self.has_stray = False
+
+    def exchange(
+        self,
+        servo_id: int,
+        instruction: int,
+        parameters: bytes,
+        ids: Sequence[int],
+        length: int,
+    ) -> dict[int, ServoReply]:
+        """Send an instruction and return the replies; see `ServoPort.exchange`."""
+        size = (len(parameters) + 3).to_bytes(2, "little")
+        # The SDK fills in header and CRC.
+        packet = [0, 0, 0, 0, servo_id, *size, instruction, *parameters, 0, 0]
+        self._port.is_using = False  # The SDK leaves it set after an exception.
+        try:
+            self.has_stray |= self._port.getBytesAvailable() > 0
+            if self._sdk.txPacket(self._port, packet) != _SUCCESS:
+                raise RobotError(f"The bus at {self._device} does not take what is written to it.")
+            if not ids:
+                return {}
+            self._port.setPacketTimeout((_STATUS_BYTES + length) * len(ids))
+            return self._replies(ids, length)
+        except (OSError, termios.error) as error:
+            raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
+
+    def close(self) -> None:
+        """Close the port."""
+        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
+            self._port.closePort()
+
+    def _replies(self, ids: Sequence[int], length: int) -> dict[int, ServoReply]:
+        # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
+        # keeps no error byte; so the packets are received one by one here.
+        heard: dict[int, ServoReply] = {}
+        for _ in range(len(ids) + _MAX_DAMAGED):
+            packet, result = self._receive()
+            if result == _RX_TIMEOUT:
+                break
+            if result != _SUCCESS:
+                continue
+            end = 5 + int.from_bytes(bytes(packet[5:7]), "little")
+            servo_id, reply = packet[4], ServoReply(packet[8], bytes(packet[9:end]))
+            if servo_id in ids and (len(reply.data) == length or reply.error & REFUSED):
+                heard[servo_id] = reply
+            if len(heard) == len(ids):
+                break
+        return heard
+
+    def _receive(self) -> tuple[list[int], int]:
+        try:
+            return self._sdk.rxPacket(self._port, False)
+        except IndexError:  # The SDK trusts the length in a packet.
+            return [], _RX_CORRUPT
+
+
+def open_serial_port(settings: BusSettings) -> SerialServoPort:
+    """Open the port of a bus.
+
+    Raises:
+        RobotError: If it cannot be opened with this baud rate.
+    """
+    port = PromptPort(settings.device, settings.answer_ms)
+    try:
+        opened = port.setBaudRate(settings.baud)
+    except OSError as error:
+        raise RobotError(f"The bus at {settings.device} cannot be opened: {error}.") from error
+    if not opened:
+        raise RobotError(
+            f"The bus at {settings.device} cannot have {settings.baud} baud; "
+            "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
+        )
+    return SerialServoPort(port, settings.device)
