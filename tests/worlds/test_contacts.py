@@ -7,7 +7,7 @@ import math
 import mujoco
 import pytest
 
-from shapechanger.bodies.vehicles import PlanarPose
+from shapechanger.bodies.vehicles import Motion
 from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
@@ -33,7 +33,7 @@ class _Bench:
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
-            self.touch.follow(self.data, lambda: PlanarPose(x, 0.0, heading), _DT)
+            self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
 
 
 def test_the_ground_is_nothing_to_run_into() -> None:

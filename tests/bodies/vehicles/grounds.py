@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mujoco
 
 from shapechanger.bodies.vehicles import BoundVehicle, VehicleModel, add_vehicle
+from shapechanger.bodies.vehicles.parts import BATTERY_V
 
 LAND = ("car", "tank", "truck")
 ALL = (*LAND, "boat")
@@ -53,14 +54,14 @@ class Ground:
         self, seconds: float, outputs: Mapping[str, float | None], battery_v: float | None = None
     ) -> None:
         """Let time go by with these outputs."""
-        volts = self.kind.battery_v if battery_v is None else battery_v
+        volts = BATTERY_V if battery_v is None else battery_v
         for _ in range(round(seconds / self.model.opt.timestep)):
             self.vehicle.drive(outputs, volts)
             mujoco.mj_step(self.model, self.data)
 
     def pace(self) -> float:
         """Speed in whatever direction, m/s."""
-        return math.hypot(self.vehicle.speed(), self.vehicle.lateral_speed())
+        return math.hypot(self.vehicle.motion().speed, self.vehicle.motion().lateral_speed)
 
     def uprightness(self) -> float:
         """Cosine of the angle between the vehicle's upright axis and the world's."""

@@ -17,7 +17,7 @@ def test_the_turning_circle_is_geometrys(name: str, throttle: float, side: float
     """At full lock, from the wheelbase and the angle of the wheels alone."""
     here = ground(name)
     here.drive(8.0, {"wheels": throttle, "steering": side})
-    radius = here.pace() / abs(here.vehicle.yaw_rate())
+    radius = here.pace() / abs(here.vehicle.motion().yaw_rate)
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.15)
 
 
@@ -60,14 +60,17 @@ def test_the_car_slips_on_ice() -> None:
     dry, ice = ground("car"), ground("car", friction=0.3)
     for here in (dry, ice):
         here.drive(0.3, AHEAD["car"])
-    assert ice.vehicle.speed() < 0.7 * dry.vehicle.speed()
-    assert ice.vehicle.travelled_m() > 1.3 * ice.vehicle.pose().x
+    assert ice.vehicle.motion().speed < 0.7 * dry.vehicle.motion().speed
+    assert ice.vehicle.travelled_m() > 1.3 * ice.vehicle.motion().x
     slips: list[float] = []
     for here in (dry, ice):
         most = 0.0
         for _ in range(20):
             here.drive(0.1, {"wheels": 1.0, "steering": -1.0})
-            aside, ahead = abs(here.vehicle.lateral_speed()), abs(here.vehicle.speed())
+            aside, ahead = (
+                abs(here.vehicle.motion().lateral_speed),
+                abs(here.vehicle.motion().speed),
+            )
             most = max(most, math.atan2(aside, ahead))
         slips.append(most)
     assert slips[0] < math.radians(20.0)
@@ -98,16 +101,16 @@ def test_it_scrapes_along_a_wall(name: str) -> None:
         height = max(height, abs(here.height()))
     assert upright > 0.99
     assert height < 0.02
-    assert here.vehicle.pose().y > -2.5
+    assert here.vehicle.motion().y > -2.5
 
 
 def test_the_tank_turns_on_the_spot() -> None:
     """Its middle stays where it was."""
     here = ground("tank")
     here.drive(3.0, {"left track": -0.5, "right track": 0.5})
-    pose = here.vehicle.pose()
+    pose = here.vehicle.motion()
     assert math.hypot(pose.x, pose.y) < 0.05
-    assert here.vehicle.yaw_rate() > 0.8
+    assert here.vehicle.motion().yaw_rate > 0.8
     assert abs(here.vehicle.travelled_m()) < 0.05
 
 
@@ -118,8 +121,8 @@ def test_swapped_tracks_turn_the_other_way() -> None:
     for left, right in ((0.8, 0.3), (0.3, 0.8)):
         here.vehicle.place(0.0, 0.0, 0.0)
         here.drive(3.0, {"left track": left, "right track": right})
-        rates.append(here.vehicle.yaw_rate())
-        assert here.vehicle.speed() > 0.1
+        rates.append(here.vehicle.motion().yaw_rate)
+        assert here.vehicle.motion().speed > 0.1
     assert rates[0] < -0.2
     assert rates[1] == pytest.approx(-rates[0], rel=0.02)
 
@@ -131,7 +134,7 @@ def test_the_tank_steers_while_it_drives() -> None:
     for inner in (0.6, 0.3):
         here.vehicle.place(0.0, 0.0, 0.0)
         here.drive(3.0, {"left track": inner, "right track": 0.8})
-        radii.append(here.vehicle.speed() / here.vehicle.yaw_rate())
+        radii.append(here.vehicle.motion().speed / here.vehicle.motion().yaw_rate)
     assert radii[0] > 1.5 * radii[1] > 0.1
 
 
@@ -184,4 +187,4 @@ def test_gear_and_bed_do_nothing() -> None:
     """A truck's robot may have them."""
     here = ground("truck")
     here.drive(2.0, {**AHEAD["truck"], "gear": 1.0, "bed": -1.0})
-    assert here.vehicle.speed() > 1.3
+    assert here.vehicle.motion().speed > 1.3
