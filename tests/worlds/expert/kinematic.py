@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.expert.lattice import ClearanceField
+from shapechanger.worlds.expert.path import ClearanceField
 from shapechanger.worlds.world import Pose
 
 SIZES = {"car": (0.40, 0.20), "tank": (0.32, 0.24), "truck": (0.50, 0.20), "boat": (0.60, 0.20)}

@@ -53,12 +53,13 @@ def test_progress_counts_laps_and_counts_down() -> None:
     line = ClosedLine(course.route)
     progress = CourseProgress(course)
     progress.reset(*line.at(5.0))
+    metres = 0.0
     for station in np.arange(5.0, 5.0 + 3 * line.length, 0.1):
-        progress.update(*line.at(float(station)))
-    assert progress.metres == pytest.approx(3 * line.length, abs=0.2)
+        metres = progress.update(*line.at(float(station)))
+    assert metres == pytest.approx(3 * line.length, abs=0.2)
     for station in np.arange(5.0 + 3 * line.length, 4.0, -0.1):
-        progress.update(*line.at(float(station)))
-    assert progress.metres == pytest.approx(-1.0, abs=0.2)
+        metres = progress.update(*line.at(float(station)))
+    assert metres == pytest.approx(-1.0, abs=0.2)
 
 
 def test_standing_still_is_no_progress() -> None:
@@ -69,4 +70,4 @@ def test_standing_still_is_no_progress() -> None:
     progress.reset(x, y)
     for _ in range(50):
         progress.update(x, y)
-    assert progress.metres == 0.0
+    assert progress.update(x, y) == 0.0

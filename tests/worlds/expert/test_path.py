@@ -11,8 +11,8 @@ import pytest
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.expert import CoursePath, plan_path
-from shapechanger.worlds.expert.lattice import FAR_M, ClearanceField
 from shapechanger.worlds.expert.line import ClosedLine
+from shapechanger.worlds.expert.path import FAR_M, ClearanceField
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
 from tests.worlds.expert.courses import ring
@@ -103,10 +103,10 @@ def test_a_gap_is_found_until_it_is_too_narrow() -> None:
 def test_ahead_goes_round() -> None:
     """A whole lap ahead is here."""
     path = plan_path(ring(5), 0.1, 0.12)
-    assert path.ahead(3.0, path.length) == pytest.approx(path.ahead(3.0, 0.0))
-    spot = path.nearest(*path.ahead(3.0, 1.0), hint=3.0)
+    assert path.at(3.0 + path.length) == pytest.approx(path.at(3.0))
+    spot = path.nearest(*path.at(4.0), hint=3.0)
     assert spot.station == pytest.approx(4.0)
-    assert path.way(path.length - 1.0, 1.0) == pytest.approx(2.0)
+    assert path.ahead_by(path.length - 1.0, 1.0) == pytest.approx(2.0)
 
 
 def test_distances_are_exact() -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, Disturbance
+from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.simulation import MujocoWorld
 from shapechanger.worlds.world import Pose
 
@@ -55,8 +56,8 @@ class VehicleDemonstrator:
         self._course = self._world.course
         self._expert = CourseExpert(self._course, self._world.vehicle.name, path=self._world.path())
         self._expert.reset(self._world.pose)
-        self._disturbance = Disturbance.of(
-            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
+        self._disturbance = Disturbance(
+            int(self._seeds.integers(2**31)), traits_of(self._world.vehicle.name).sway
         )
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -100,8 +101,8 @@ class TeacherDemonstrator:
 
     def begin(self) -> None:
         """Begin an episode."""
-        self._disturbance = Disturbance.of(
-            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
+        self._disturbance = Disturbance(
+            int(self._seeds.integers(2**31)), traits_of(self._world.vehicle.name).sway
         )
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -39,8 +39,8 @@ WIDEST_RAD: Final = 1.0
 _SIZE: Final = (160, 120)
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
 _LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
-# Of the slow wandering and jerks of a demonstrator: as much as steering by 0.25 is in the car.
-_SWAY: Final = (0.18, 0.1)
+# Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
+_SWAY: Final = 0.18
 
 # Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
 # is left out because the vehicle is still changing its motion.
@@ -333,7 +333,7 @@ class WaypointDemonstrator:
         """Begin an episode."""
         world = self._world
         self._expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
-        self._disturbance = Disturbance(seed=int(self._seeds.integers(2**31)), size=_SWAY)
+        self._disturbance = Disturbance(int(self._seeds.integers(2**31)), _SWAY)
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return the waypoint, to learn from, and the disturbed one, to drive to.
@@ -343,7 +343,7 @@ class WaypointDemonstrator:
         """
         pose, path = self._world.pose, self._expert.path
         station = path.nearest(pose.x, pose.y).station
-        x, y = path.ahead(station, AHEAD_M)
+        x, y = path.at(station + AHEAD_M)
         left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
         share = self._expert.speeds[path.index(station)] / self._world.vehicle.top_speed_mps
         waypoint = np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)
