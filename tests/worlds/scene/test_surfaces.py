@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.worlds.course import Course, Lamp, Wall
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.scene.surfaces import Light, wall_patches
+from shapechanger.worlds.surfaces import Light, wall_patches
 from tests.worlds.scene.courses import square, with_walls
 
 

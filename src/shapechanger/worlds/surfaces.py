@@ -4,14 +4,157 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Obstacle, Wall
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.scene.patches import Array, Patches, add_box, add_turned, grid_cells
+from shapechanger.worlds.paint import CELLS, ROWS
+
+Array = NDArray[np.float64]
+
+# The corners of a patch are counter-clockwise seen from its front.
+_TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
+# A mirrored patch has the opposite order.
+_MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
+_DOWN: Final = np.array([1.0, 1.0, -1.0])
+
+
+@dataclass(slots=True)
+class Patches:
+    """Patches with texture coordinates and light.
+
+    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
+    coordinates are u to the right and v down, from 0 to 1.
+    """
+
+    _corners: list[Array] = field(default_factory=list[Array])
+    _places: list[Array] = field(default_factory=list[Array])
+    _lights: list[Array] = field(default_factory=list[Array])
+
+    def add(self, corners: Array, places: Array, lights: Array | float = 1.0) -> None:
+        """Add n patches.
+
+        Args:
+            corners: Corners, m, (n, 4, 3).
+            places: Texture coordinates of the corners, (n, 4, 2).
+            lights: Brightness of each corner, 0 to 1, (n, 4); or of all of them.
+        """
+        self._corners.append(corners)
+        self._places.append(places)
+        self._lights.append(np.broadcast_to(np.asarray(lights, float), corners.shape[:2]))
+
+    def __bool__(self) -> bool:
+        return bool(self._corners)
+
+    def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
+
+        Args:
+            mirrored: Whether to add a copy mirrored below the ground, for a glossy ground.
+        """
+        points = np.concatenate(self._corners).reshape(-1, 3)
+        places = np.concatenate(self._places).reshape(-1, 2)
+        lights = np.concatenate(self._lights).reshape(-1)
+        first = np.arange(0, len(points), 4)[:, None, None]
+        triangles = (first + _TRIANGLES).reshape(-1, 3)
+        if mirrored:
+            below = (first + len(points) + _MIRRORED).reshape(-1, 3)
+            triangles = np.concatenate([triangles, below])
+            points = np.concatenate([points, points * _DOWN])
+            places, lights = np.tile(places, (2, 1)), np.tile(lights, 2)
+        return points, places, lights, triangles
+
+
+# Margin of a texture cell, so that its neighbours do not bleed into it at a distance.
+_INSET: Final = 0.08
+_SIDES: Final = 10
+# Corners of a cube from -1 to 1: four sides and the top, counter-clockwise from the lower left.
+_BOX: Final = np.array(
+    [
+        [(1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)],
+        [(1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1)],
+        [(-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1)],
+        [(-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1)],
+        [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
+    ],
+    float,
+)
+_BOX_LIGHT: Final = np.array([0.9, 0.75, 0.7, 0.85, 1.0])
+_FOOT: Final = 0.75
+
+
+def _add_box(
+    patches: Patches, middle: Array, half: Array, yaw: float, stuff: str, light: float
+) -> None:
+    """Add an upright box.
+
+    Args:
+        patches: Patches to extend.
+        middle: Its centre, m, (3,).
+        half: Half sizes, m, (3,).
+        yaw: Rotation about the vertical axis, rad.
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
+    corners = _turned(_BOX * half, yaw) + middle
+    lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
+    lights[:4, :2] *= _FOOT
+    patches.add(corners, np.tile(_cell(stuff, _square()), (5, 1, 1)), lights)
+
+
+def _add_turned(
+    patches: Patches, x: float, y: float, profile: Array, stuff: str, light: float
+) -> None:
+    """Add a solid of revolution.
+
+    Args:
+        patches: Patches to extend.
+        x: Position of its axis, m.
+        y: Position of its axis, m.
+        profile: Radius and height from below, m, (n, 2).
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points = np.empty((len(profile), _SIDES + 1, 3))
+    points[..., :2] = profile[:, None, :1] * ring + (x, y)
+    points[..., 2] = profile[:, None, 1]
+    rise = profile[:, 1] - profile[0, 1]
+    places = np.empty((len(profile), _SIDES + 1, 2))
+    places[..., 0] = np.abs(2.0 * angle / (2.0 * np.pi) - 1.0)
+    places[..., 1] = 1.0 - (rise / max(float(rise[-1]), 1e-6))[:, None]
+    lights = np.empty((len(profile), _SIDES + 1, 1))
+    lights[..., 0] = light * (0.82 + 0.18 * np.cos(angle - 0.7))
+    lights[0] *= _FOOT
+    patches.add(_grid_cells(points), _cell(stuff, _grid_cells(places)), _grid_cells(lights)[..., 0])
+
+
+def _square() -> Array:
+    return np.array([[(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)]])
+
+
+def _cell(stuff: str, places: Array) -> Array:
+    """Texture coordinates within a cell, as coordinates within the whole texture."""
+    row, column = divmod(CELLS[stuff], ROWS)
+    return (np.array([column, row]) + _INSET + (1.0 - 2.0 * _INSET) * places) / ROWS
+
+
+def _turned(corners: Array, yaw: float) -> Array:
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return corners @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _grid_cells(grid: Array) -> Array:
+    """Corners of each cell of a grid (rows, columns, k) with rows upwards: (n, 4, k)."""
+    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+    return np.stack(corners, axis=2).reshape(-1, 4, grid.shape[-1])
+
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
@@ -71,29 +214,27 @@ _VERGE_WIDTH: Final = 0.4
 def ground_patches(course: Course, light: Light) -> Patches:
     """Ground of the lane and a margin, seen from above."""
     corners = _tiles(course)
-    patches = Patches()
-    patches.add(
-        np.concatenate([corners, np.zeros((*corners.shape[:2], 1))], axis=2),
-        corners / _GROUND_PERIOD,
-        light.on_ground(corners),
-    )
-    return patches
+    return _level(corners, 0.0, _GROUND_PERIOD, light.on_ground(corners))
 
 
 def ceiling_patches(course: Course, light: Light) -> Patches:
     """Ceiling, seen from below."""
     corners = _tiles(course)[:, ::-1]
+    return _level(corners, course.ceiling_m, _CEILING_PERIOD, 0.9 * light.on_ground(corners))
+
+
+def _level(corners: Array, height: float, period: float, lights: Array) -> Patches:
+    """Horizontal patches with a texture of a width `period`, m."""
     patches = Patches()
-    patches.add(
-        np.concatenate([corners, np.full((*corners.shape[:2], 1), course.ceiling_m)], axis=2),
-        corners / _CEILING_PERIOD,
-        0.9 * light.on_ground(corners),
-    )
+    up = np.full((*corners.shape[:2], 1), height)
+    patches.add(np.concatenate([corners, up], axis=2), corners / period, lights)
     return patches
 
 
-def lamp_patches(course: Course, place: Array) -> Patches:
-    """Lamps, seen from below, with the texture coordinate `place`, (2,), everywhere."""
+def lamp_patches(course: Course) -> Patches:
+    """Lamps, seen from below, with the middle of their texture cell everywhere."""
+    row, column = divmod(CELLS["lamp"], ROWS)
+    place = (np.array([column, row]) + 0.5) / ROWS
     patches = Patches()
     for lamp in course.lamps:
         cos, sin = np.cos(lamp.yaw), np.sin(lamp.yaw)
@@ -111,8 +252,6 @@ def verge_patches(course: Course, light: Light) -> Patches:
     for wall in course.walls:
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
         length = float(np.hypot(*(end - start)))
-        if length <= 0.0:
-            continue
         along = (end - start) / length
         inwards = _VERGE_WIDTH * np.array([-along[1], along[0]])
         flat = np.array([start, end, end + inwards, start + inwards])
@@ -202,8 +341,6 @@ def _add(
     """
     start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
     length = float(np.hypot(*(end - start)))
-    if length <= 0.0:
-        return
     columns = max(1, int(np.ceil(length / _LONGEST)))
     share = np.linspace(0.0, 1.0, columns + 1)
     across, down = _spread(wall, length, low, high)
@@ -219,7 +356,7 @@ def _add(
     along = end - start
     facing = light.facing(float(np.arctan2(along[0], -along[1])))
     lights = _UPWARDS[:, None] * (facing * light.on_ground(base))[None, :]
-    patches.add(grid_cells(points), grid_cells(places), grid_cells(lights[..., None])[..., 0])
+    patches.add(_grid_cells(points), _grid_cells(places), _grid_cells(lights[..., None])[..., 0])
 
 
 def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, float]:
@@ -284,16 +421,16 @@ def obstacle_patches(course: Course, light: Light) -> Patches:
         if obstacle.is_round:
             for outline, stuff in _ROUND[obstacle.kind]:
                 profile = np.array(outline) * (obstacle.length, obstacle.height)
-                add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
+                _add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
         else:
-            _add_boxes(patches, obstacle, bright)
+            __add_boxes(patches, obstacle, bright)
     return patches
 
 
-def _add_boxes(patches: Patches, obstacle: Obstacle, bright: float) -> None:
+def __add_boxes(patches: Patches, obstacle: Obstacle, bright: float) -> None:
     size = np.array([obstacle.length, obstacle.width, obstacle.height])
     cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
     for half, place, stuff in _BOXES[obstacle.kind]:
         dx, dy, dz = np.array(place) * size
         middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
-        add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)
+        _add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)
