@@ -101,10 +101,12 @@ def _add_box(
         stuff: Cell of the texture.
         light: Brightness, 0 to 1.
     """
-    corners = _turned(_BOX * half, yaw) + middle
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    corners = _BOX * half @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + middle
     lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
     lights[:4, :2] *= _FOOT
-    patches.add(corners, np.tile(_cell(stuff, _square()), (5, 1, 1)), lights)
+    square = np.array([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+    patches.add(corners, np.tile(_cell(stuff, square), (5, 1, 1)), lights)
 
 
 def _add_turned(
@@ -135,19 +137,10 @@ def _add_turned(
     patches.add(_grid_cells(points), _cell(stuff, _grid_cells(places)), _grid_cells(lights)[..., 0])
 
 
-def _square() -> Array:
-    return np.array([[(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)]])
-
-
 def _cell(stuff: str, places: Array) -> Array:
     """Texture coordinates within a cell, as coordinates within the whole texture."""
     row, column = divmod(CELLS[stuff], ROWS)
     return (np.array([column, row]) + _INSET + (1.0 - 2.0 * _INSET) * places) / ROWS
-
-
-def _turned(corners: Array, yaw: float) -> Array:
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return corners @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _grid_cells(grid: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What all four vehicles promise: how they stand, go, turn, stop and bump."""
+"""Properties of all four vehicles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.bodies.vehicles.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground,
 
 @pytest.mark.parametrize("name", ALL)
 def test_it_stands_still_at_rest(name: str) -> None:
-    """No creeping, no trembling: a tenth of a millimetre in ten seconds."""
+    """A vehicle at rest creeps by less than 0.1 mm in ten seconds."""
     here = ground(name)
     here.drive(1.0, {})
     before = here.vehicle.motion()
@@ -29,7 +29,7 @@ def test_it_stands_still_at_rest(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_top_speed_is_as_declared(name: str) -> None:
-    """Straight on, and the encoder or the log agrees with the way that it went."""
+    """The top speed is as declared, and the odometer agrees."""
     here = ground(name)
     here.drive(6.0, AHEAD[name])
     assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
@@ -40,7 +40,7 @@ def test_top_speed_is_as_declared(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_less_voltage_is_less_speed(name: str) -> None:
-    """A battery that runs low shows."""
+    """Speed falls with the voltage."""
     here = ground(name)
     here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
     assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
@@ -48,7 +48,7 @@ def test_less_voltage_is_less_speed(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_backwards_counts_down(name: str) -> None:
-    """Speed and distance have signs."""
+    """Speed and distance are negative backwards."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], -0.5))
     assert here.vehicle.motion().speed < -0.05
@@ -58,7 +58,7 @@ def test_backwards_counts_down(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_left_is_counter_clockwise(name: str) -> None:
-    """And the mirror image turns the other way just as fast."""
+    """Left turns are positive, and right turns mirror them."""
     here = ground(name)
     here.drive(3.0, TO_THE_LEFT[name])
     left = here.vehicle.motion().yaw_rate
@@ -77,7 +77,7 @@ def test_left_is_counter_clockwise(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("value", [0.03, -0.05])
 def test_a_small_value_moves_nothing(name: str, value: float) -> None:
-    """Friction in the gear holds it: less than a millimetre a second."""
+    """Outputs within the dead band do not move a vehicle."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], value))
     assert here.pace() < 1e-3
@@ -87,7 +87,7 @@ def test_a_small_value_moves_nothing(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", LAND)
 def test_zero_brakes_on_land(name: str) -> None:
-    """The shorted motor brakes; without a connection it coasts further."""
+    """A shorted motor brakes more than an open one."""
     here = ground(name)
     ways: list[float] = []
     for value in (0.0, None):
@@ -104,7 +104,7 @@ def test_zero_brakes_on_land(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_stalled_motor_draws_most(name: str) -> None:
-    """The current is that of the winding alone before it turns, and less at speed."""
+    """The stall current is that of the winding, and less flows at speed."""
     here = ground(name)
     here.vehicle.drive(AHEAD[name], BATTERY_V)
     stalled = here.vehicle.current_a()
@@ -117,7 +117,7 @@ def test_a_stalled_motor_draws_most(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 def test_a_wall_stops_it(name: str, heading: float) -> None:
-    """At top speed, head on and askew: it neither climbs, nor tips, nor passes."""
+    """A wall stops a vehicle, which neither climbs nor tips."""
     here = ground(name, wall_x=6.0)
     here.vehicle.place(0.0, 0.0, heading)
     most_height, least_upright, furthest = 0.0, 1.0, 0.0
@@ -137,7 +137,7 @@ def test_a_wall_stops_it(name: str, heading: float) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_wild_outputs_break_nothing(name: str) -> None:
-    """A minute of random values, now and then without a connection, between walls."""
+    """Random outputs keep the simulation stable."""
     rng = np.random.default_rng(7)
     here = ground(name, wall_x=2.0)
     with np.errstate(all="raise"):
@@ -154,7 +154,7 @@ def test_wild_outputs_break_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_placing_forgets_everything(name: str) -> None:
-    """The same drive from the same place is the same, to the last bit."""
+    """`place` resets the whole state."""
     here = ground(name)
     ends: list[tuple[float, float, float, float]] = []
     for _ in range(2):
@@ -171,7 +171,7 @@ def test_placing_forgets_everything(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_speed_is_along_the_heading(name: str) -> None:
-    """Wherever it points."""
+    """Speed is measured along the heading."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 2.5)
     here.drive(2.0, AHEAD[name])
@@ -183,7 +183,7 @@ def test_speed_is_along_the_heading(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
-    """Hulls meet walls, wheels the ground too, what is only seen nothing."""
+    """Collision bits and names follow the conventions."""
     model = ground(name).model
     for i in range(model.ngeom):
         geom = model.geom(i)
@@ -203,7 +203,7 @@ def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_its_size_is_as_declared(name: str) -> None:
-    """What collides ends where the numbers say, which the worlds rely on."""
+    """The extent of the collision geoms is as declared."""
     here = ground(name)
     hits: list[float] = []
     for geom in map(here.model.geom, range(here.model.ngeom)):
@@ -220,7 +220,7 @@ def test_its_size_is_as_declared(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_its_camera_looks_ahead(name: str) -> None:
-    """Along the heading, level with the horizon or a little below."""
+    """The camera looks along the heading, level or slightly down."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 1.0)
     axes = here.data.camera("vehicle/camera").xmat.reshape(3, 3)

@@ -1,4 +1,4 @@
-"""The boat: no brakes, drift, currents, and two ways to steer."""
+"""The boat: gliding, drift, currents and twin propellers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.bodies.vehicles.grounds import AHEAD, TO_THE_LEFT, ground
 
 
 def test_it_has_no_brakes() -> None:
-    """A second after the motor stopped it still goes, whether shorted or not."""
+    """A boat glides on for more than a second without thrust."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
     fast = here.vehicle.motion().speed
@@ -20,7 +20,7 @@ def test_it_has_no_brakes() -> None:
 
 
 def test_astern_is_weak() -> None:
-    """It stops by reversing, slowly, and goes backwards slowly."""
+    """Reverse thrust is weak."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
     here.drive(0.5, {"propeller": -1.0, "rudder": 0.0})
@@ -30,7 +30,7 @@ def test_astern_is_weak() -> None:
 
 
 def test_it_drifts_outwards_in_a_turn() -> None:
-    """In a turn to the left it slides to its right, on a circle some lengths wide."""
+    """In a left turn the boat drifts to the right."""
     here = ground("boat")
     here.drive(8.0, TO_THE_LEFT["boat"])
     assert here.vehicle.motion().lateral_speed < -0.1 * here.vehicle.motion().speed
@@ -41,7 +41,7 @@ def test_it_drifts_outwards_in_a_turn() -> None:
 
 
 def test_it_slows_down_in_a_turn() -> None:
-    """As every ship does."""
+    """A turn reduces the speed."""
     here = ground("boat")
     here.drive(8.0, {"propeller": 0.7, "rudder": 0.0})
     straight = here.vehicle.motion().speed
@@ -50,7 +50,7 @@ def test_it_slows_down_in_a_turn() -> None:
 
 
 def test_a_current_carries_it() -> None:
-    """Over ground; through the water it hardly moves, and turns a little as it is swept away."""
+    """A current moves the boat over ground, hardly through the water."""
     here = ground("boat")
     here.vehicle.set_current(0.0, 0.3)
     here.drive(60.0, {})
@@ -60,7 +60,7 @@ def test_a_current_carries_it() -> None:
 
 
 def test_the_log_goes_by_the_water() -> None:
-    """Against a current the log runs ahead of the ground."""
+    """The log measures distance through the water."""
     here = ground("boat")
     here.vehicle.set_current(-0.3, 0.0)
     here.drive(10.0, AHEAD["boat"])
@@ -70,7 +70,7 @@ def test_the_log_goes_by_the_water() -> None:
 
 
 def test_physics_is_the_same_in_every_steady_current() -> None:
-    """A boat that goes with the flow from the start sees still water (Galilei)."""
+    """Motion relative to a uniform flow is that in still water."""
     still, flowing = ground("boat"), ground("boat")
     flowing.vehicle.set_current(0.2, -0.1)
     flowing.data.qvel[0:2] = (0.2, -0.1)
@@ -82,7 +82,7 @@ def test_physics_is_the_same_in_every_steady_current() -> None:
 
 
 def test_without_thrust_the_rudder_needs_way() -> None:
-    """It steers while it glides, and not at all at rest; the propeller's wash helps at once."""
+    """The rudder needs flow, from motion or from the propeller."""
     here = ground("boat")
     here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
     assert abs(here.vehicle.motion().yaw_rate) < 1e-3
@@ -95,7 +95,7 @@ def test_without_thrust_the_rudder_needs_way() -> None:
 
 
 def test_it_keeps_its_course() -> None:
-    """A push aside dies out; it does not begin to circle by itself."""
+    """A disturbed heading rate decays."""
     here = ground("boat")
     here.drive(5.0, AHEAD["boat"])
     here.data.qvel[2] += 0.5
@@ -104,7 +104,7 @@ def test_it_keeps_its_course() -> None:
 
 
 def test_two_propellers_steer() -> None:
-    """More on the right turns to the left; one ahead and one astern turns at a small way on."""
+    """Differential thrust turns the boat."""
     here = ground("boat")
     both = {"left propeller": 1.0, "right propeller": 1.0}
     here.drive(8.0, both)
@@ -118,7 +118,7 @@ def test_two_propellers_steer() -> None:
 
 
 def test_two_propellers_share_fairly() -> None:
-    """Straight on for some lengths, and twice the current of one at a standstill."""
+    """Equal thrust drives straight and draws twice the current."""
     here = ground("boat")
     here.vehicle.drive({"left propeller": 1.0, "right propeller": 1.0}, 7.2)
     assert here.vehicle.current_a() == pytest.approx(14.4)

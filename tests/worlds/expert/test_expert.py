@@ -1,4 +1,4 @@
-"""The expert drives every vehicle round without touching, and gets away where it touched."""
+"""The expert drives every vehicle without collisions and recovers when stuck."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _drive(
     seconds: float,
     disturbance: Disturbance | None = None,
 ) -> float:
-    """Net progress after some time, m."""
+    """Return the net progress after some time, m."""
     progress = CourseProgress(course)
     progress.reset(vehicle.pose.x, vehicle.pose.y)
     for _ in range(round(seconds / 0.05)):
@@ -43,7 +43,7 @@ def _drive(
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", _HOMES)
 def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
-    """From a start on the middle of the lane, fast and without touching anything."""
+    """The expert is fast and touches nothing."""
     course = lay_out(_HOMES[name], seed)
     vehicle = Kinematic(name, course, start_pose(course, seed))
     metres = _drive(vehicle, CourseExpert(course, name), course, 30.0)
@@ -53,7 +53,7 @@ def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", _HOMES)
 def test_disturbances_are_put_right(name: str) -> None:
-    """What wanders and jerks comes back to its line, mostly without touching anything."""
+    """The expert corrects wandering and jerks with at most one collision."""
     course = lay_out(_HOMES[name], 6)
     vehicle = Kinematic(name, course, start_pose(course, 6))
     expert = CourseExpert(course, name)
@@ -65,7 +65,7 @@ def test_disturbances_are_put_right(name: str) -> None:
 
 
 def test_a_boat_holds_against_the_current() -> None:
-    """Water that moves at a fifth of its speed sets it off its line by little."""
+    """A current of a fifth of its speed displaces it by less than 0.35 m."""
     course = ring(2, half_width=2.5, radius=10.0, gap=1.8, current=(0.2, -0.1))
     x, y = course.route[0]
     ahead = course.route[1] - course.route[0]
@@ -83,7 +83,7 @@ def test_a_boat_holds_against_the_current() -> None:
 @pytest.mark.parametrize("name", _HOMES)
 @pytest.mark.parametrize("side", [1, -1])
 def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
-    """With its nose at a wall it backs up, turns, and goes on."""
+    """A vehicle that faces a wall backs up, turns and drives on."""
     half_width = 1.2 if name in ("car", "tank") else 2.5
     course = ring(7, half_width=half_width, radius=10.0, obstacles=0)
     ahead = course.route[31] - course.route[30]
@@ -101,7 +101,7 @@ def pose_on(expert: CourseExpert, i: int) -> Pose:
 
 
 def test_it_backs_up_when_it_stands_still() -> None:
-    """After 0.7 s of throttle without motion, and forward again later."""
+    """Recovery starts after 0.7 s of throttle without motion and ends by driving forward."""
     course = ring(0)
     expert = CourseExpert(course, "car")
     pose = pose_on(expert, 0)
@@ -114,7 +114,7 @@ def test_it_backs_up_when_it_stands_still() -> None:
 
 
 def test_the_same_seed_does_the_same() -> None:
-    """Also while it gets away from walls."""
+    """Equal seeds give equal actions during recovery; other seeds give others."""
     course = ring(1)
 
     def track(seed: int) -> list[float]:
@@ -127,7 +127,7 @@ def test_the_same_seed_does_the_same() -> None:
 
 
 def test_a_reset_forgets_everything() -> None:
-    """The next episode begins as the first did, its randomness aside."""
+    """After `reset`, the first actions of an episode repeat."""
     course = ring(1)
     expert = CourseExpert(course, "boat")
     pose = pose_on(expert, 50)
@@ -140,7 +140,7 @@ def test_a_reset_forgets_everything() -> None:
 
 
 def test_an_unknown_vehicle_is_named() -> None:
-    """With the nearest spelling."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'truck'"):
         CourseExpert(ring(0), "trukc")
 
